@@ -1,0 +1,3 @@
+//! The `canter` command.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! The canonical robot command language: text, JSON, diagnostics.

@@ -1,0 +1,1 @@
+//! Queue, planner and real-time executor of canonical robot commands.

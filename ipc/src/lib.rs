@@ -1,0 +1,1 @@
+//! The process border: messages and channels over iceoryx2.

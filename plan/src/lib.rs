@@ -1,0 +1,1 @@
+//! Plan interpreters (PDDL, kitting process plans) and the world model.

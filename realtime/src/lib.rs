@@ -1,0 +1,3 @@
+//! What runs once in every control period: no heap, no lock, no failure.
+#![no_std]
+#![forbid(unsafe_code)]

@@ -1,0 +1,1 @@
+//! State-to-state moves, smooth paths through tolerance balls, path timing.
