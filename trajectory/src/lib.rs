@@ -1,1 +1,5 @@
 //! State-to-state moves, smooth paths through tolerance balls, path timing.
+
+pub mod limits;
+pub mod line;
+pub mod path;
