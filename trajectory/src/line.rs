@@ -44,7 +44,12 @@ impl Line {
     pub fn new(start: Isometry3<f64>, end: Isometry3<f64>) -> Self {
         let direction = end.translation.vector - start.translation.vector;
         let turn = body_turn(&start.rotation, &end.rotation);
-        Self { start, end, direction, turn }
+        Self {
+            start,
+            end,
+            direction,
+            turn,
+        }
     }
 
     /// Length of the way of the controlled point, m.
@@ -117,8 +122,12 @@ mod tests {
     use proptest::test_runner::RngSeed;
 
     fn pose() -> impl Strategy<Value = Isometry3<f64>> {
-        prop::array::uniform6(-3.0..3.0_f64)
-            .prop_map(|x| Isometry3::new(Vector3::new(x[0], x[1], x[2]), Vector3::new(x[3], x[4], x[5])))
+        prop::array::uniform6(-3.0..3.0_f64).prop_map(|x| {
+            Isometry3::new(
+                Vector3::new(x[0], x[1], x[2]),
+                Vector3::new(x[3], x[4], x[5]),
+            )
+        })
     }
 
     proptest! {

@@ -76,9 +76,18 @@ impl Certificate {
     /// The factor by which time must be stretched so that all limits hold; 1
     /// when they do. Stretching never changes the way.
     pub(crate) fn stretch(&self) -> f64 {
-        let second = self.acceleration.ratio.max(self.angular_acceleration.ratio).sqrt();
+        let second = self
+            .acceleration
+            .ratio
+            .max(self.angular_acceleration.ratio)
+            .sqrt();
         let third = self.jerk.ratio.max(self.angular_jerk.ratio).cbrt();
-        self.speed.ratio.max(self.angular_speed.ratio).max(second).max(third).max(1.0)
+        self.speed
+            .ratio
+            .max(self.angular_speed.ratio)
+            .max(second)
+            .max(third)
+            .max(1.0)
     }
 
     fn limits(&self) -> [Peak; 6] {
@@ -135,7 +144,9 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
 /// while it is above the limit and above what the ends show.
 fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> f64 {
     let norms = control.map(|c| c.norm() / limit);
-    let bound = norms.iter().fold(0.0, |worst: f64, n| if *n <= worst { worst } else { *n });
+    let bound = norms
+        .iter()
+        .fold(0.0, |worst: f64, n| if *n <= worst { worst } else { *n });
     let ends = norms[0].max(norms[M - 1]);
     if depth == 0 || bound <= 0.9 || bound <= ends * (1.0 + 1e-4) {
         return bound;
@@ -153,7 +164,11 @@ fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
     let parts: u32 = if span.turns.len() == 1 { 1 } else { 4 };
     let width = span.duration / f64::from(parts);
     let limits = &options.limits;
-    let caps = [limits.angular_speed, limits.angular_acceleration, limits.angular_jerk];
+    let caps = [
+        limits.angular_speed,
+        limits.angular_acceleration,
+        limits.angular_jerk,
+    ];
     let mut worst = [0.0_f64; 3];
     for part in 0..parts {
         let from = width * f64::from(part);
@@ -170,8 +185,11 @@ fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
 fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
     let half = (to - from) / 2.0;
     let mut rotation = span.base;
-    let (mut rate, mut rate2, mut rate3) =
-        ([Vector3::zeros(); 4], [Vector3::zeros(); 3], [Vector3::zeros(); 2]);
+    let (mut rate, mut rate2, mut rate3) = (
+        [Vector3::zeros(); 4],
+        [Vector3::zeros(); 3],
+        [Vector3::zeros(); 2],
+    );
     // Bounds of the angular velocity and its derivative of the factors before.
     let (mut before, mut before2, mut rest) = (0.0, 0.0, [0.0_f64; 3]);
     let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(span.turns.len());
@@ -187,10 +205,17 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
         let (m1, m2, m3) = (largest(&first), largest(&second), largest(&third));
         // The axis turns with the factors before it; where they share its
         // direction it does not turn at all.
-        let skew = axes.iter().fold(0.0_f64, |worst, other| worst.max(sine(other, &axis)));
-        let skew = if skew < 1e-12 { 0.0 } else { (skew + 2.0 * before * half).min(1.0) };
+        let skew = axes
+            .iter()
+            .fold(0.0_f64, |worst, other| worst.max(sine(other, &axis)));
+        let skew = if skew < 1e-12 {
+            0.0
+        } else {
+            (skew + 2.0 * before * half).min(1.0)
+        };
         let axis1 = length * before * skew;
-        let axis2 = length * before2 * skew.max(if skew > 0.0 { 1.0 } else { 0.0 }) + before * axis1;
+        let axis2 =
+            length * before2 * skew.max(if skew > 0.0 { 1.0 } else { 0.0 }) + before * axis1;
         let drift = axis1 * half;
         for (sum, c) in rate.iter_mut().zip(first) {
             *sum += axis * c;
@@ -223,16 +248,15 @@ fn largest<const M: usize>(control: &[f64; M]) -> f64 {
 /// Sine of the angle between two vectors; 0 when either vanishes.
 fn sine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     let product = a.norm() * b.norm();
-    if product > 0.0 { a.cross(b).norm() / product } else { 0.0 }
+    if product > 0.0 {
+        a.cross(b).norm() / product
+    } else {
+        0.0
+    }
 }
 
 /// Greatest distance from the leg being travelled over the half width.
-fn corridor(
-    spans: &[Span],
-    poses: &[Isometry3<f64>],
-    passes: &[Pass],
-    width: f64,
-) -> Peak {
+fn corridor(spans: &[Span], poses: &[Isometry3<f64>], passes: &[Pass], width: f64) -> Peak {
     let mut peak = Peak::default();
     if width.is_infinite() {
         return peak;
@@ -242,7 +266,10 @@ fn corridor(
     let end = spans.last().map_or(0.0, Span::end);
     for leg in 1..poses.len() {
         let until = passes.get(leg - 1).map_or(end, |pass| pass.time);
-        let ends = [poses[leg - 1].translation.vector, poses[leg].translation.vector];
+        let ends = [
+            poses[leg - 1].translation.vector,
+            poses[leg].translation.vector,
+        ];
         let since = if leg == 1 { 0.0 } else { passes[leg - 2].time };
         while at < spans.len() {
             let span = &spans[at];
@@ -250,7 +277,10 @@ fn corridor(
             let to = (until - span.start).clamp(0.0, span.duration);
             if to > from {
                 let control = span.position_control(from, to);
-                peak.raise(away(&control, &ends, room, 5) / room, span.start + (from + to) / 2.0);
+                peak.raise(
+                    away(&control, &ends, room, 5) / room,
+                    span.start + (from + to) / 2.0,
+                );
             }
             if span.end() > until || at + 1 == spans.len() {
                 break;
@@ -282,6 +312,10 @@ fn away(control: &[Vector3<f64>; 5], ends: &[Vector3<f64>; 2], room: f64, depth:
 pub(crate) fn to_segment(point: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
     let way = ends[1] - ends[0];
     let square = way.norm_squared();
-    let share = if square > 0.0 { ((point - ends[0]).dot(&way) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let share = if square > 0.0 {
+        ((point - ends[0]).dot(&way) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     (point - ends[0] - way * share).norm()
 }

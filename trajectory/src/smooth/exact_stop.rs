@@ -40,7 +40,12 @@ impl Leg {
 
     /// Spans of a motion along the leg with pieces (duration s, jerk of the
     /// progress in 1/s3), from the progress state `state`, starting at `time`.
-    pub(crate) fn spans(&self, pieces: &[(f64, f64)], mut state: [f64; 3], mut time: f64) -> Vec<Span> {
+    pub(crate) fn spans(
+        &self,
+        pieces: &[(f64, f64)],
+        mut state: [f64; 3],
+        mut time: f64,
+    ) -> Vec<Span> {
         let mut spans = Vec::with_capacity(pieces.len());
         for &(duration, jerk) in pieces {
             if duration <= 0.0 {
@@ -55,7 +60,14 @@ impl Leg {
                 duration,
                 point,
                 base: self.from.rotation,
-                turns: if still { Vec::new() } else { vec![Turn { axis: self.turn, angle }] },
+                turns: if still {
+                    Vec::new()
+                } else {
+                    vec![Turn {
+                        axis: self.turn,
+                        angle,
+                    }]
+                },
             });
             state = ramp::advance(state, duration, jerk);
             time += duration;
@@ -68,7 +80,9 @@ impl Leg {
 /// before take no time. Empty when nothing moves.
 pub(crate) fn plan(poses: &[Isometry3<f64>], limits: &ToolLimits) -> Vec<Span> {
     let (mut spans, mut time) = (Vec::new(), 0.0);
-    let Some(mut from) = poses.first() else { return spans };
+    let Some(mut from) = poses.first() else {
+        return spans;
+    };
     for to in &poses[1..] {
         if Line::new(*from, *to).is_still() {
             continue;

@@ -47,7 +47,13 @@ impl SmoothOptions {
     /// Options with the defaults that follow from a tolerance (m) and limits.
     #[must_use]
     pub fn new(tolerance: f64, limits: ToolLimits) -> Self {
-        Self { tolerance, corridor: None, angular_tolerance: None, limits, window: 25 }
+        Self {
+            tolerance,
+            corridor: None,
+            angular_tolerance: None,
+            limits,
+            window: 25,
+        }
     }
 
     /// Half width of the corridor in force, m.
@@ -59,7 +65,8 @@ impl SmoothOptions {
     /// Angular tolerance in force, rad.
     #[must_use]
     pub fn angular_tolerance(&self) -> f64 {
-        self.angular_tolerance.unwrap_or((self.tolerance / LEVER).min(WIDEST_ANGLE))
+        self.angular_tolerance
+            .unwrap_or((self.tolerance / LEVER).min(WIDEST_ANGLE))
     }
 
     /// The options with each infinite limit replaced by a huge one, so that
@@ -85,7 +92,11 @@ impl SmoothOptions {
             return Err(SmoothError::NoPose);
         }
         for (index, pose) in poses.iter().enumerate() {
-            let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+            let numbers = pose
+                .translation
+                .vector
+                .iter()
+                .chain(pose.rotation.coords.iter());
             if let Some(value) = numbers.copied().find(|x| !(x.abs() <= 1e6)) {
                 return Err(SmoothError::BadPose { index, value });
             }

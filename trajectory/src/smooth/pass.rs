@@ -42,8 +42,14 @@ impl Pass {
 }
 
 /// The passes of all intermediate poses, in order.
-pub(crate) fn passes(spans: &[Span], poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Pass> {
-    let inner = poses.get(1..poses.len().saturating_sub(1)).unwrap_or_default();
+pub(crate) fn passes(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> Vec<Pass> {
+    let inner = poses
+        .get(1..poses.len().saturating_sub(1))
+        .unwrap_or_default();
     let mut result = Vec::with_capacity(inner.len());
     let (mut at, mut time) = (0, 0.0);
     for (i, pose) in inner.iter().enumerate() {
@@ -52,7 +58,13 @@ pub(crate) fn passes(spans: &[Span], poses: &[Isometry3<f64>], options: &SmoothO
         let (mut deviation, mut angle) = apart(spans, &poses[0], (at, time), pose);
         if angle > options.angular_tolerance() {
             let near = deviation + (0.02 * options.tolerance).max(1e3 * RESOLUTION);
-            if let Some(better) = turned(spans, since, (at, time), pose, [near, options.angular_tolerance()]) {
+            if let Some(better) = turned(
+                spans,
+                since,
+                (at, time),
+                pose,
+                [near, options.angular_tolerance()],
+            ) {
                 (at, time) = better;
                 (deviation, angle) = apart(spans, &poses[0], better, pose);
             }
@@ -114,7 +126,9 @@ fn turned(
                 continue;
             }
             match best {
-                Some((found, least)) if angle > least + 1e-9 && least <= near[1] => return Some(found),
+                Some((found, least)) if angle > least + 1e-9 && least <= near[1] => {
+                    return Some(found);
+                }
                 Some((_, least)) if angle >= least => {}
                 _ => best = Some((moment, angle)),
             }
@@ -134,7 +148,11 @@ fn closest(
 ) -> (usize, f64) {
     let goal = pose.translation.vector;
     let noise = 1e-14 * (1.0 + goal.norm()) * options.limits.speed;
-    let mut search = Search { falling: false, near: options.tolerance + RESOLUTION, noise };
+    let mut search = Search {
+        falling: false,
+        near: options.tolerance + RESOLUTION,
+        noise,
+    };
     for (index, span) in spans.iter().enumerate().skip(at) {
         let from = (time - span.start).clamp(0.0, span.duration);
         if from >= span.duration && index + 1 < spans.len() {

@@ -129,10 +129,22 @@ pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothP
     let options = &options.finite();
     let spans = exact_stop::plan(poses, &options.limits);
     let (certificate, passes) = certificate::certify(&spans, poses, options);
-    let method = if spans.is_empty() { Method::Still } else { Method::ExactStop };
+    let method = if spans.is_empty() {
+        Method::Still
+    } else {
+        Method::ExactStop
+    };
     let exact_stop = spans.last().map_or(0.0, Span::end);
     let (start, goal) = (poses[0], poses[poses.len() - 1]);
-    Ok(SmoothPlan { start, goal, spans, passes, certificate, method, exact_stop })
+    Ok(SmoothPlan {
+        start,
+        goal,
+        spans,
+        passes,
+        certificate,
+        method,
+        exact_stop,
+    })
 }
 
 #[cfg(test)]
@@ -153,7 +165,12 @@ mod tests {
 
     fn check(poses: &[Isometry3<f64>], tolerance: f64) -> SmoothPlan {
         let plan = plan(poses, &SmoothOptions::new(tolerance, limits())).unwrap();
-        assert!(plan.certificate().holds(), "{:?} {:?}", plan.certificate(), plan.passes());
+        assert!(
+            plan.certificate().holds(),
+            "{:?} {:?}",
+            plan.certificate(),
+            plan.passes()
+        );
         assert!(plan.duration() <= plan.exact_stop());
         plan
     }
@@ -161,18 +178,39 @@ mod tests {
     #[test]
     fn degenerate_lists() {
         let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
-        let turned = |x: f64, angle: f64| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::z() * angle);
+        let turned =
+            |x: f64, angle: f64| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::z() * angle);
         for tolerance in [0.0, 1e-5, 1e-3, 10.0] {
             check(&[at(0.0, 0.0)], tolerance);
             check(&[at(0.1, 0.0); 4], tolerance);
             check(&[at(0.0, 0.0), at(0.1, 0.0)], tolerance);
-            check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.0), at(0.2, 0.0)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.0), at(0.2, 0.0)],
+                tolerance,
+            );
             check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 0.0)], tolerance);
             check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 1e-4)], tolerance);
-            check(&[at(0.0, 0.0), at(1e-6, 0.0), at(0.0, 1e-6), at(1e-6, 1e-6)], tolerance);
-            check(&[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 1.0)], tolerance);
-            check(&[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 0.0)], tolerance);
-            check(&[turned(0.0, 0.0), turned(0.1, 0.5), turned(0.1, 1.0), turned(0.2, 0.0)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(1e-6, 0.0), at(0.0, 1e-6), at(1e-6, 1e-6)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 1.0)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 0.0)],
+                tolerance,
+            );
+            check(
+                &[
+                    turned(0.0, 0.0),
+                    turned(0.1, 0.5),
+                    turned(0.1, 1.0),
+                    turned(0.2, 0.0),
+                ],
+                tolerance,
+            );
         }
     }
 
@@ -180,9 +218,18 @@ mod tests {
     fn bad_input_is_named() {
         let options = SmoothOptions::new(0.001, limits());
         assert_eq!(plan(&[], &options).unwrap_err(), SmoothError::NoPose);
-        let bad = [Isometry3::identity(), Isometry3::translation(f64::NAN, 0.0, 0.0)];
-        assert!(matches!(plan(&bad, &options), Err(SmoothError::BadPose { index: 1, .. })));
+        let bad = [
+            Isometry3::identity(),
+            Isometry3::translation(f64::NAN, 0.0, 0.0),
+        ];
+        assert!(matches!(
+            plan(&bad, &options),
+            Err(SmoothError::BadPose { index: 1, .. })
+        ));
         let negative = SmoothOptions::new(-1.0, limits());
-        assert!(matches!(plan(&bad[..1], &negative), Err(SmoothError::BadTolerance { .. })));
+        assert!(matches!(
+            plan(&bad[..1], &negative),
+            Err(SmoothError::BadTolerance { .. })
+        ));
     }
 }

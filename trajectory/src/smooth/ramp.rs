@@ -30,11 +30,19 @@ impl Gate {
 fn rise(gate: &Gate, top: f64, caps: &Caps) -> [f64; 3] {
     let (a0, jerk) = (gate.acceleration, caps.jerk);
     let gain = (top - gate.speed).max(0.0);
-    let peak = (jerk * gain + 0.5 * a0 * a0).max(a0 * a0).sqrt().min(caps.acceleration).max(a0);
+    let peak = (jerk * gain + 0.5 * a0 * a0)
+        .max(a0 * a0)
+        .sqrt()
+        .min(caps.acceleration)
+        .max(a0);
     let up = (peak - a0) / jerk;
     let down = peak / jerk;
     let ramps = (2.0 * peak * peak - a0 * a0) / (2.0 * jerk);
-    let hold = if peak > 0.0 { ((gain - ramps) / peak).max(0.0) } else { 0.0 };
+    let hold = if peak > 0.0 {
+        ((gain - ramps) / peak).max(0.0)
+    } else {
+        0.0
+    };
     [up, hold, down]
 }
 
@@ -92,7 +100,11 @@ pub(crate) fn leg(length: f64, start: Gate, end: Gate, caps: &Caps) -> Option<Ve
         top = low;
     }
     let (first, last) = halves(top);
-    let cruise = if top > 0.0 { (length - distance(top)).max(0.0) / top } else { 0.0 };
+    let cruise = if top > 0.0 {
+        (length - distance(top)).max(0.0) / top
+    } else {
+        0.0
+    };
     let jerk = caps.jerk;
     Some(vec![
         (first[0], jerk),
@@ -148,7 +160,11 @@ mod tests {
     /// 100 mm at 500 mm/s, 5000 mm/s2, 1e5 mm/s3: by hand 0.1/0.5 + 0.5/5 + 0.05 s.
     #[test]
     fn known_leg() {
-        let caps = Caps { speed: 0.5, acceleration: 5.0, jerk: 100.0 };
+        let caps = Caps {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+        };
         let pieces = leg(0.1, Gate::default(), Gate::default(), &caps).unwrap();
         assert_relative_eq!(duration(&pieces), 0.35, epsilon = 1e-12);
     }

@@ -128,8 +128,16 @@ mod tests {
         let turned = (c.pose.rotation * a.pose.rotation.inverse()).scaled_axis() / (2.0 * d);
         assert_relative_eq!(turned, b.angular[0], epsilon = 1e-7);
         for k in 0..2 {
-            assert_relative_eq!((c.angular[k] - a.angular[k]) / (2.0 * d), b.angular[k + 1], epsilon = 1e-6);
-            assert_relative_eq!((c.linear[k] - a.linear[k]) / (2.0 * d), b.linear[k + 1], epsilon = 1e-6);
+            assert_relative_eq!(
+                (c.angular[k] - a.angular[k]) / (2.0 * d),
+                b.angular[k + 1],
+                epsilon = 1e-6
+            );
+            assert_relative_eq!(
+                (c.linear[k] - a.linear[k]) / (2.0 * d),
+                b.linear[k + 1],
+                epsilon = 1e-6
+            );
         }
         assert_relative_eq!(b.pose.rotation, span.rotation(t), epsilon = 1e-14);
     }
@@ -143,7 +151,12 @@ mod tests {
         let v = span.velocity_control(0.3, 1.1);
         let a = span.acceleration_control(0.3, 1.1);
         let j = span.jerk_control(0.3, 1.1);
-        for (first, last, k) in [(p[0], p[4], 0), (v[0], v[3], 1), (a[0], a[2], 2), (j[0], j[1], 3)] {
+        for (first, last, k) in [
+            (p[0], p[4], 0),
+            (v[0], v[3], 1),
+            (a[0], a[2], 2),
+            (j[0], j[1], 3),
+        ] {
             assert_relative_eq!(first, low[k], epsilon = 1e-12);
             assert_relative_eq!(last, high[k], epsilon = 1e-12);
         }
