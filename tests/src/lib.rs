@@ -1,1 +1,6 @@
-//! Whole-system tests: fixtures, laws, goldens, fault tests.
+//! Fixtures of the system tests; the tests themselves are in `suite/`.
+//!
+//! A test here sees Canter from outside: whole programs, real processes, the repository's own
+//! rules. The laws of one crate are tested in that crate.
+
+pub mod repository;

@@ -1,1 +1,24 @@
 //! State-to-state moves, smooth paths through tolerance balls, path timing.
+//!
+//! Every engine ends in a [`Trajectory`]: quintic pieces in time, which the control cycle
+//! evaluates as they are.
+//!
+//! This crate never reads a file, a clock or a robot description, and never calls inverse
+//! kinematics: geometry comes in as [`ToolCurve`] and [`Path`].
+#![forbid(unsafe_code)]
+
+mod error;
+mod hermite_path;
+mod joint_line;
+mod limits;
+mod path;
+pub mod timing;
+mod trajectory;
+
+pub use error::TimingError;
+pub use hermite_path::HermitePath;
+pub use joint_line::JointLine;
+pub use limits::{JointLimits, ToolLimits};
+pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
+pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
+pub use trajectory::Trajectory;

@@ -1,0 +1,28 @@
+//! One file a command: its arguments, and `run`, which gives the exit code.
+//!
+//! A new command is a file here and one line in [`Command`] and in [`Command::run`].
+
+mod completions;
+mod man;
+
+use clap::Subcommand;
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// What `canter` can do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Completions(completions::Completions),
+    Man(man::Man),
+}
+
+impl Command {
+    /// Runs the command that was given.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        match self {
+            Self::Completions(command) => command.run(),
+            Self::Man(command) => command.run(),
+        }
+    }
+}

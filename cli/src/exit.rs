@@ -1,0 +1,33 @@
+use std::process::ExitCode;
+
+/// How a command of `canter` ends, as its process exit code.
+///
+/// The numbers are a contract with scripts and never change their meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Exit {
+    /// Everything asked for was done.
+    Done = 0,
+    /// The program has findings, or a command of it was refused before any motion.
+    Refused = 1,
+    /// The arguments make no sense.
+    Usage = 2,
+    /// A file cannot be read or parsed, or a robot cannot be loaded.
+    Unreadable = 3,
+    /// No engine or no driver answers.
+    NoPeer = 4,
+    /// The operator stopped the motion.
+    Stopped = 5,
+    /// A limit or guard of the engine aborted the motion.
+    Aborted = 6,
+    /// The driver reported a fault or was lost.
+    DriverFault = 7,
+    /// A mistake of Canter itself.
+    Internal = 70,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        ExitCode::from(exit as u8)
+    }
+}

@@ -1,0 +1,41 @@
+use std::io::{self, Write};
+
+use crate::exit::Exit;
+
+/// Why a command could not do its work: the exit code and the chain of causes.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    exit: Exit,
+    cause: anyhow::Error,
+}
+
+impl Failure {
+    /// A failure that ends the process with `exit`.
+    pub(crate) fn new(exit: Exit, cause: impl Into<anyhow::Error>) -> Self {
+        Self {
+            exit,
+            cause: cause.into(),
+        }
+    }
+
+    /// Writes `canter: error: cause: cause of the cause` to standard error and gives the exit code.
+    ///
+    /// A reader of our answer that has gone away (`canter robots list | head -1`) is no failure.
+    pub(crate) fn report(&self) -> Exit {
+        if let Some(error) = self.cause.downcast_ref::<io::Error>()
+            && error.kind() == io::ErrorKind::BrokenPipe
+        {
+            return Exit::Done;
+        }
+        // Nobody is left to be told when standard error is closed.
+        let _ = writeln!(io::stderr(), "canter: error: {:#}", self.cause);
+        self.exit
+    }
+}
+
+/// Writing the answer failed; everything else names its exit code itself.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::new(Exit::Internal, error)
+    }
+}

@@ -1,0 +1,74 @@
+//! The `canter` command line: the outermost layer, where files, terminals, signals and exit
+//! codes live.
+//!
+//! It parses arguments, calls the libraries and says what they answered. The answer of a command
+//! goes to standard output, all else (progress, findings of a program that is about to move,
+//! logs) to standard error, so that `canter ... | other` sees the answer only.
+//!
+//! It never plans, converts units or decides about motion: whatever a second program would want
+//! to do as well belongs to a library crate.
+//!
+//! It is a library with one function so that the system tests run the same code as a process of
+//! their own; the binary `canter` is three lines.
+
+mod commands;
+mod exit;
+mod failure;
+mod logging;
+mod output;
+
+use std::panic::catch_unwind;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::exit::Exit;
+
+/// Executes canonical robot commands: check, plan, run.
+///
+/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read or
+/// parse; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
+/// 7 driver fault or lost; 70 internal error.
+#[derive(Debug, Parser)]
+#[command(name = "canter", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: commands::Command,
+}
+
+/// Runs the process: parses the arguments, runs the command, reports a failure on standard error.
+///
+/// The exit codes are part of the command line's contract, see [`Exit`].
+pub fn main() -> ExitCode {
+    logging::start();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            // A closed terminal is no reason to fail in another way.
+            let _ = message.print();
+            let exit = if message.use_stderr() {
+                Exit::Usage
+            } else {
+                Exit::Done
+            };
+            return exit.into();
+        }
+    };
+    let exit = match catch_unwind(|| arguments.command.run()) {
+        Ok(Ok(exit)) => exit,
+        Ok(Err(failure)) => failure.report(),
+        // The panic hook has told where; a panic is our mistake, whatever the input was.
+        Err(_) => Exit::Internal,
+    };
+    exit.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_argument_definitions_are_consistent() {
+        super::Arguments::command().debug_assert();
+    }
+}

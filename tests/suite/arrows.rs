@@ -1,0 +1,185 @@
+//! The arrows between the crates point down only, and some crates of others stay in one place.
+
+use std::fs;
+
+use system_tests::repository::root;
+use toml::{Table, Value};
+
+/// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
+const ARROWS: [(&str, &[&str]); 9] = [
+    (
+        "cli",
+        &[
+            "plan",
+            "engine",
+            "crcl",
+            "kinematics",
+            "trajectory",
+            "realtime",
+            "ipc",
+            "driver-sim",
+        ],
+    ),
+    ("plan", &["crcl"]),
+    (
+        "engine",
+        &["crcl", "kinematics", "trajectory", "realtime", "ipc"],
+    ),
+    ("trajectory", &["realtime"]),
+    ("driver-sim", &["ipc", "realtime"]),
+    ("crcl", &[]),
+    ("kinematics", &[]),
+    ("realtime", &[]),
+    ("ipc", &[]),
+];
+
+/// Crates of others that may be named by one crate of ours only.
+const FENCES: [(&str, &str); 6] = [
+    ("k", "kinematics"),
+    ("faer", "trajectory"),
+    ("iceoryx2", "ipc"),
+    ("rusqlite", "plan"),
+    ("anyhow", "cli"),
+    ("clap", "cli"),
+];
+
+const OUTERMOST: [&str; 2] = ["system-tests", "benches"];
+
+/// What the manifest of a crate has that it must not have; development dependencies are free,
+/// for oracles.
+fn violations(manifest: &Table) -> Vec<String> {
+    let name = manifest["package"]["name"].as_str().unwrap();
+    if OUTERMOST.contains(&name) {
+        return Vec::new();
+    }
+    let Some((_, allowed)) = ARROWS.iter().find(|(from, _)| *from == name) else {
+        return vec![format!("{name} has no place in the order of the crates")];
+    };
+    let mut found = Vec::new();
+    for dependency in dependencies(manifest) {
+        let ours = ARROWS
+            .iter()
+            .any(|(crate_of_ours, _)| *crate_of_ours == dependency);
+        if (ours && !allowed.contains(&dependency.as_str()))
+            || OUTERMOST.contains(&dependency.as_str())
+        {
+            found.push(format!("{name} must not depend on {dependency}"));
+        }
+        if let Some((fenced, only)) = FENCES.iter().find(|(fenced, _)| *fenced == dependency)
+            && *only != name
+        {
+            found.push(format!(
+                "{fenced} may be used by {only} only, not by {name}"
+            ));
+        }
+    }
+    found
+}
+
+/// The normal and build dependencies by package name, those for one platform included.
+fn dependencies(manifest: &Table) -> Vec<String> {
+    let mut tables = vec![manifest];
+    if let Some(targets) = manifest.get("target").and_then(Value::as_table) {
+        tables.extend(targets.values().filter_map(Value::as_table));
+    }
+    tables
+        .into_iter()
+        .flat_map(|table| ["dependencies", "build-dependencies"].map(|kind| table.get(kind)))
+        .filter_map(|table| table?.as_table())
+        .flatten()
+        .map(|(key, value)| {
+            value
+                .get("package")
+                .and_then(Value::as_str)
+                .unwrap_or(key)
+                .to_owned()
+        })
+        .collect()
+}
+
+/// The manifests of all members of the workspace.
+fn manifests() -> Vec<Table> {
+    let read = |path: std::path::PathBuf| -> Table {
+        let text = fs::read_to_string(&path).unwrap();
+        text.parse()
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    let workspace = read(root().join("Cargo.toml"));
+    let members = workspace["workspace"]["members"].as_array().unwrap();
+    members
+        .iter()
+        .map(|member| read(root().join(member.as_str().unwrap()).join("Cargo.toml")))
+        .collect()
+}
+
+#[test]
+fn arrows_point_down() {
+    let manifests = manifests();
+    assert!(manifests.len() >= ARROWS.len(), "members are missing");
+    let found: Vec<_> = manifests.iter().flat_map(violations).collect();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn a_wrong_arrow_is_seen() {
+    let check = |text: &str| violations(&text.parse().unwrap());
+    assert_eq!(
+        check("[package]\nname = 'realtime'\n[dependencies]\nkinematics.workspace = true"),
+        ["realtime must not depend on kinematics"]
+    );
+    assert_eq!(
+        check(
+            "[package]\nname = 'crcl'\n[target.'cfg(unix)'.dependencies]\nx = { package = 'ipc' }"
+        ),
+        ["crcl must not depend on ipc"]
+    );
+    assert_eq!(
+        check("[package]\nname = 'engine'\n[build-dependencies]\niceoryx2 = '1'"),
+        ["iceoryx2 may be used by ipc only, not by engine"]
+    );
+    assert_eq!(
+        check("[package]\nname = 'common'"),
+        ["common has no place in the order of the crates"]
+    );
+    assert!(check("[package]\nname = 'plan'\n[dependencies]\ncrcl.workspace = true").is_empty());
+}
+
+/// Inside a crate: `k` is one file's secret, the real-time crate has no heap.
+#[test]
+fn fences_inside_crates_hold() {
+    let urdf = root().join("kinematics/src/urdf.rs");
+    for path in sources("kinematics/src") {
+        let text = fs::read_to_string(&path).unwrap();
+        let names_k = text.lines().any(|line| names_crate_k(line));
+        assert!(!names_k || path == urdf, "{} names k", path.display());
+    }
+    let realtime = fs::read_to_string(root().join("realtime/src/lib.rs")).unwrap();
+    assert!(realtime.contains("#![no_std]"), "realtime must be no_std");
+    assert!(names_crate_k("use k::Chain;") && names_crate_k("    let x = k::Chain::new();"));
+    assert!(!names_crate_k("let x = rank::of(y);") && !names_crate_k("// k::Chain"));
+}
+
+/// Whether code of this line names the crate `k`.
+fn names_crate_k(line: &str) -> bool {
+    let code = line.split("//").next().unwrap_or(line);
+    code.match_indices("k::").any(|(at, _)| {
+        !code[..at].ends_with(|before: char| before.is_alphanumeric() || before == '_')
+    })
+}
+
+/// All Rust files under a folder of the repository.
+fn sources(folder: &str) -> Vec<std::path::PathBuf> {
+    let mut folders = vec![root().join(folder)];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    files
+}

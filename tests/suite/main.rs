@@ -1,0 +1,36 @@
+//! All system tests as one binary: one link step instead of one a file.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+
+mod arrows;
+mod canter;
+mod command_line;
+
+/// Every file of this folder is a module above: a forgotten one would never run.
+#[test]
+fn no_test_file_was_forgotten() {
+    let runner = include_str!("main.rs");
+    let forgotten = forgotten(
+        runner,
+        &system_tests::repository::files("tests/suite", "rs").unwrap(),
+    );
+    assert!(
+        forgotten.is_empty(),
+        "add to tests/suite/main.rs: {forgotten:?}"
+    );
+}
+
+/// The names of `files` that `runner` has no `mod` line for.
+fn forgotten(runner: &str, files: &[std::path::PathBuf]) -> Vec<String> {
+    files
+        .iter()
+        .map(|file| file.file_stem().unwrap().to_string_lossy().into_owned())
+        .filter(|name| name != "main" && !runner.lines().any(|line| line == format!("mod {name};")))
+        .collect()
+}
+
+/// The check above fires.
+#[test]
+fn a_forgotten_test_file_is_seen() {
+    let files = ["main.rs".into(), "here.rs".into(), "lost.rs".into()];
+    assert_eq!(forgotten("mod here;\n", &files), ["lost"]);
+}

@@ -1,0 +1,56 @@
+//! A straight line in joint space.
+
+use nalgebra::SVector;
+
+use crate::{JointPoint, Path, PathPoint, ToolPoint};
+
+/// The straight line in joint space from a start to an end, parameter 0 to 1. What the tool does
+/// along it comes from a closure, so that this crate needs no kinematics.
+///
+/// ```
+/// use nalgebra::{Isometry3, vector};
+/// use trajectory::{JointLine, Path, ToolPoint};
+///
+/// let still = |_: &trajectory::JointPoint<2>| ToolPoint::still(Isometry3::identity());
+/// let line = JointLine::new(vector![0.0, 1.0], vector![1.0, 3.0], still);
+/// assert_eq!(line.at(0.5).joint.q[0], vector![0.5, 2.0]);
+/// assert_eq!(line.at(0.5).joint.q[1], vector![1.0, 2.0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct JointLine<const N: usize, F> {
+    start: SVector<f64, N>,
+    end: SVector<f64, N>,
+    tool: F,
+}
+
+impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> JointLine<N, F> {
+    /// A line from `start` to `end` (rad). `tool` gives the controlled point and its derivatives
+    /// to the parameter from the joints and theirs.
+    pub fn new(start: SVector<f64, N>, end: SVector<f64, N>, tool: F) -> Self {
+        Self { start, end, tool }
+    }
+}
+
+impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> Path<N> for JointLine<N, F> {
+    fn end(&self) -> f64 {
+        1.0
+    }
+
+    fn knots(&self) -> &[f64] {
+        &[0.0, 1.0]
+    }
+
+    fn at(&self, u: f64) -> PathPoint<N> {
+        let u = u.clamp(0.0, 1.0);
+        let step = self.end - self.start;
+        let zero = SVector::zeros();
+        // The weighted mean meets both ends exactly.
+        let joint = JointPoint {
+            q: [self.start * (1.0 - u) + self.end * u, step, zero, zero],
+        };
+        PathPoint {
+            joint,
+            tool: (self.tool)(&joint),
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! What joints and tool may do.
+
+use nalgebra::SVector;
+
+use crate::TimingError;
+
+/// Limits of `N` joints (rad, rad/s, rad/s², rad/s³; metres for a prismatic joint). Infinity
+/// means: not limited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits<const N: usize> {
+    /// Lowest positions (rad).
+    pub lower: SVector<f64, N>,
+    /// Highest positions (rad).
+    pub upper: SVector<f64, N>,
+    /// Highest speeds (rad/s).
+    pub velocity: SVector<f64, N>,
+    /// Highest accelerations (rad/s²), up and down.
+    pub acceleration: SVector<f64, N>,
+    /// Highest jerks (rad/s³), up and down.
+    pub jerk: SVector<f64, N>,
+}
+
+impl<const N: usize> JointLimits<N> {
+    /// The same velocity (rad/s), acceleration (rad/s²) and jerk (rad/s³) for every joint, any
+    /// position.
+    pub fn uniform(velocity: f64, acceleration: f64, jerk: f64) -> Self {
+        Self {
+            lower: SVector::repeat(f64::NEG_INFINITY),
+            upper: SVector::repeat(f64::INFINITY),
+            velocity: SVector::repeat(velocity),
+            acceleration: SVector::repeat(acceleration),
+            jerk: SVector::repeat(jerk),
+        }
+    }
+
+    /// Checks that every velocity, acceleration and jerk limit is positive.
+    ///
+    /// # Errors
+    /// [`TimingError::BadJointLimit`] with the first joint whose limit is not.
+    pub fn check(&self) -> Result<(), TimingError> {
+        let rows = [
+            ("velocity", &self.velocity),
+            ("acceleration", &self.acceleration),
+            ("jerk", &self.jerk),
+        ];
+        for (quantity, values) in rows {
+            for (joint, &value) in values.iter().enumerate() {
+                if value.is_nan() || value <= 0.0 {
+                    return Err(TimingError::BadJointLimit {
+                        joint,
+                        quantity,
+                        value,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Limits of the controlled point: norms of its linear and angular velocity and of their
+/// derivatives. Infinity means: not limited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolLimits {
+    /// Speed (m/s).
+    pub speed: f64,
+    /// Acceleration (m/s²).
+    pub acceleration: f64,
+    /// Jerk (m/s³).
+    pub jerk: f64,
+    /// Angular speed (rad/s).
+    pub angular_speed: f64,
+    /// Angular acceleration (rad/s²).
+    pub angular_acceleration: f64,
+    /// Angular jerk (rad/s³).
+    pub angular_jerk: f64,
+}
+
+impl ToolLimits {
+    /// No limit at all: the joints alone decide.
+    pub const UNLIMITED: Self = Self {
+        speed: f64::INFINITY,
+        acceleration: f64::INFINITY,
+        jerk: f64::INFINITY,
+        angular_speed: f64::INFINITY,
+        angular_acceleration: f64::INFINITY,
+        angular_jerk: f64::INFINITY,
+    };
+
+    /// Checks that every limit is positive.
+    ///
+    /// # Errors
+    /// [`TimingError::BadToolLimit`] with the first that is not.
+    pub fn check(&self) -> Result<(), TimingError> {
+        let rows = [
+            ("speed", self.speed),
+            ("acceleration", self.acceleration),
+            ("jerk", self.jerk),
+            ("angular_speed", self.angular_speed),
+            ("angular_acceleration", self.angular_acceleration),
+            ("angular_jerk", self.angular_jerk),
+        ];
+        for (quantity, value) in rows {
+            if value.is_nan() || value <= 0.0 {
+                return Err(TimingError::BadToolLimit { quantity, value });
+            }
+        }
+        Ok(())
+    }
+}

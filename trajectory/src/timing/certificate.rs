@@ -1,0 +1,115 @@
+//! What is known for certain about a time law.
+
+use std::fmt;
+
+/// One limit of the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Limit {
+    /// Speed of a joint (index from 0).
+    JointVelocity(usize),
+    /// Acceleration of a joint.
+    JointAcceleration(usize),
+    /// Jerk of a joint.
+    JointJerk(usize),
+    /// Speed of the controlled point.
+    ToolSpeed,
+    /// Acceleration of the controlled point.
+    ToolAcceleration,
+    /// Jerk of the controlled point.
+    ToolJerk,
+    /// Angular speed of the tool.
+    AngularSpeed,
+    /// Angular acceleration of the tool.
+    AngularAcceleration,
+    /// Angular jerk of the tool.
+    AngularJerk,
+    /// The cap on the rate of the path parameter.
+    Rate,
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::JointVelocity(joint) => write!(f, "velocity of joint {joint}"),
+            Self::JointAcceleration(joint) => write!(f, "acceleration of joint {joint}"),
+            Self::JointJerk(joint) => write!(f, "jerk of joint {joint}"),
+            Self::ToolSpeed => f.write_str("tool speed"),
+            Self::ToolAcceleration => f.write_str("tool acceleration"),
+            Self::ToolJerk => f.write_str("tool jerk"),
+            Self::AngularSpeed => f.write_str("angular speed"),
+            Self::AngularAcceleration => f.write_str("angular acceleration"),
+            Self::AngularJerk => f.write_str("angular jerk"),
+            Self::Rate => f.write_str("rate of the path parameter"),
+        }
+    }
+}
+
+/// How near the motion comes to one limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitPeak {
+    /// Which limit.
+    pub limit: Limit,
+    /// Highest value over the limit: a bound that holds for all times, not only at samples.
+    pub ratio: f64,
+    /// When (s).
+    pub time: f64,
+}
+
+/// A part of the motion over which one limit decides the speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActiveSpan {
+    /// Which limit.
+    pub limit: Limit,
+    /// From when (s).
+    pub start: f64,
+    /// Until when (s).
+    pub end: f64,
+}
+
+/// What is known for certain about a timed path.
+///
+/// Joint ratios are bounds on the quintic pieces themselves for all times. Tool ratios come from
+/// dense samples of the exact composition plus `tool_margin`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeCertificate {
+    /// Every finite limit with its peak, in the order of [`Limit`].
+    pub peaks: Vec<LimitPeak>,
+    /// Which limit is active when, in the order of time; spans of different limits may overlap.
+    pub active: Vec<ActiveSpan>,
+    /// How long the motion lasts (s).
+    pub duration: f64,
+    /// No motion along this path within these limits is shorter (s).
+    pub lower_bound: f64,
+    /// Largest distance of a joint from the path (rad), at the middle and the quarters of pieces.
+    pub fit_error: f64,
+    /// What was added to sampled tool ratios to cover the times between the samples.
+    pub tool_margin: f64,
+    /// Factor by which the whole law was slowed at the end to meet every bound; 1 = not at all.
+    pub stretch: f64,
+    /// Cells of the law.
+    pub cells: usize,
+    /// Newton steps that were taken.
+    pub iterations: usize,
+}
+
+impl TimeCertificate {
+    /// The largest ratio among the limits that `which` picks; 0 when there is none.
+    pub fn ratio(&self, which: impl Fn(Limit) -> bool) -> f64 {
+        let picked = self.peaks.iter().filter(|peak| which(peak.limit));
+        picked.map(|peak| peak.ratio).fold(0.0, f64::max)
+    }
+
+    /// Whether every limit holds for all times.
+    pub fn holds(&self) -> bool {
+        self.peaks.iter().all(|peak| peak.ratio <= 1.0)
+    }
+
+    /// Duration over its lower bound, 1 at best.
+    pub fn optimality(&self) -> f64 {
+        if self.lower_bound > 0.0 {
+            self.duration / self.lower_bound
+        } else {
+            1.0
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What is asked of a time law.
+
+use crate::TimingError;
+
+/// What the law does at an end of the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Boundary {
+    /// The path parameter rests: `du/dt = 0` while `q'(u)` is not zero.
+    #[default]
+    Rest,
+    /// The joints rest because `q'(u) = 0` there; `du/dt` is free, up to the rate cap.
+    Free,
+    /// The path parameter moves in a given way, as when a plan is renewed in motion. Only at the
+    /// start.
+    Moving {
+        /// `du/dt` (u/s), positive.
+        rate: f64,
+        /// `d²u/dt²` (u/s²).
+        acceleration: f64,
+    },
+}
+
+/// What is asked of a time law; the default is from rest to rest without a cap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimingOptions {
+    /// How the motion starts.
+    pub start: Boundary,
+    /// How the motion ends.
+    pub end: Boundary,
+    /// Upper bound of `du/dt` (u/s).
+    pub rate_cap: Option<f64>,
+    /// Number of cells of the law; `None` chooses it from the duration and the path.
+    pub cells: Option<usize>,
+    /// Largest distance (rad) of a joint from the path between the knots of the motion.
+    pub fit: f64,
+    /// Relative gap of the duration at which the search stops.
+    pub gap: f64,
+}
+
+impl Default for TimingOptions {
+    fn default() -> Self {
+        Self {
+            start: Boundary::Rest,
+            end: Boundary::Rest,
+            rate_cap: None,
+            cells: None,
+            fit: 1e-8,
+            gap: 1e-3,
+        }
+    }
+}
+
+impl TimingOptions {
+    /// Checks that every number is positive and finite.
+    ///
+    /// # Errors
+    /// [`TimingError::BadOption`] with the first that is not.
+    pub fn check(&self) -> Result<(), TimingError> {
+        let mut rows = vec![("fit", self.fit), ("gap", self.gap)];
+        rows.extend(self.rate_cap.map(|cap| ("rate_cap", cap)));
+        rows.extend(self.cells.map(|cells| ("cells", cells as f64)));
+        if let Boundary::Moving { rate, .. } = self.start {
+            rows.push(("start rate", rate));
+        }
+        match rows
+            .into_iter()
+            .find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+        {
+            Some((option, value)) => Err(TimingError::BadOption { option, value }),
+            None => Ok(()),
+        }
+    }
+}
