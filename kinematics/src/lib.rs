@@ -1,1 +1,18 @@
 //! Forward and inverse kinematics of serial arms from URDF.
+//!
+//! The crate never moves anything, keeps no global state and touches no file:
+//! text in, numbers out. All quantities are SI (m, rad); every pose is named by
+//! its frames, so `base_from_flange` maps flange coordinates to base ones.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`urdf`] | reads a URDF, checks it, finds the chain of joints from root to tip |
+//! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
+#![doc = ""]
+
+mod arith;
+pub mod chain;
+pub mod urdf;
+
+pub use chain::Chain;
+pub use urdf::{Model, UrdfError};

@@ -1,0 +1,5 @@
+//! Laws and oracles of the crate `kinematics`, one binary.
+
+mod arms;
+mod chain;
+mod urdf;
