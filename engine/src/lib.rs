@@ -1,1 +1,5 @@
 //! Queue, planner and real-time executor of canonical robot commands.
+
+pub mod command_error;
+pub mod task;
+pub mod tooling;
