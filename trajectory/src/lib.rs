@@ -22,3 +22,4 @@ pub use limits::{JointLimits, ToolLimits};
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
+pub mod otg;
