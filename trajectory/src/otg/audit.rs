@@ -32,13 +32,20 @@ pub struct Audit {
 impl Audit {
     /// The largest of all numbers.
     pub fn worst(&self) -> f64 {
-        [self.end, self.joins, self.velocity, self.acceleration, self.jerk]
-            .into_iter()
-            .fold(self.start, f64::max)
+        [
+            self.end,
+            self.joins,
+            self.velocity,
+            self.acceleration,
+            self.jerk,
+        ]
+        .into_iter()
+        .fold(self.start, f64::max)
     }
 
     /// Checks `motion` against what was asked for. Limits are not checked while a joint brakes
-    /// because its start breaks them; positions that were not asked for count as reached.
+    /// because its start breaks them, and a velocity that is still beyond its limit then (because the
+    /// opposite limit leaves no other way) only must not grow; positions that were not asked for count as reached.
     pub fn of<const N: usize>(
         motion: &Motion<N>,
         start: &State<N>,
@@ -66,16 +73,33 @@ impl Audit {
         let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
             return;
         };
-        let wanted = [start.position[joint], start.velocity[joint], start.acceleration[joint]];
-        raise(&mut self.start, scale.difference(at(first, joint, 0.0), wanted));
-        let wanted = [target.position[joint], target.velocity[joint], target.acceleration[joint]];
-        raise(&mut self.end, scale.difference(at(last, joint, last.duration), wanted));
+        let wanted = [
+            start.position[joint],
+            start.velocity[joint],
+            start.acceleration[joint],
+        ];
+        raise(
+            &mut self.start,
+            scale.difference(at(first, joint, 0.0), wanted),
+        );
+        let wanted = [
+            target.position[joint],
+            target.velocity[joint],
+            target.acceleration[joint],
+        ];
+        raise(
+            &mut self.end,
+            scale.difference(at(last, joint, last.duration), wanted),
+        );
     }
 
     fn joins<const N: usize>(&mut self, joint: usize, scale: &Scale, pieces: &[Piece<N>]) {
         for pair in pieces.windows(2) {
             let before = at(&pair[0], joint, pair[0].duration);
-            raise(&mut self.joins, scale.difference(before, at(&pair[1], joint, 0.0)));
+            raise(
+                &mut self.joins,
+                scale.difference(before, at(&pair[1], joint, 0.0)),
+            );
         }
     }
 
@@ -87,17 +111,23 @@ impl Audit {
         limits: &Limits<N>,
     ) {
         let mut time = 0.0;
+        let mut allowed = (limits.velocity_min[joint], limits.velocity_max[joint]);
         for piece in pieces {
             let settled = time >= scale.braking * (1.0 - 1e-12);
             time += piece.duration;
+            let [_, v, a] = at(piece, joint, 0.0);
             if !settled {
+                let [_, w, _] = at(piece, joint, piece.duration);
+                allowed = (
+                    limits.velocity_min[joint].min(w),
+                    limits.velocity_max[joint].max(w),
+                );
                 continue;
             }
             let jerk = 6.0 * piece.coefficients[3][joint].abs();
             if limits.jerk[joint].is_finite() {
                 raise(&mut self.jerk, jerk / limits.jerk[joint] - 1.0);
             }
-            let [_, v, a] = at(piece, joint, 0.0);
             let [_, w, b] = at(piece, joint, piece.duration);
             let turn = -a / (6.0 * piece.coefficients[3][joint]);
             let mut speeds = (v.min(w), v.max(w));
@@ -105,8 +135,7 @@ impl Audit {
                 let [_, extreme, _] = at(piece, joint, turn);
                 speeds = (speeds.0.min(extreme), speeds.1.max(extreme));
             }
-            let over = (speeds.1 - limits.velocity_max[joint])
-                .max(limits.velocity_min[joint] - speeds.0);
+            let over = (speeds.1 - allowed.1).max(allowed.0 - speeds.0);
             raise(&mut self.velocity, over / scale.velocity);
             let over = (a.max(b) - limits.acceleration_max[joint])
                 .max(limits.acceleration_min[joint] - a.min(b));
@@ -136,15 +165,23 @@ impl Scale {
         let jerk = limits.jerk[joint];
         let fastest = limits.velocity_max[joint].max(-limits.velocity_min[joint]);
         let second = !jerk.is_finite();
-        let time = if second { fastest / acceleration } else { acceleration / jerk };
+        let time = if second {
+            fastest / acceleration
+        } else {
+            acceleration / jerk
+        };
         let end = motion.end();
-        let reached = start.velocity[joint].abs().max(end.velocity[joint].abs()).max(
-            (end.position[joint] - start.position[joint]).abs() / motion.duration().max(time),
-        );
-        let fastest = if fastest.is_finite() { fastest.max(reached) } else { reached };
-        let way = start.position[joint].abs()
-            + end.position[joint].abs()
-            + fastest * motion.duration();
+        let reached = start.velocity[joint]
+            .abs()
+            .max(end.velocity[joint].abs())
+            .max((end.position[joint] - start.position[joint]).abs() / motion.duration().max(time));
+        let fastest = if fastest.is_finite() {
+            fastest.max(reached)
+        } else {
+            reached
+        };
+        let way =
+            start.position[joint].abs() + end.position[joint].abs() + fastest * motion.duration();
         Self {
             position: acceleration * time * time + way,
             velocity: acceleration * time + fastest,
@@ -160,7 +197,11 @@ impl Scale {
         let velocity = (left[1] - right[1]).abs() / self.velocity;
         let acceleration = (left[2] - right[2]).abs() / self.acceleration;
         let position = if self.positions { position } else { 0.0 };
-        let acceleration = if self.accelerations { acceleration } else { 0.0 };
+        let acceleration = if self.accelerations {
+            acceleration
+        } else {
+            0.0
+        };
         position.max(velocity).max(acceleration)
     }
 }

@@ -62,14 +62,26 @@ impl Axis {
     /// A cheap guess at the shortest duration.
     pub(crate) fn guess(&self) -> f64 {
         let way = self.distance.abs();
-        let top = if self.distance < 0.0 { -self.bounds.bottom } else { self.bounds.top };
-        let ramps = if self.bounds.smooth { (32.0 * way).cbrt() } else { 0.0 };
+        let top = if self.distance < 0.0 {
+            -self.bounds.bottom
+        } else {
+            self.bounds.top
+        };
+        let ramps = if self.bounds.smooth {
+            (32.0 * way).cbrt()
+        } else {
+            0.0
+        };
         ramps.max(2.0 * way.sqrt()).max(way / top)
     }
 
     /// The side that leads towards the target of a move between states at rest.
     fn leading(&self) -> (&Side, f64) {
-        if self.distance < 0.0 { (&self.down, -self.distance) } else { (&self.up, self.distance) }
+        if self.distance < 0.0 {
+            (&self.down, -self.distance)
+        } else {
+            (&self.up, self.distance)
+        }
     }
 
     /// The shortest duration not below `from` after which the joint can be at the target, infinity
@@ -87,7 +99,11 @@ impl Axis {
         {
             return time;
         }
-        let late = if from + tiny >= windows.late { from } else { windows.late };
+        let late = if from + tiny >= windows.late {
+            from
+        } else {
+            windows.late
+        };
         self.first_in(late, f64::INFINITY).unwrap_or(f64::INFINITY)
     }
 
@@ -109,8 +125,15 @@ impl Axis {
         let (start, end) = (self.start, self.end);
         if !self.bounds.smooth {
             let change = end.velocity - start.velocity;
-            let bound = if change > 0.0 { self.bounds.rise } else { self.bounds.fall };
-            return Windows { early: None, late: change.abs() / bound };
+            let bound = if change > 0.0 {
+                self.bounds.rise
+            } else {
+                self.bounds.fall
+            };
+            return Windows {
+                early: None,
+                late: change.abs() / bound,
+            };
         }
         velocity_windows(start, end, self.bounds)
     }
@@ -147,7 +170,11 @@ impl Axis {
             return course;
         }
         let extremal = side.at(time);
-        let weight = if distance >= extremal.distance { 1.0 } else { distance / extremal.distance };
+        let weight = if distance >= extremal.distance {
+            1.0
+        } else {
+            distance / extremal.distance
+        };
         let sign = if self.distance < 0.0 { -1.0 } else { 1.0 };
         course.push(self.strand(side, &extremal, sign), weight);
         course
@@ -158,7 +185,11 @@ impl Axis {
         if self.bounds.smooth {
             Strand::jerks(times, sign)
         } else {
-            let bounds = if sign < 0.0 { self.bounds.mirrored() } else { self.bounds };
+            let bounds = if sign < 0.0 {
+                self.bounds.mirrored()
+            } else {
+                self.bounds
+            };
             Strand::accelerations(times, sign * bounds.rise, -sign * bounds.fall)
         }
     }
@@ -183,7 +214,10 @@ pub(crate) fn velocity_windows(start: End, end: End, bounds: Bounds) -> Windows 
         (_, Some(last)) if up_next <= last => Some((up_next, last)),
         _ => None,
     };
-    Windows { early, late: up_next.max(down_next) }
+    Windows {
+        early,
+        late: up_next.max(down_next),
+    }
 }
 
 /// The durations for which the largest change of velocity is at least the wanted: up to the first
@@ -194,7 +228,11 @@ fn pulse_windows(square: f64, bound: f64, a0: f64, af: f64) -> (Option<f64>, f64
     }
     let height = square.sqrt();
     let bound = bound.max(a0).max(af);
-    let next = if height <= bound { height } else { 0.5 * (square / bound + bound) };
+    let next = if height <= bound {
+        height
+    } else {
+        0.5 * (square / bound + bound)
+    };
     let first = (a0.max(af) <= -height).then_some(-2.0 * height - a0 - af);
     (first, 2.0 * next - a0 - af)
 }
@@ -266,7 +304,11 @@ fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     let below = goal - side.at(low).distance;
     let width = side.at(high).distance - goal + below;
-    let share = if width > 0.0 { (below / width).clamp(0.0, 1.0) } else { 1.0 };
+    let share = if width > 0.0 {
+        (below / width).clamp(0.0, 1.0)
+    } else {
+        1.0
+    };
     let mut time = low + (high - low) * share.cbrt();
     for _ in 0..100 {
         let here = side.at(time);
@@ -278,9 +320,17 @@ fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
         }
         let step = error / here.slope;
         let newton = time - step;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         if step.abs() <= 2.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
-            return if error >= 0.0 || step.abs() <= 4.0 * f64::EPSILON * time { time } else { high };
+            return if error >= 0.0 || step.abs() <= 4.0 * f64::EPSILON * time {
+                time
+            } else {
+                high
+            };
         }
         time = next;
     }

@@ -19,7 +19,10 @@ const ROUNDING: f64 = 1e-12;
 impl Brake {
     /// The way from `start` back inside acceleration and, if `velocity`, velocity bounds.
     pub(crate) fn new(start: End, bounds: Bounds, velocity: bool) -> Self {
-        let mut brake = Self { smooth: bounds.smooth, ..Self::default() };
+        let mut brake = Self {
+            smooth: bounds.smooth,
+            ..Self::default()
+        };
         if bounds.smooth {
             brake.accelerations(start, bounds);
         }
@@ -45,7 +48,10 @@ impl Brake {
 
     /// Slows down where the velocity is above, or cannot be kept from rising above, the bound.
     fn velocities(&mut self, now: End, bounds: Bounds, sign: f64) {
-        let End { velocity: v, acceleration: a } = now;
+        let End {
+            velocity: v,
+            acceleration: a,
+        } = now;
         let rounding = ROUNDING * (1.0 + bounds.top.min(v.abs()));
         if !bounds.smooth {
             if v > bounds.top + rounding {
@@ -62,7 +68,12 @@ impl Brake {
         let low = a + (0.5 * a * a + v - bounds.bottom).max(0.0).sqrt();
         let ramp = back.min(low).min(a + bounds.fall).max(0.0);
         self.push(ramp, -sign);
-        let after = Point { velocity: v, acceleration: a, ..Point::default() }.after(ramp, -1.0);
+        let after = Point {
+            velocity: v,
+            acceleration: a,
+            ..Point::default()
+        }
+        .after(ramp, -1.0);
         if after.acceleration < 0.0 {
             let deceleration = -after.acceleration;
             let hold = (after.velocity - bounds.top) / deceleration;
@@ -88,7 +99,10 @@ impl Brake {
             ..Point::default()
         };
         let end = self.point(point, self.duration());
-        End { velocity: end.velocity, acceleration: end.acceleration }
+        End {
+            velocity: end.velocity,
+            acceleration: end.acceleration,
+        }
     }
 
     /// How long it takes.
@@ -110,7 +124,11 @@ impl Brake {
             point = if self.smooth {
                 point.after(passed, control)
             } else {
-                Point { acceleration: control, ..point }.after(passed, 0.0)
+                Point {
+                    acceleration: control,
+                    ..point
+                }
+                .after(passed, 0.0)
             };
             if rest < length {
                 return point;

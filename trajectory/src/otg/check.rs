@@ -26,12 +26,18 @@ pub(crate) fn input<const N: usize>(
     let wait = options.minimum_duration;
     if !(wait.is_finite() && wait >= 0.0) {
         let expected = "finite and not negative";
-        return Err(OtgError::BadOption { option: "minimum duration", expected, value: wait });
+        return Err(OtgError::BadOption {
+            option: "minimum duration",
+            expected,
+            value: wait,
+        });
     }
     match options.period {
-        Some(value) if !(value.is_finite() && value > 0.0) => {
-            Err(OtgError::BadOption { option: "period", expected: "finite and positive", value })
-        }
+        Some(value) if !(value.is_finite() && value > 0.0) => Err(OtgError::BadOption {
+            option: "period",
+            expected: "finite and positive",
+            value,
+        }),
         _ => Ok(()),
     }
 }
@@ -50,10 +56,18 @@ fn states<const N: usize>(
         ("target acceleration", target.acceleration[joint]),
         ("target position", target.position[joint]),
     ];
-    let count = if interface == Interface::Position { 6 } else { 5 };
+    let count = if interface == Interface::Position {
+        6
+    } else {
+        5
+    };
     for (quantity, value) in numbers.into_iter().take(count) {
         if !value.is_finite() {
-            return Err(OtgError::NotFinite { joint, quantity, value });
+            return Err(OtgError::NotFinite {
+                joint,
+                quantity,
+                value,
+            });
         }
     }
     Ok(())
@@ -61,7 +75,12 @@ fn states<const N: usize>(
 
 fn bounds<const N: usize>(joint: usize, limits: &Limits<N>) -> Result<(), OtgError> {
     let bad = |quantity, expected, value| {
-        Err(OtgError::BadLimit { joint, quantity, expected, value })
+        Err(OtgError::BadLimit {
+            joint,
+            quantity,
+            expected,
+            value,
+        })
     };
     let acceleration = limits.acceleration_max[joint];
     if !(acceleration > 0.0 && acceleration.is_finite()) {
@@ -71,8 +90,11 @@ fn bounds<const N: usize>(joint: usize, limits: &Limits<N>) -> Result<(), OtgErr
     if !(deceleration < 0.0 && deceleration.is_finite()) {
         return bad("lower acceleration", "negative and finite", deceleration);
     }
-    let (jerk, fast, slow) =
-        (limits.jerk[joint], limits.velocity_max[joint], limits.velocity_min[joint]);
+    let (jerk, fast, slow) = (
+        limits.jerk[joint],
+        limits.velocity_max[joint],
+        limits.velocity_min[joint],
+    );
     if jerk.is_nan() || jerk <= 0.0 {
         return bad("jerk", "positive", jerk);
     }
@@ -100,7 +122,12 @@ fn reachable<const N: usize>(
     interface: Interface,
 ) -> Result<(), OtgError> {
     let beyond = |quantity, value, limit| {
-        Err(OtgError::TargetBeyondLimit { joint, quantity, value, limit })
+        Err(OtgError::TargetBeyondLimit {
+            joint,
+            quantity,
+            value,
+            limit,
+        })
     };
     let outside = |value: f64, low: f64, high: f64| {
         let room = ROUNDING * value.abs();
@@ -115,8 +142,11 @@ fn reachable<const N: usize>(
     let jerk = limits.jerk[joint];
     let a = target.acceleration[joint];
     if jerk.is_finite()
-        && let Some(limit) =
-            outside(a, limits.acceleration_min[joint], limits.acceleration_max[joint])
+        && let Some(limit) = outside(
+            a,
+            limits.acceleration_min[joint],
+            limits.acceleration_max[joint],
+        )
     {
         return beyond("acceleration", a, limit);
     }
@@ -159,10 +189,18 @@ pub(crate) fn positions<const N: usize>(
         let (low, high) = track.extent();
         let room = ROUNDING * (low.abs() + high.abs());
         if high > upper.max(track.start[0]) + room {
-            return Err(OtgError::PositionLimit { joint, value: high, limit: upper });
+            return Err(OtgError::PositionLimit {
+                joint,
+                value: high,
+                limit: upper,
+            });
         }
         if low < lower.min(track.start[0]) - room {
-            return Err(OtgError::PositionLimit { joint, value: low, limit: lower });
+            return Err(OtgError::PositionLimit {
+                joint,
+                value: low,
+                limit: lower,
+            });
         }
     }
     Ok(())

@@ -24,7 +24,10 @@ impl Track {
         });
         let times = &mut times[..(count + 1).min(SWITCHES)];
         times.sort_unstable_by(f64::total_cmp);
-        let (mut low, mut high) = (self.start[0].min(self.end[0]), self.start[0].max(self.end[0]));
+        let (mut low, mut high) = (
+            self.start[0].min(self.end[0]),
+            self.start[0].max(self.end[0]),
+        );
         for pair in times.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             if to > from {

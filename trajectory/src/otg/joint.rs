@@ -75,10 +75,21 @@ impl Given {
         limits: &Limits<N>,
     ) -> Self {
         Self {
-            start: [start.position[joint], start.velocity[joint], start.acceleration[joint]],
-            target: [target.position[joint], target.velocity[joint], target.acceleration[joint]],
+            start: [
+                start.position[joint],
+                start.velocity[joint],
+                start.acceleration[joint],
+            ],
+            target: [
+                target.position[joint],
+                target.velocity[joint],
+                target.acceleration[joint],
+            ],
             velocity: [limits.velocity_min[joint], limits.velocity_max[joint]],
-            acceleration: [limits.acceleration_min[joint], limits.acceleration_max[joint]],
+            acceleration: [
+                limits.acceleration_min[joint],
+                limits.acceleration_max[joint],
+            ],
             jerk: limits.jerk[joint],
             grain: f64::EPSILON * (start.position[joint].abs() + target.position[joint].abs()),
         }
@@ -135,7 +146,11 @@ impl Joint {
         };
         let normal = |state: &[f64; 3]| End {
             velocity: state[1] / units.velocity,
-            acceleration: if bounds.smooth { state[2] / units.acceleration } else { 0.0 },
+            acceleration: if bounds.smooth {
+                state[2] / units.acceleration
+            } else {
+                0.0
+            },
         };
         let (from, to) = (normal(&given.start), normal(&given.target));
         let brake = Brake::new(from, bounds, interface == Interface::Position);
@@ -145,17 +160,37 @@ impl Joint {
             ..Point::default()
         };
         let pause = brake.duration();
-        let launch = if pause > 0.0 { brake.point(start, pause) } else { start };
-        let ready = End { velocity: launch.velocity, acceleration: launch.acceleration };
+        let launch = if pause > 0.0 {
+            brake.point(start, pause)
+        } else {
+            start
+        };
+        let ready = End {
+            velocity: launch.velocity,
+            acceleration: launch.acceleration,
+        };
         let task = match interface {
             Interface::Position => {
                 let distance = (given.target[0] - given.start[0]) / units.position;
                 let noise = given.grain / units.position;
-                Task::Reach(Axis::new(ready, to, bounds, distance - launch.position, noise))
+                Task::Reach(Axis::new(
+                    ready,
+                    to,
+                    bounds,
+                    distance - launch.position,
+                    noise,
+                ))
             }
             Interface::Velocity => Task::Pace(Pace::new(ready, to, bounds)),
         };
-        Self { units, brake, pause, start, launch, task }
+        Self {
+            units,
+            brake,
+            pause,
+            start,
+            launch,
+            task,
+        }
     }
 
     /// The joint that moves `share` times as far.
@@ -177,7 +212,11 @@ impl Joint {
             Task::Reach(axis) => axis.next_possible(wanted),
             Task::Pace(pace) => pace.next_possible(wanted),
         };
-        if next <= wanted { from } else { (next + self.pause) * self.units.time }
+        if next <= wanted {
+            from
+        } else {
+            (next + self.pause) * self.units.time
+        }
     }
 
     /// The profile of `duration` (s) after braking, which must be possible.

@@ -61,7 +61,11 @@ fn one_interface<const N: usize>(options: &Options<N>) -> Result<Interface, OtgE
             continue;
         }
         if found.is_some() {
-            return Err(OtgError::NotStraight { joint, quantity: "interface", deviation: 1.0 });
+            return Err(OtgError::NotStraight {
+                joint,
+                quantity: "interface",
+                deviation: 1.0,
+            });
         }
         found = Some(interface);
     }
@@ -107,7 +111,9 @@ fn vectors<const N: usize>(
 /// The direction of the first vector that is not zero, scaled so that its largest share is one,
 /// and the joint that has that share.
 fn direction<const N: usize>(vectors: &[SVector<f64, N>; 5]) -> Option<(SVector<f64, N>, usize)> {
-    let vector = vectors.iter().find(|vector| vector.iter().any(|share| *share != 0.0))?;
+    let vector = vectors
+        .iter()
+        .find(|vector| vector.iter().any(|share| *share != 0.0))?;
     let mut leader = 0;
     for joint in 0..N {
         if vector[joint].abs() > vector[leader].abs() {
@@ -136,7 +142,11 @@ fn collinear<const N: usize>(
             let deviation = (vector[joint] - vector[leader] * direction[joint]).abs();
             if deviation > room {
                 let quantity = NAMES[which];
-                return Err(OtgError::NotStraight { joint, quantity, deviation });
+                return Err(OtgError::NotStraight {
+                    joint,
+                    quantity,
+                    deviation,
+                });
             }
         }
     }
@@ -164,7 +174,10 @@ fn scalar<const N: usize>(
         if share != 0.0 {
             let (slow, fast) = (limits.velocity_min[joint], limits.velocity_max[joint]);
             tighten(&mut velocity, slow, fast, share);
-            let (low, high) = (limits.acceleration_min[joint], limits.acceleration_max[joint]);
+            let (low, high) = (
+                limits.acceleration_min[joint],
+                limits.acceleration_max[joint],
+            );
             tighten(&mut acceleration, low, high, share);
             jerk = jerk.min(limits.jerk[joint] / share.abs());
         }
@@ -188,8 +201,16 @@ fn standing<const N: usize>(
 ) -> Motion<N> {
     let duration = options.minimum_duration;
     let tracks = std::array::from_fn(|joint| {
-        let begin = [start.position[joint], start.velocity[joint], start.acceleration[joint]];
-        let mut end = [target.position[joint], target.velocity[joint], target.acceleration[joint]];
+        let begin = [
+            start.position[joint],
+            start.velocity[joint],
+            start.acceleration[joint],
+        ];
+        let mut end = [
+            target.position[joint],
+            target.velocity[joint],
+            target.acceleration[joint],
+        ];
         if !options.enabled[joint] {
             end = [begin[0], 0.0, 0.0];
         } else if options.interface[joint] == Interface::Velocity {
@@ -203,5 +224,9 @@ fn standing<const N: usize>(
             end,
         }
     });
-    Motion { tracks, duration, straight: true }
+    Motion {
+        tracks,
+        duration,
+        straight: true,
+    }
 }

@@ -73,12 +73,17 @@ impl<const N: usize> Motion<N> {
 
     /// How long joint `joint` brakes at first because its start breaks limits (s), mostly zero.
     pub fn braking(&self, joint: usize) -> f64 {
-        self.tracks.get(joint).map_or(0.0, |track| track.joint.braking())
+        self.tracks
+            .get(joint)
+            .map_or(0.0, |track| track.joint.braking())
     }
 
     /// Whether joint `joint` had to reach a position (not only a velocity).
     pub fn reaches_position(&self, joint: usize) -> bool {
-        !matches!(self.tracks.get(joint).map(|t| t.joint.task), Some(Task::Pace(_)) | None)
+        !matches!(
+            self.tracks.get(joint).map(|t| t.joint.task),
+            Some(Task::Pace(_)) | None
+        )
     }
 
     /// Whether the joints were planned along one straight line in joint space.

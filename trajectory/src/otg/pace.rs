@@ -26,7 +26,11 @@ impl Pace {
     pub(crate) fn next_possible(&self, from: f64) -> f64 {
         let from = from.max(0.0);
         if !self.bounds.smooth {
-            let bound = if self.change() > 0.0 { self.bounds.rise } else { self.bounds.fall };
+            let bound = if self.change() > 0.0 {
+                self.bounds.rise
+            } else {
+                self.bounds.fall
+            };
             return from.max(self.change().abs() / bound);
         }
         let windows = velocity_windows(self.start, self.end, self.bounds);
@@ -58,7 +62,10 @@ impl Pace {
         let (first, last) = ((held - a0).abs(), (held - af).abs());
         let times = [first, (time - first - last).max(0.0), last];
         let sign = |rising: bool| if rising { 1 } else { -1 };
-        course.push(Strand::three(times, [sign(held >= a0), 0, sign(af >= held)]), 1.0);
+        course.push(
+            Strand::three(times, [sign(held >= a0), 0, sign(af >= held)]),
+            1.0,
+        );
         course
     }
 

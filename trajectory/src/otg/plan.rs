@@ -26,7 +26,10 @@ pub(crate) fn plan<const N: usize>(
     }
     let joints: [Joint; N] = std::array::from_fn(|joint| {
         if options.enabled[joint] {
-            Joint::new(&Given::of(joint, start, target, limits), options.interface[joint])
+            Joint::new(
+                &Given::of(joint, start, target, limits),
+                options.interface[joint],
+            )
         } else {
             Joint::default()
         }
@@ -73,7 +76,10 @@ pub(crate) fn common_duration<const N: usize>(
     for _ in 0..(joints.len() * 8 + 16) {
         let next = joints[joint].next_possible(duration);
         if !next.is_finite() {
-            return Err(OtgError::OutOfRange { joint, time: duration });
+            return Err(OtgError::OutOfRange {
+                joint,
+                time: duration,
+            });
         }
         let rounded = whole_periods(next, options.period);
         agreed = if next <= duration {
@@ -89,7 +95,10 @@ pub(crate) fn common_duration<const N: usize>(
         }
         joint = (joint + 1) % joints.len();
     }
-    Err(OtgError::OutOfRange { joint, time: duration })
+    Err(OtgError::OutOfRange {
+        joint,
+        time: duration,
+    })
 }
 
 fn slowest(joints: &[Joint]) -> usize {
@@ -123,14 +132,26 @@ fn assemble<const N: usize>(
             joint: joints[joint],
             course: joints[joint].course(durations[joint]),
             duration: durations[joint],
-            start: [start.position[joint], start.velocity[joint], start.acceleration[joint]],
-            end: [target.position[joint], target.velocity[joint], target.acceleration[joint]],
+            start: [
+                start.position[joint],
+                start.velocity[joint],
+                start.acceleration[joint],
+            ],
+            end: [
+                target.position[joint],
+                target.velocity[joint],
+                target.acceleration[joint],
+            ],
         };
         finish(&mut track, options.enabled[joint], options.interface[joint]);
         track
     });
     let duration = durations.iter().copied().fold(0.0, f64::max);
-    Motion { tracks, duration, straight: false }
+    Motion {
+        tracks,
+        duration,
+        straight: false,
+    }
 }
 
 /// Sets the end of a joint whose position is not asked for.

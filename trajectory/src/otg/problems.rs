@@ -58,14 +58,22 @@ pub struct Problems {
 impl Problems {
     /// The sequence of `seed`.
     pub fn new(seed: u64, ends: Ends) -> Self {
-        Self { state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d, ends }
+        Self {
+            state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d,
+            ends,
+        }
     }
 
     /// The next problem whose target can be reached at all.
     pub fn draw<const N: usize>(&mut self) -> Problem<N> {
         loop {
             let problem = self.any();
-            let Problem { start, target, limits, options } = &problem;
+            let Problem {
+                start,
+                target,
+                limits,
+                options,
+            } = &problem;
             if check::input(start, target, limits, options).is_ok() {
                 return problem;
             }
@@ -90,7 +98,12 @@ impl Problems {
             self.limit_vector() + target.acceleration.abs(),
             self.limit_vector(),
         );
-        Problem { start, target, limits, options: Options::default() }
+        Problem {
+            start,
+            target,
+            limits,
+            options: Options::default(),
+        }
     }
 
     fn limit_vector<const N: usize>(&mut self) -> SVector<f64, N> {
@@ -99,7 +112,11 @@ impl Problems {
 
     fn normal_vector<const N: usize>(&mut self, deviation: f64, share: f64) -> SVector<f64, N> {
         SVector::from_fn(|_, _| {
-            if self.between(0.0, 1.0) < share { deviation * self.normal() } else { 0.0 }
+            if self.between(0.0, 1.0) < share {
+                deviation * self.normal()
+            } else {
+                0.0
+            }
         })
     }
 

@@ -151,7 +151,14 @@ impl Side {
         if free.crossing && free.peak > self.top {
             return self.cruising(span);
         }
-        let Free { high, low, rising, falling, peak, crossing } = free;
+        let Free {
+            high,
+            low,
+            rising,
+            falling,
+            peak,
+            crossing,
+        } = free;
         let distance = 0.5 * (rising * (self.start + peak) + falling * (peak + self.end));
         let tiny = 1e-14 * (1.0 + time);
         let fits = if self.smooth {
@@ -193,7 +200,7 @@ impl Side {
         self.free_bounded(half, change, high > self.rise)
     }
 
-    /// The same where an acceleration bound is reached, first guess: the upper one.
+    /// The same where an acceleration bound is reached; `upper` if the upper one may be.
     fn free_bounded(&self, half: f64, change: f64, upper: bool) -> Free {
         let (rise, fall) = (self.rise, self.fall);
         if upper {
@@ -208,18 +215,17 @@ impl Side {
                     crossing: low <= 0.0,
                 };
             }
-        } else {
-            let high = (2.0 * fall * half + change).max(0.0).sqrt() - fall;
-            if high <= rise {
-                return Free {
-                    high,
-                    low: -fall,
-                    rising: 2.0 * high,
-                    falling: 2.0 * (half - high),
-                    peak: self.start + high * high,
-                    crossing: high >= 0.0,
-                };
-            }
+        }
+        let high = (2.0 * fall * half + change).max(0.0).sqrt() - fall;
+        if high <= rise {
+            return Free {
+                high,
+                low: -fall,
+                rising: 2.0 * high,
+                falling: 2.0 * (half - high),
+                peak: self.start + high * high,
+                crossing: high >= 0.0,
+            };
         }
         self.two_plateaus(2.0 * half - rise - fall, rise, fall)
     }
@@ -267,12 +273,20 @@ impl Side {
 
     fn pulse_up(&self) -> (f64, f64) {
         let change = self.top - self.start;
-        if self.smooth { pulse(change, self.rise) } else { (change / self.rise, 0.0) }
+        if self.smooth {
+            pulse(change, self.rise)
+        } else {
+            (change / self.rise, 0.0)
+        }
     }
 
     fn pulse_down(&self) -> (f64, f64) {
         let change = self.top - self.end;
-        if self.smooth { pulse(change, self.fall) } else { (change / self.fall, 0.0) }
+        if self.smooth {
+            pulse(change, self.fall)
+        } else {
+            (change / self.fall, 0.0)
+        }
     }
 
     /// From this time on the velocity bound is reached.
@@ -323,11 +337,23 @@ impl Side {
     /// The times of the seven phases with jerk +, 0, -, 0, -, 0, +.
     pub(crate) fn phases(&self, e: &Extremal) -> [f64; 7] {
         if !self.smooth {
-            return [0.0, e.rising.max(0.0), 0.0, e.cruise, 0.0, e.falling.max(0.0), 0.0];
+            return [
+                0.0,
+                e.rising.max(0.0),
+                0.0,
+                e.cruise,
+                0.0,
+                e.falling.max(0.0),
+                0.0,
+            ];
         }
         let high = e.high.max(self.a0);
         let low = e.low.min(self.af);
-        let (third, fifth) = if e.crossing { (high, -low) } else { (high - low, 0.0) };
+        let (third, fifth) = if e.crossing {
+            (high, -low)
+        } else {
+            (high - low, 0.0)
+        };
         [
             high - self.a0,
             (e.rising - 2.0 * e.high).max(0.0),

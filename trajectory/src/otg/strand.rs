@@ -12,7 +12,12 @@ pub(crate) struct Point {
 impl Point {
     /// After `time` of constant jerk.
     pub(crate) fn after(self, time: f64, jerk: f64) -> Self {
-        let Self { position, velocity, acceleration, .. } = self;
+        let Self {
+            position,
+            velocity,
+            acceleration,
+            ..
+        } = self;
         let third = 1.0 / 3.0;
         Self {
             position: position
@@ -37,14 +42,26 @@ pub(crate) struct Strand {
 impl Strand {
     /// Phases of jerk `sign` times (+1, 0, -1, 0, -1, 0, +1).
     pub(crate) fn jerks(times: [f64; 7], sign: f64) -> Self {
-        let signs = if sign < 0.0 { [-1, 0, 1, 0, 1, 0, -1] } else { [1, 0, -1, 0, -1, 0, 1] };
-        Self { times, signs, levels: None }
+        let signs = if sign < 0.0 {
+            [-1, 0, 1, 0, 1, 0, -1]
+        } else {
+            [1, 0, -1, 0, -1, 0, 1]
+        };
+        Self {
+            times,
+            signs,
+            levels: None,
+        }
     }
 
     /// Phases of the acceleration `first`, zero and `second` (phases 1, 3 and 5, the others of no
     /// length).
     pub(crate) fn accelerations(times: [f64; 7], first: f64, second: f64) -> Self {
-        Self { times, signs: [0, 1, 0, 0, 0, -1, 0], levels: Some((first, second)) }
+        Self {
+            times,
+            signs: [0, 1, 0, 0, 0, -1, 0],
+            levels: Some((first, second)),
+        }
     }
 
     /// The first three phases with the given signs of the jerk.
@@ -64,7 +81,11 @@ impl Strand {
             -1 => second,
             _ => 0.0,
         };
-        Point { acceleration, ..point }.after(time, 0.0)
+        Point {
+            acceleration,
+            ..point
+        }
+        .after(time, 0.0)
     }
 
     /// The point at `time`, from `start` on. A switching instant belongs to the later phase.

@@ -27,7 +27,12 @@ fn peer_duration<const N: usize>(problem: &Problem<N>) -> Option<f64> {
 
 /// Plans, audits and compares one problem with the peer.
 fn compare<const N: usize>(index: usize, problem: &Problem<N>, failures: &mut Vec<String>) {
-    let Problem { start, target, limits, options } = problem;
+    let Problem {
+        start,
+        target,
+        limits,
+        options,
+    } = problem;
     let motion = match Otg::plan(start, target, limits, options) {
         Ok(motion) => motion,
         Err(error) => {
@@ -37,12 +42,22 @@ fn compare<const N: usize>(index: usize, problem: &Problem<N>, failures: &mut Ve
     };
     let audit = Audit::of(&motion, start, target, limits);
     if !(audit.worst() <= 1e-12) {
-        failures.push(format!("{index}: {audit:?} {}", if N == 1 { format!("{problem:?} {motion:?}") } else { String::new() }));
+        failures.push(format!(
+            "{index}: {audit:?} {}",
+            if N == 1 {
+                format!("{problem:?} {motion:?}")
+            } else {
+                String::new()
+            }
+        ));
     }
     if let Some(duration) = peer_duration(problem)
         && motion.duration() > duration * (1.0 + 1e-9)
     {
-        failures.push(format!("{index}: {} instead of {duration}", motion.duration()));
+        failures.push(format!(
+            "{index}: {} instead of {duration}",
+            motion.duration()
+        ));
     }
 }
 
@@ -52,7 +67,12 @@ fn agree<const N: usize>(seed: u64, ends: Ends, count: usize) {
     for index in 0..count {
         compare(index, &problems.draw::<N>(), &mut failures);
     }
-    assert!(failures.is_empty(), "{} of {count}: {:#?}", failures.len(), &failures[..failures.len().min(20)]);
+    assert!(
+        failures.is_empty(),
+        "{} of {count}: {:#?}",
+        failures.len(),
+        &failures[..failures.len().min(20)]
+    );
 }
 
 #[test]
