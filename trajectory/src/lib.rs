@@ -27,3 +27,4 @@ pub use line::Line;
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
+pub mod otg;
