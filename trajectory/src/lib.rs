@@ -12,6 +12,7 @@ mod hermite_path;
 mod joint_line;
 mod limits;
 mod path;
+mod spline_path;
 pub mod timing;
 mod trajectory;
 
@@ -20,5 +21,6 @@ pub use hermite_path::HermitePath;
 pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
+pub use spline_path::SplinePath;
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
