@@ -1,1 +1,23 @@
 //! Forward and inverse kinematics of serial arms from URDF.
+//!
+//! The crate never moves anything, keeps no global state and touches no file:
+//! text in, numbers out. All quantities are SI (m, rad); every pose is named by
+//! its frames, so `base_from_flange` maps flange coordinates to base ones.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`urdf`] | reads a URDF, checks it, finds the chain of joints from root to tip |
+//! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
+#![doc = ""]
+//! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
+//! | [`measure`] | manipulability, singular values, condition number |
+
+mod arith;
+pub mod chain;
+pub mod ik;
+pub mod measure;
+pub mod urdf;
+
+pub use chain::Chain;
+pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
+pub use urdf::{Model, UrdfError};

@@ -1,1 +1,7 @@
 //! Plan interpreters (PDDL, kitting process plans) and the world model.
+
+pub mod error;
+pub mod finding;
+pub mod world;
+
+pub use error::PlanError;

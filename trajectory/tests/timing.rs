@@ -11,7 +11,11 @@ use trajectory::{
 };
 
 fn config() -> ProptestConfig {
-    ProptestConfig { cases: 48, rng_seed: RngSeed::Fixed(40), ..ProptestConfig::default() }
+    ProptestConfig {
+        cases: 48,
+        rng_seed: RngSeed::Fixed(40),
+        ..ProptestConfig::default()
+    }
 }
 
 fn spline(points: &[[f64; 3]]) -> SplinePath<3> {
@@ -20,7 +24,13 @@ fn spline(points: &[[f64; 3]]) -> SplinePath<3> {
 }
 
 fn time(path: &SplinePath<3>, limits: &JointLimits<3>) -> Timed<3> {
-    time_path(path, limits, &ToolLimits::UNLIMITED, &TimingOptions::default()).unwrap()
+    time_path(
+        path,
+        limits,
+        &ToolLimits::UNLIMITED,
+        &TimingOptions::default(),
+    )
+    .unwrap()
 }
 
 /// Largest ratios of velocity, acceleration and jerk at many samples.
@@ -91,7 +101,12 @@ fn straight_lines_of_any_length() {
     let still = |_: &JointPoint<2>| ToolPoint::still(Isometry3::identity());
     let limits = JointLimits::uniform(2.0, 10.0, 100.0);
     let start = SVector::<f64, 2>::new(1.0, 1.0);
-    for (length, textbook) in [(1e-6, 0.006_840), (1e-3, 0.068_4), (1.0, 0.8), (100.0, 50.3)] {
+    for (length, textbook) in [
+        (1e-6, 0.006_840),
+        (1e-3, 0.068_4),
+        (1.0, 0.8),
+        (100.0, 50.3),
+    ] {
         let end = start + SVector::<f64, 2>::new(length, -0.3 * length);
         let line = JointLine::new(start, end, still);
         let options = TimingOptions::default();
@@ -105,7 +120,12 @@ fn straight_lines_of_any_length() {
 /// Something always decides the speed: nearly all of the motion has an active limit.
 #[test]
 fn some_limit_is_active() {
-    let path = spline(&[[0.0, 0.0, 0.0], [1.0, -1.0, 0.5], [0.2, 0.3, -1.0], [1.0, 1.0, 1.0]]);
+    let path = spline(&[
+        [0.0, 0.0, 0.0],
+        [1.0, -1.0, 0.5],
+        [0.2, 0.3, -1.0],
+        [1.0, 1.0, 1.0],
+    ]);
     let timed = time(&path, &JointLimits::uniform(1.0, 5.0, 50.0));
     let certificate = &timed.certificate;
     assert!(certificate.ratio(|limit| matches!(limit, Limit::JointJerk(_))) > 0.98);
@@ -115,5 +135,9 @@ fn some_limit_is_active() {
         covered += (span.end - span.start.max(until)).max(0.0);
         until = until.max(span.end);
     }
-    assert!(covered > 0.7 * certificate.duration, "{covered} of {}", certificate.duration);
+    assert!(
+        covered > 0.7 * certificate.duration,
+        "{covered} of {}",
+        certificate.duration
+    );
 }

@@ -154,7 +154,6 @@ impl Audit {
         spans.sort_by(|a, b| a.start.total_cmp(&b.start));
         spans
     }
-
 }
 
 /// Root of the order 1, 2 or 3.

@@ -435,7 +435,12 @@ impl<'a> Interior<'a> {
     fn share(&self, i: usize, spot: Spot, mu: f64) -> Share {
         let problem = self.problem;
         let mut share = Share::default();
-        share.value(spot.a, [problem.weight(i), problem.cap[i]], &self.cap[i], mu);
+        share.value(
+            spot.a,
+            [problem.weight(i), problem.cap[i]],
+            &self.cap[i],
+            mu,
+        );
         let range = i * problem.lanes..(i + 1) * problem.lanes;
         let rows = &problem.acceleration[range.clone()];
         share.accelerations(rows, &self.acceleration[range], mu);

@@ -1,0 +1,6 @@
+//! Laws and oracles of the crate `kinematics`, one binary.
+
+mod arms;
+mod chain;
+mod ik;
+mod urdf;

@@ -1,0 +1,314 @@
+//! Writing the world database: for the controller only.
+
+use std::path::Path;
+
+use rusqlite::{Connection, OptionalExtension, Transaction, params};
+
+use super::reader::{load, pose_to_text};
+use super::{Change, Location, Model, Object, ObjectId, Scalar, schema};
+use crate::PlanError;
+
+/// How safe a commit is against loss of power. A killed process never loses a commit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Durability {
+    /// On the disk when the commit returns.
+    #[default]
+    Full,
+    /// Handed to the operating system; for dry runs and tests.
+    Process,
+}
+
+/// State of a run of a plan, stored with each commit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredRun {
+    /// Its number.
+    pub id: i64,
+    /// Id of the plan.
+    pub plan: String,
+    /// Text of the plan, as it was when the run started.
+    pub source: String,
+    /// Values of the parameters (JSON).
+    pub parameters: String,
+    /// What the simulated factotum has in store (JSON).
+    pub stock: String,
+    /// Program counter, variables and counters (JSON).
+    pub state: String,
+    /// How it ended; none while it runs or after it was killed.
+    pub outcome: Option<String>,
+    /// The step whose motion was begun and not yet committed.
+    pub under_way: Option<String>,
+}
+
+/// The one connection that may write the world database.
+#[derive(Debug)]
+pub struct Writer {
+    connection: Connection,
+}
+
+impl Writer {
+    /// Opens or creates the database in `path` and brings its schema up to date.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`] or [`PlanError::Schema`].
+    pub fn open(path: &Path, durability: Durability) -> Result<Self, PlanError> {
+        let mut connection = Connection::open(path)?;
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        let synchronous = if durability == Durability::Full {
+            "FULL"
+        } else {
+            "NORMAL"
+        };
+        connection.pragma_update(None, "synchronous", synchronous)?;
+        connection.pragma_update(None, "foreign_keys", true)?;
+        connection.busy_timeout(std::time::Duration::from_secs(5))?;
+        schema::migrate(&mut connection)?;
+        Ok(Self { connection })
+    }
+
+    /// Reads the whole world.
+    ///
+    /// # Errors
+    /// As [`super::Reader::model`].
+    pub fn model(&self) -> Result<Model, PlanError> {
+        let transaction = self.connection.unchecked_transaction()?;
+        load(&transaction)
+    }
+
+    /// Replaces the whole world by `model`; runs stay.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`].
+    pub fn replace(&mut self, model: &Model) -> Result<(), PlanError> {
+        let transaction = self.connection.transaction()?;
+        transaction.execute_batch(
+            "DELETE FROM volume; DELETE FROM property; DELETE FROM object;
+             DELETE FROM design_part; DELETE FROM design; DELETE FROM sku_effector;
+             DELETE FROM sku; DELETE FROM workstation;",
+        )?;
+        let units = &model.units;
+        transaction.execute(
+            "INSERT INTO workstation VALUES (1, ?, ?, ?, ?, ?, ?)",
+            params![
+                units.length,
+                units.angle,
+                units.weight,
+                model.next,
+                model.revision,
+                model.arm.as_ref().map(pose_to_text)
+            ],
+        )?;
+        write_descriptions(&transaction, model)?;
+        for object in model.objects() {
+            create(&transaction, object)?;
+        }
+        for (position, volume) in model.volumes().iter().enumerate() {
+            transaction.execute(
+                "INSERT INTO volume VALUES (?, ?, ?, ?)",
+                params![
+                    volume.robot.0,
+                    i64::try_from(position).unwrap_or(i64::MAX),
+                    format!("{:?}", volume.minimum),
+                    format!("{:?}", volume.maximum)
+                ],
+            )?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Commits changes of the world, and the state of the run that made them, as one transaction:
+    /// all of it or nothing. Returns the new revision.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`]; the database is then unchanged.
+    pub fn commit(
+        &mut self,
+        changes: &[Change],
+        run: Option<(i64, &str, Option<&str>)>,
+    ) -> Result<i64, PlanError> {
+        let transaction = self.connection.transaction()?;
+        for change in changes {
+            write_change(&transaction, change)?;
+        }
+        if let Some((id, state, outcome)) = run {
+            transaction
+                .prepare_cached(
+                    "UPDATE run SET state = ?, outcome = ?, under_way = NULL WHERE id = ?",
+                )?
+                .execute(params![state, outcome, id])?;
+        }
+        let revision = transaction
+            .prepare_cached("UPDATE workstation SET revision = revision + 1 RETURNING revision")?
+            .query_row([], |row| row.get(0))?;
+        transaction.commit()?;
+        Ok(revision)
+    }
+
+    /// Records a new run and returns its number.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`].
+    pub fn begin_run(&mut self, run: &StoredRun) -> Result<i64, PlanError> {
+        self.connection.execute(
+            "INSERT INTO run (plan, source, parameters, stock, state) VALUES (?, ?, ?, ?, ?)",
+            params![run.plan, run.source, run.parameters, run.stock, run.state],
+        )?;
+        Ok(self.connection.last_insert_rowid())
+    }
+
+    /// Records that the motion of a step begins, so that an inspection after a kill can tell.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`].
+    pub fn mark_under_way(&mut self, run: i64, step: &str) -> Result<(), PlanError> {
+        self.connection
+            .prepare_cached("UPDATE run SET under_way = ? WHERE id = ?")?
+            .execute(params![step, run])?;
+        Ok(())
+    }
+
+    /// The latest run, or none.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`].
+    pub fn last_run(&self) -> Result<Option<StoredRun>, PlanError> {
+        let run = self
+            .connection
+            .query_row("SELECT * FROM run ORDER BY id DESC LIMIT 1", [], |row| {
+                Ok(StoredRun {
+                    id: row.get(0)?,
+                    plan: row.get(1)?,
+                    source: row.get(2)?,
+                    parameters: row.get(3)?,
+                    stock: row.get(4)?,
+                    state: row.get(5)?,
+                    outcome: row.get(6)?,
+                    under_way: row.get(7)?,
+                })
+            })
+            .optional()?;
+        Ok(run)
+    }
+}
+
+fn write_descriptions(transaction: &Transaction<'_>, model: &Model) -> Result<(), PlanError> {
+    let position = |index: usize| i64::try_from(index).unwrap_or(i64::MAX);
+    for sku in model.skus() {
+        transaction.execute(
+            "INSERT INTO sku VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            params![
+                sku.id,
+                sku.description,
+                sku.shape.map(|s| s.length),
+                sku.shape.map(|s| s.width),
+                sku.shape.map(|s| s.height),
+                sku.shape.map(|s| s.has_top),
+                sku.weight,
+                sku.grasp.as_ref().map(pose_to_text)
+            ],
+        )?;
+        for (index, effector) in sku.effectors.iter().enumerate() {
+            transaction.execute(
+                "INSERT INTO sku_effector VALUES (?, ?, ?)",
+                params![sku.id, position(index), effector],
+            )?;
+        }
+    }
+    for design in model.designs() {
+        transaction.execute(
+            "INSERT INTO design VALUES (?, ?)",
+            params![design.id, design.tray_sku],
+        )?;
+        for (index, part) in design.parts.iter().enumerate() {
+            transaction.execute(
+                "INSERT INTO design_part VALUES (?, ?, ?, ?)",
+                params![
+                    design.id,
+                    position(index),
+                    part.sku,
+                    pose_to_text(&part.pose)
+                ],
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn create(transaction: &Transaction<'_>, object: &Object) -> Result<(), PlanError> {
+    transaction
+        .prepare_cached("INSERT INTO object VALUES (?, ?, ?, ?, ?, ?)")?
+        .execute(params![
+            object.id.0,
+            object.name,
+            object.class.name(),
+            object.location.reference.0,
+            object.location.relation.name(),
+            pose_to_text(&object.location.pose)
+        ])?;
+    for (name, value) in &object.properties {
+        set(transaction, object.id, name, value)?;
+    }
+    Ok(())
+}
+
+fn set(
+    transaction: &Transaction<'_>,
+    object: ObjectId,
+    name: &str,
+    value: &Scalar,
+) -> Result<(), PlanError> {
+    let value = serde_json::to_string(value).map_err(|error| PlanError::Stored {
+        place: name.to_owned(),
+        what: error.to_string(),
+    })?;
+    transaction
+        .prepare_cached("INSERT OR REPLACE INTO property VALUES (?, ?, ?)")?
+        .execute(params![object.0, name, value])?;
+    Ok(())
+}
+
+fn place(
+    transaction: &Transaction<'_>,
+    object: ObjectId,
+    location: &Location,
+) -> Result<(), PlanError> {
+    transaction
+        .prepare_cached("UPDATE object SET reference = ?, relation = ?, pose = ? WHERE id = ?")?
+        .execute(params![
+            location.reference.0,
+            location.relation.name(),
+            pose_to_text(&location.pose),
+            object.0
+        ])?;
+    Ok(())
+}
+
+fn write_change(transaction: &Transaction<'_>, change: &Change) -> Result<(), PlanError> {
+    match change {
+        Change::Create(object) => {
+            create(transaction, object)?;
+            transaction
+                .prepare_cached(
+                    "UPDATE workstation SET next_object = max(next_object, ? + 1) WHERE id = 1",
+                )?
+                .execute([object.id.0])?;
+        }
+        Change::Delete(id) => {
+            transaction
+                .prepare_cached("DELETE FROM object WHERE id = ?")?
+                .execute([id.0])?;
+        }
+        Change::Place { object, location } => place(transaction, *object, location)?,
+        Change::Set {
+            object,
+            property,
+            value,
+        } => set(transaction, *object, property, value)?,
+        Change::Arm(pose) => {
+            transaction
+                .prepare_cached("UPDATE workstation SET arm = ?")?
+                .execute([pose_to_text(pose)])?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,5 @@
+//! Tests of plans and the world model, one binary.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod fixtures;
+mod world;
