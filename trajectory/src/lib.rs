@@ -28,3 +28,4 @@ pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 pub use spline_path::SplinePath;
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
+pub mod otg;
