@@ -1,1 +1,3 @@
 //! Queue, planner and real-time executor of canonical robot commands.
+
+pub mod robot;

@@ -1,1 +1,84 @@
 //! The process border: messages and channels over iceoryx2.
+//!
+//! - [`Setpoint`] goes from the engine to the driver once in every period, [`State`] comes back.
+//!   Both are plain numbers of fixed size: any bytes are a value, and [`Setpoint::check`] and
+//!   [`State::check`] say whether the value makes sense before anyone uses it.
+//! - [`Hello`] and [`HelloAck`] are the handshake that opens a session.
+//! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
+//! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
+//!   report back.
+//!
+//! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
+//! in a signature. Nobody else names iceoryx2. All segments belong to one user and are readable by
+//! that user only.
+
+mod arm;
+mod client;
+mod clock;
+mod driver_link;
+mod engine_link;
+mod error;
+mod hello;
+mod node;
+mod setpoint;
+mod state;
+mod tool;
+
+pub use arm::{Arm, model_hash};
+pub use client::{
+    Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
+};
+pub use clock::now_ns;
+pub use driver_link::{DriverLink, Greeting};
+pub use engine_link::EngineLink;
+pub use error::{IpcError, MessageError};
+pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
+pub use node::{Leftovers, cleanup, survey};
+pub use setpoint::{Setpoint, SetpointFlags};
+pub use state::{DriverState, FaultCode, State};
+pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
+
+/// How many joints fit into a message.
+pub const MAX_JOINTS: usize = 16;
+
+/// How many tools fit into a message: 0 is the gripper, 1 the tool changer.
+pub const MAX_TOOLS: usize = 2;
+
+/// The index of the gripper among the tools of a message.
+pub const GRIPPER: usize = 0;
+
+/// The index of the tool changer among the tools of a message.
+pub const TOOL_CHANGER: usize = 1;
+
+/// The version of the driver protocol. Both sides must have the same.
+pub const PROTOCOL: u32 = 1;
+
+/// A checksum of the byte layout of the two cyclic messages; part of the handshake, so that a
+/// driver built from other headers is refused before it moves.
+///
+/// # Source
+/// Fowler, Noll, Vo, hash FNV-1a, 64 bit, over the sizes and offsets.
+pub const fn schema_checksum() -> u64 {
+    let numbers = [
+        PROTOCOL as usize,
+        MAX_JOINTS,
+        MAX_TOOLS,
+        size_of::<Setpoint>(),
+        core::mem::offset_of!(Setpoint, position),
+        core::mem::offset_of!(Setpoint, tools),
+        core::mem::offset_of!(Setpoint, digital_outputs),
+        size_of::<State>(),
+        core::mem::offset_of!(State, position),
+        core::mem::offset_of!(State, tools),
+        core::mem::offset_of!(State, digital_inputs),
+        size_of::<Hello>(),
+        size_of::<HelloAck>(),
+    ];
+    let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
+    let mut index = 0;
+    while index < numbers.len() {
+        hash = (hash ^ numbers[index] as u64).wrapping_mul(0x0100_0000_01b3);
+        index += 1;
+    }
+    hash
+}

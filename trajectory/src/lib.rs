@@ -11,7 +11,11 @@ mod error;
 mod hermite_path;
 mod joint_line;
 mod limits;
+mod line;
 mod path;
+
+pub mod smooth;
+mod spline_path;
 pub mod timing;
 mod trajectory;
 
@@ -19,6 +23,9 @@ pub use error::TimingError;
 pub use hermite_path::HermitePath;
 pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
+pub use line::Line;
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
+pub use spline_path::SplinePath;
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
+pub mod otg;

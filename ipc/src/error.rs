@@ -1,0 +1,163 @@
+//! What can go wrong at the process border.
+
+use thiserror::Error;
+
+/// Why a channel could not be opened or used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum IpcError {
+    /// The name is not `cell/arm`.
+    #[error("an arm is named cell/arm with letters, digits, - and _, got {name:?}")]
+    BadArmName {
+        /// The name that was given.
+        name: String,
+    },
+    /// Another living process already holds this end of the arm.
+    #[error("{arm}: the {role} is already taken by {owner}")]
+    Taken {
+        /// The arm.
+        arm: String,
+        /// Which end: engine, driver, server of clients.
+        role: &'static str,
+        /// Executable and process number of the owner, as far as known.
+        owner: String,
+    },
+    /// The other side was built with messages of another type or size.
+    #[error(
+        "{service}: the other side uses messages of another layout; \
+         this side speaks protocol {protocol}, build both from the same version"
+    )]
+    Incompatible {
+        /// The service.
+        service: String,
+        /// Our protocol version.
+        protocol: u32,
+    },
+    /// The service exists, but was made by another version of iceoryx2 or is broken.
+    #[error(
+        "{service}: made by another version of iceoryx2 than 0.9.3, or left broken by a crash; \
+         stop all engines and drivers of this arm and run `canter doctor`"
+    )]
+    OtherLibrary {
+        /// The service.
+        service: String,
+    },
+    /// The operating system refused.
+    #[error(
+        "{service}: {operation} refused: not the same user as the other side, or shared memory is not accessible"
+    )]
+    Permission {
+        /// The service.
+        service: String,
+        /// What was tried.
+        operation: &'static str,
+    },
+    /// Anything else, with the name that iceoryx2 gives it.
+    #[error("{service}: {operation} failed ({cause})")]
+    Failed {
+        /// The service.
+        service: String,
+        /// What was tried.
+        operation: &'static str,
+        /// The cause in iceoryx2's own words.
+        cause: String,
+    },
+    /// Nobody answered in time.
+    #[error("{arm}: no {role} answered within {waited_ms} ms")]
+    NoAnswer {
+        /// The arm.
+        arm: String,
+        /// Who was asked: driver or engine.
+        role: &'static str,
+        /// How long was waited (ms).
+        waited_ms: u64,
+    },
+    /// The driver refused the handshake.
+    #[error("{arm}: driver {driver:?} refused: {reason}")]
+    Refused {
+        /// The arm.
+        arm: String,
+        /// The driver's name.
+        driver: String,
+        /// Its reason.
+        reason: String,
+    },
+    /// A message of the other side makes no sense.
+    #[error("{arm}: {cause}")]
+    BadMessage {
+        /// The arm.
+        arm: String,
+        /// What is wrong with it.
+        #[source]
+        cause: MessageError,
+    },
+    /// A text of a client channel is not what it should be.
+    #[error("{service}: cannot read the message: {cause}")]
+    BadText {
+        /// The service.
+        service: String,
+        /// What the reader said.
+        cause: String,
+    },
+}
+
+/// What is wrong with a message that was read from shared memory. Plain numbers, so that it can
+/// be made inside the cycle.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum MessageError {
+    /// Another protocol version.
+    #[error("protocol {found} where {expected} is spoken")]
+    Protocol {
+        /// Our version.
+        expected: u32,
+        /// The version in the message.
+        found: u32,
+    },
+    /// Another number of joints.
+    #[error("{found} joints where the arm has {expected}")]
+    Joints {
+        /// Joints of the arm.
+        expected: u32,
+        /// Joints in the message.
+        found: u32,
+    },
+    /// A value of a joint is not finite.
+    #[error("{quantity} of joint {joint} is {value}, not a finite number")]
+    NotFinite {
+        /// Position, velocity and so on.
+        quantity: &'static str,
+        /// The joint, from 0.
+        joint: u32,
+        /// The value.
+        value: f64,
+    },
+    /// A number stands for none of the known choices.
+    #[error("{field} is {value}, which means nothing")]
+    Choice {
+        /// The field of the message.
+        field: &'static str,
+        /// Its value.
+        value: u32,
+    },
+    /// A time or count is out of its range.
+    #[error("{field} is {value}, allowed is {least} to {most}")]
+    Range {
+        /// The field of the message.
+        field: &'static str,
+        /// Its value.
+        value: u64,
+        /// The least allowed.
+        least: u64,
+        /// The most allowed.
+        most: u64,
+    },
+    /// The layout checksum differs.
+    #[error("layout checksum {found:#018x} where {expected:#018x} is used")]
+    Schema {
+        /// Ours.
+        expected: u64,
+        /// Theirs.
+        found: u64,
+    },
+}

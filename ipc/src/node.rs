@@ -1,0 +1,276 @@
+//! This process among the others: configuration, services, left-overs of dead processes.
+
+use core::fmt::Debug;
+
+use iceoryx2::node::NodeView;
+use iceoryx2::prelude::*;
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+use iceoryx2::service::builder::request_response::{
+    RequestResponseOpenError, RequestResponseOpenOrCreateError,
+};
+use iceoryx2::service::port_factory::{publish_subscribe, request_response};
+
+use crate::{Arm, IpcError, PROTOCOL};
+
+/// The kind of service: shared memory between processes, ports that stay in their thread.
+pub(crate) type Shared = ipc::Service;
+
+/// How many messages wait for a slow reader before the oldest is overwritten.
+const BUFFER: usize = 16;
+
+/// Where our files are: apart from every other user of iceoryx2, and from other users.
+fn configuration() -> Config {
+    let mut config = Config::default();
+    // SAFETY: the call has no preconditions and cannot fail.
+    #[expect(
+        unsafe_code,
+        reason = "the standard library does not show the user's number"
+    )]
+    let user = unsafe { libc::geteuid() };
+    if let Ok(prefix) = FileName::new(format!("canter_{user}_").as_bytes()) {
+        config.global.prefix = prefix;
+    }
+    config
+}
+
+/// Joins the others: cleans up after dead processes, then makes a node. `role` is shown to those
+/// who find the place taken.
+pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
+    set_log_level(LogLevel::Fatal);
+    let config = configuration();
+    Node::<Shared>::try_cleanup_dead_nodes(&config);
+    let fail = |cause: String| IpcError::Failed {
+        service: arm.to_string(),
+        operation: "joining shared memory",
+        cause,
+    };
+    let label = format!("{role} of {arm}");
+    let name = NodeName::new(&label).map_err(|cause| fail(format!("{cause:?}")))?;
+    NodeBuilder::new()
+        .name(&name)
+        .config(&config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<Shared>()
+        .map_err(|cause| fail(format!("{cause:?}")))
+}
+
+/// What dead processes left behind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Leftovers {
+    /// Processes that live and use our shared memory.
+    pub alive: usize,
+    /// Dead processes whose segments are still there.
+    pub dead: usize,
+}
+
+/// Counts the living and the dead processes in our shared memory, and changes nothing.
+pub fn survey() -> Leftovers {
+    let mut found = Leftovers::default();
+    let config = configuration();
+    // A list that cannot be read counts as empty: there is nothing to clean up then.
+    let _ = Node::<Shared>::list(&config, |state| {
+        match state {
+            NodeState::Alive(_) => found.alive += 1,
+            NodeState::Dead(_) => found.dead += 1,
+            _ => {}
+        }
+        CallbackProgression::Continue
+    });
+    found
+}
+
+/// Removes what dead processes left behind; returns how many were cleaned up and how many could
+/// not be.
+pub fn cleanup() -> (u64, u64) {
+    let result = Node::<Shared>::try_cleanup_dead_nodes(&configuration());
+    (result.cleanups, result.failed_cleanups)
+}
+
+/// The name of a service of `arm`, in iceoryx2's type.
+fn service_name(arm: &Arm, kind: &str) -> Result<(String, ServiceName), IpcError> {
+    let service = arm.service(kind);
+    let name = ServiceName::new(&service).map_err(|cause| IpcError::Failed {
+        service: service.clone(),
+        operation: "naming the service",
+        cause: format!("{cause:?}"),
+    })?;
+    Ok((service, name))
+}
+
+/// Opens or creates the topic `kind` of `arm`: one writer, eight readers, never blocking.
+pub(crate) fn topic<T>(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+) -> Result<publish_subscribe::PortFactory<Shared, T, ()>, IpcError>
+where
+    T: Debug + ZeroCopySend,
+{
+    let (service, name) = service_name(arm, kind)?;
+    let mut builder = node.service_builder(&name).publish_subscribe::<T>();
+    if let Some(line) = Alignment::new(64) {
+        builder = builder.payload_alignment(line);
+    }
+    builder
+        .enable_safe_overflow(true)
+        .history_size(0)
+        .subscriber_max_buffer_size(BUFFER)
+        .subscriber_max_borrowed_samples(2)
+        .max_publishers(1)
+        .max_subscribers(8)
+        .max_nodes(16)
+        .open_or_create()
+        .map_err(|error| topic_error(service, &error))
+}
+
+/// The same as [`topic`] for texts of any length.
+pub(crate) fn text_topic(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+) -> Result<publish_subscribe::PortFactory<Shared, [u8], ()>, IpcError> {
+    let (service, name) = service_name(arm, kind)?;
+    node.service_builder(&name)
+        .publish_subscribe::<[u8]>()
+        .enable_safe_overflow(true)
+        .history_size(0)
+        .subscriber_max_buffer_size(2)
+        .subscriber_max_borrowed_samples(2)
+        .max_publishers(1)
+        .max_subscribers(16)
+        .max_nodes(24)
+        .open_or_create()
+        .map_err(|error| topic_error(service, &error))
+}
+
+/// Opens or creates the handshake `kind` of `arm`: one server, a few clients.
+pub(crate) fn exchange<Q, A>(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+) -> Result<request_response::PortFactory<Shared, Q, (), A, ()>, IpcError>
+where
+    Q: Debug + ZeroCopySend,
+    A: Debug + ZeroCopySend,
+{
+    let (service, name) = service_name(arm, kind)?;
+    node.service_builder(&name)
+        .request_response::<Q, A>()
+        .enable_safe_overflow_for_requests(true)
+        .enable_safe_overflow_for_responses(true)
+        .max_active_requests_per_client(2)
+        .max_response_buffer_size(2)
+        .max_servers(1)
+        .max_clients(8)
+        .max_nodes(16)
+        .open_or_create()
+        .map_err(|error| exchange_error(service, &error))
+}
+
+/// The same as [`exchange`] for texts of any length.
+pub(crate) fn text_exchange(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+) -> Result<request_response::PortFactory<Shared, [u8], (), [u8], ()>, IpcError> {
+    let (service, name) = service_name(arm, kind)?;
+    node.service_builder(&name)
+        .request_response::<[u8], [u8]>()
+        .enable_safe_overflow_for_requests(true)
+        .enable_safe_overflow_for_responses(true)
+        .max_active_requests_per_client(2)
+        .max_response_buffer_size(2)
+        .max_servers(1)
+        .max_clients(16)
+        .max_nodes(24)
+        .open_or_create()
+        .map_err(|error| exchange_error(service, &error))
+}
+
+/// Who lives in a service, apart from ourselves: the names and process numbers.
+pub(crate) fn inhabitants<F>(factory: &F, ourselves: &Node<Shared>) -> String
+where
+    F: PortFactory<Service = Shared>,
+{
+    let mut names = Vec::new();
+    // A list that cannot be read gives an owner without a name.
+    let _ = factory.nodes(|state| {
+        if let NodeState::Alive(view) = state
+            && view.id() != ourselves.id()
+        {
+            let label = view.details().as_ref().map_or_else(String::new, |details| {
+                format!("{} ({})", details.name().as_str(), details.executable())
+            });
+            names.push(format!("{label} process {}", view.id().pid()));
+        }
+        CallbackProgression::Continue
+    });
+    if names.is_empty() {
+        "another process".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
+/// iceoryx2's error in words that say what to do.
+fn topic_error(service: String, error: &PublishSubscribeOpenOrCreateError) -> IpcError {
+    use PublishSubscribeOpenError as Open;
+    match error {
+        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => match open {
+            Open::IncompatibleTypes
+            | Open::IncompatibleMessagingPattern
+            | Open::IncompatibleOverflowBehavior
+            | Open::DoesNotSupportRequestedMinBufferSize => IpcError::Incompatible {
+                service,
+                protocol: PROTOCOL,
+            },
+            Open::ServiceInCorruptedState => IpcError::OtherLibrary { service },
+            Open::InsufficientPermissions => IpcError::Permission {
+                service,
+                operation: "opening the service",
+            },
+            other => IpcError::Failed {
+                service,
+                operation: "opening the service",
+                cause: format!("{other:?}"),
+            },
+        },
+        other => IpcError::Failed {
+            service,
+            operation: "creating the service",
+            cause: format!("{other:?}"),
+        },
+    }
+}
+
+/// iceoryx2's error in words that say what to do.
+fn exchange_error(service: String, error: &RequestResponseOpenOrCreateError) -> IpcError {
+    use RequestResponseOpenError as Open;
+    match error {
+        RequestResponseOpenOrCreateError::RequestResponseOpenError(open) => match open {
+            Open::IncompatibleRequestType
+            | Open::IncompatibleResponseType
+            | Open::IncompatibleMessagingPattern => IpcError::Incompatible {
+                service,
+                protocol: PROTOCOL,
+            },
+            Open::ServiceInCorruptedState => IpcError::OtherLibrary { service },
+            Open::InsufficientPermissions => IpcError::Permission {
+                service,
+                operation: "opening the service",
+            },
+            other => IpcError::Failed {
+                service,
+                operation: "opening the service",
+                cause: format!("{other:?}"),
+            },
+        },
+        other => IpcError::Failed {
+            service,
+            operation: "creating the service",
+            cause: format!("{other:?}"),
+        },
+    }
+}

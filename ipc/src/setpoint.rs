@@ -1,0 +1,191 @@
+//! The setpoint: engine to driver, once in every period.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{MAX_JOINTS, MAX_TOOLS, MessageError, PROTOCOL, ToolAction, ToolCommand};
+
+/// Bits of [`Setpoint::flags`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SetpointFlags;
+
+impl SetpointFlags {
+    /// The setpoint is at rest and will stay there.
+    pub const HOLD: u32 = 1;
+    /// The engine is stopping on the path.
+    pub const STOPPING: u32 = 2;
+    /// The driver shall stop by itself now, within its own limits, and latch.
+    pub const STOP_REQUEST: u32 = 4;
+    /// The engine leaves: the session ends without a fault. Only together with [`Self::HOLD`].
+    pub const GOODBYE: u32 = 8;
+}
+
+/// What the joints shall do at one instant. Sent by the engine once in every period.
+///
+/// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` count, the rest is 0. Times are
+/// nanoseconds of `CLOCK_MONOTONIC`.
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("canter.Setpoint.1")]
+pub struct Setpoint {
+    /// Protocol version.
+    pub protocol: u32,
+    /// Number of joints.
+    pub joints: u32,
+    /// The session that the handshake gave.
+    pub session: u64,
+    /// Grows by one with each setpoint sent in a session, from 1.
+    pub sequence: u64,
+    /// The number of the period since the session began; jumps where periods were skipped.
+    pub tick: u64,
+    /// When it was sent (ns).
+    pub published_ns: u64,
+    /// When the period began in which it was made (ns); the driver runs 0.4 periods later.
+    pub tick_ns: u64,
+    /// Length of a period (ns).
+    pub period_ns: u64,
+    /// A driver that has had no setpoint for this long stops by itself and latches (ns).
+    pub watchdog_ns: u64,
+    /// Sequence of the last state that the engine had seen.
+    pub state_sequence: u64,
+    /// Index of the canonical command under way.
+    pub command: u32,
+    /// Bits of [`SetpointFlags`].
+    pub flags: u32,
+    /// One bit for each joint whose numbers are valid.
+    pub valid: u32,
+    /// For later; 0.
+    pub reserved_word: u32,
+    /// Planned time since the command's start (s).
+    pub path_time: f64,
+    /// Speed along the path as a share of the planned one, 0..=1.
+    pub path_rate: f64,
+    /// Joint positions (rad, m).
+    pub position: [f64; MAX_JOINTS],
+    /// Joint velocities (rad/s, m/s).
+    pub velocity: [f64; MAX_JOINTS],
+    /// Joint accelerations (rad/s², m/s²).
+    pub acceleration: [f64; MAX_JOINTS],
+    /// Joint efforts as feed-forward (N m, N).
+    pub effort: [f64; MAX_JOINTS],
+    /// Orders to gripper and tool changer.
+    pub tools: [ToolCommand; MAX_TOOLS],
+    /// Digital outputs, one bit each.
+    pub digital_outputs: u64,
+    /// For later; 0.
+    pub reserved: [u64; 5],
+}
+
+impl Default for Setpoint {
+    fn default() -> Self {
+        Self {
+            protocol: PROTOCOL,
+            joints: 0,
+            session: 0,
+            sequence: 0,
+            tick: 0,
+            published_ns: 0,
+            tick_ns: 0,
+            period_ns: 0,
+            watchdog_ns: 0,
+            state_sequence: 0,
+            command: 0,
+            flags: 0,
+            valid: 0,
+            reserved_word: 0,
+            path_time: 0.0,
+            path_rate: 0.0,
+            position: [0.0; MAX_JOINTS],
+            velocity: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+            effort: [0.0; MAX_JOINTS],
+            tools: [ToolCommand::default(); MAX_TOOLS],
+            digital_outputs: 0,
+            reserved: [0; 5],
+        }
+    }
+}
+
+impl Setpoint {
+    /// Whether the message makes sense for an arm of `joints` joints: version, count, finite
+    /// numbers, known choices, sane times. Does not allocate.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn check(&self, joints: usize) -> Result<(), MessageError> {
+        check_head(self.protocol, self.joints, joints)?;
+        check_range("period_ns", self.period_ns, 1_000, 1_000_000_000)?;
+        check_range(
+            "watchdog_ns",
+            self.watchdog_ns,
+            self.period_ns,
+            10_000_000_000,
+        )?;
+        check_finite("position", &self.position, joints)?;
+        check_finite("velocity", &self.velocity, joints)?;
+        check_finite("acceleration", &self.acceleration, joints)?;
+        check_finite("effort", &self.effort, joints)?;
+        for tool in &self.tools {
+            if ToolAction::from_number(tool.action).is_none() {
+                return Err(MessageError::Choice {
+                    field: "tool action",
+                    value: tool.action,
+                });
+            }
+            check_finite("tool order", &[tool.position, tool.velocity, tool.force], 3)?;
+        }
+        Ok(())
+    }
+}
+
+/// Version and number of joints.
+pub(crate) fn check_head(protocol: u32, found: u32, joints: usize) -> Result<(), MessageError> {
+    if protocol != PROTOCOL {
+        return Err(MessageError::Protocol {
+            expected: PROTOCOL,
+            found: protocol,
+        });
+    }
+    if found as usize != joints || joints > MAX_JOINTS {
+        return Err(MessageError::Joints {
+            expected: joints as u32,
+            found,
+        });
+    }
+    Ok(())
+}
+
+/// Whether a time or count is within its range.
+pub(crate) fn check_range(
+    field: &'static str,
+    value: u64,
+    least: u64,
+    most: u64,
+) -> Result<(), MessageError> {
+    if value < least || value > most {
+        return Err(MessageError::Range {
+            field,
+            value,
+            least,
+            most,
+        });
+    }
+    Ok(())
+}
+
+/// Whether the first `count` values are finite.
+pub(crate) fn check_finite(
+    quantity: &'static str,
+    values: &[f64],
+    count: usize,
+) -> Result<(), MessageError> {
+    for (joint, value) in values.iter().take(count).enumerate() {
+        if !value.is_finite() {
+            return Err(MessageError::NotFinite {
+                quantity,
+                joint: joint as u32,
+                value: *value,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,91 @@
+//! The tool channel: what the engine asks of a gripper or tool changer, and what comes back.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+/// What a gripper or tool changer shall do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ToolAction {
+    /// Nothing was asked yet.
+    None = 0,
+    /// Open.
+    Open = 1,
+    /// Close.
+    Close = 2,
+}
+
+impl ToolAction {
+    /// The action that a number on the wire stands for.
+    pub const fn from_number(number: u32) -> Option<Self> {
+        match number {
+            0 => Some(Self::None),
+            1 => Some(Self::Open),
+            2 => Some(Self::Close),
+            _ => None,
+        }
+    }
+}
+
+/// How a tool is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ToolStatus {
+    /// There is no such tool, or the driver does not know.
+    Unknown = 0,
+    /// Open, at rest.
+    Open = 1,
+    /// Closed, at rest.
+    Closed = 2,
+    /// On its way.
+    Moving = 3,
+    /// The last order failed.
+    Failed = 4,
+}
+
+impl ToolStatus {
+    /// The status that a number on the wire stands for.
+    pub const fn from_number(number: u32) -> Option<Self> {
+        match number {
+            0 => Some(Self::Unknown),
+            1 => Some(Self::Open),
+            2 => Some(Self::Closed),
+            3 => Some(Self::Moving),
+            4 => Some(Self::Failed),
+            _ => None,
+        }
+    }
+}
+
+/// An order to one tool, repeated in every setpoint. A new `order` number is a new order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("canter.ToolCommand.1")]
+pub struct ToolCommand {
+    /// Number of the order; 0 is none. It grows by one with each order.
+    pub order: u32,
+    /// A [`ToolAction`] by number.
+    pub action: u32,
+    /// Wanted opening (m); not used by open and close.
+    pub position: f64,
+    /// Fastest allowed motion (m/s); 0 is the tool's own.
+    pub velocity: f64,
+    /// Largest allowed force (N); 0 is the tool's own.
+    pub force: f64,
+}
+
+/// How one tool is, repeated in every state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("canter.ToolFeedback.1")]
+pub struct ToolFeedback {
+    /// Number of the last order that was received.
+    pub order: u32,
+    /// A [`ToolStatus`] by number.
+    pub status: u32,
+    /// Opening (m).
+    pub position: f64,
+    /// Force (N).
+    pub force: f64,
+    /// For later; 0.
+    pub reserved: u64,
+}

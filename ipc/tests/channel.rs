@@ -1,0 +1,208 @@
+//! Both ends of every channel, in one process.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use ipc::{
+    Answer, Arm, Client, ClientServer, Clock, DriverLink, EngineLink, Hello, HelloAck, Identity,
+    IpcError, Ownership, Request, Setpoint, State, StatusReader, StatusWriter, Verb, Verdict,
+};
+
+fn arm(name: &str) -> Arm {
+    format!("test-{}/{name}", std::process::id())
+        .parse()
+        .unwrap()
+}
+
+#[test]
+fn setpoints_and_states_pass() {
+    let arm = arm("pass");
+    let engine = EngineLink::open(&arm).unwrap();
+    let driver = DriverLink::open(&arm).unwrap();
+    for sequence in 1..=100 {
+        assert!(engine.send(Setpoint {
+            sequence,
+            joints: 6,
+            ..Setpoint::default()
+        }));
+        assert_eq!(driver.last_setpoint().unwrap().sequence, sequence);
+        assert!(driver.send(State {
+            sequence,
+            joints: 6,
+            ..State::default()
+        }));
+        assert_eq!(engine.last_state().unwrap().sequence, sequence);
+    }
+    assert!(driver.last_setpoint().is_none());
+}
+
+#[test]
+fn a_slow_reader_loses_the_oldest_and_blocks_nobody() {
+    let arm = arm("slow");
+    let engine = EngineLink::open(&arm).unwrap();
+    let driver = DriverLink::open(&arm).unwrap();
+    for sequence in 1..=10_000 {
+        assert!(engine.send(Setpoint {
+            sequence,
+            ..Setpoint::default()
+        }));
+    }
+    let first = driver.next_setpoint().unwrap().sequence;
+    assert!(first > 9_900, "oldest kept is {first}");
+    assert_eq!(driver.last_setpoint().unwrap().sequence, 10_000);
+}
+
+#[test]
+fn a_second_engine_or_driver_is_refused_by_name() {
+    let arm = arm("taken");
+    let engine = EngineLink::open(&arm).unwrap();
+    let driver = DriverLink::open(&arm).unwrap();
+    let error = EngineLink::open(&arm).unwrap_err();
+    assert!(
+        matches!(&error, IpcError::Taken { role: "engine", .. }),
+        "{error}"
+    );
+    assert!(
+        error.to_string().contains(&std::process::id().to_string()),
+        "{error}"
+    );
+    assert!(matches!(
+        DriverLink::open(&arm),
+        Err(IpcError::Taken { role: "driver", .. })
+    ));
+    drop((engine, driver));
+    EngineLink::open(&arm).unwrap();
+}
+
+#[test]
+fn handshake() {
+    let arm = arm("hello");
+    let wait = Duration::from_millis(50);
+    let hello = Hello::new(6, 1_000_000, 50_000_000, Clock::Wall);
+    let engine = EngineLink::open(&arm).unwrap();
+    let alone = engine.greet(&hello, wait).unwrap_err();
+    assert!(
+        matches!(alone, IpcError::NoAnswer { role: "driver", .. }),
+        "{alone}"
+    );
+
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let (arm, done) = (&arm, &done);
+        scope.spawn(move || {
+            let driver = DriverLink::open(arm).unwrap();
+            while !done.load(Ordering::Relaxed) {
+                if let Some(greeting) = driver.greeting() {
+                    let ack = match greeting.hello.check(6) {
+                        Ok(()) => HelloAck {
+                            verdict: Verdict::Welcome as u32,
+                            session: 7,
+                            watchdog_ns: 50_000_000,
+                            ..HelloAck::refusal(6, Verdict::Welcome, "")
+                        },
+                        Err(cause) => {
+                            HelloAck::refusal(6, Verdict::WrongProtocol, &cause.to_string())
+                        }
+                    };
+                    greeting.answer(ack);
+                }
+                thread::sleep(Duration::from_millis(1));
+            }
+        });
+        let ack = engine.greet(&hello, Duration::from_secs(5)).unwrap();
+        assert_eq!(ack.session, 7);
+        let other = Hello {
+            protocol: 99,
+            ..hello
+        };
+        let refusal = engine
+            .greet(&other, Duration::from_secs(5))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refusal.contains("protocol 99 where 1 is spoken"),
+            "{refusal}"
+        );
+        done.store(true, Ordering::Relaxed);
+    });
+}
+
+#[test]
+fn clients_ask_and_everybody_reads_the_status() {
+    let arm = arm("client");
+    let none = Client::open(&arm, "early")
+        .unwrap()
+        .ask(Verb::Status, Duration::from_millis(30));
+    assert!(matches!(
+        none,
+        Err(IpcError::NoAnswer { role: "engine", .. })
+    ));
+
+    let server = ClientServer::open(&arm).unwrap();
+    assert!(matches!(
+        ClientServer::open(&arm),
+        Err(IpcError::Taken { .. })
+    ));
+    let status = StatusWriter::open(&arm).unwrap();
+    let late = StatusReader::open(&arm).unwrap();
+    assert!(late.read().unwrap().is_none());
+    status.write(&serde_json::json!({"ready": true})).unwrap();
+    assert_eq!(late.read().unwrap().unwrap()["ready"], true);
+
+    let program = "Message(\"x\");\n".repeat(20_000);
+    let length = program.len();
+    let submit = Verb::Submit {
+        format: "text".into(),
+        name: "long".into(),
+        program,
+    };
+    let asking = arm.clone();
+    let client = thread::spawn(move || {
+        let client = Client::open(&asking, "test").unwrap();
+        client.ask(submit, Duration::from_secs(5)).unwrap()
+    });
+    let handle = |request: Request| match request.ask {
+        Verb::Submit { program, .. } => Answer::accept(serde_json::json!(program.len())),
+        other => Answer::refuse(format!("{other:?}")),
+    };
+    while !server.serve(handle).unwrap() {
+        thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(
+        client.join().unwrap(),
+        Answer::accept(serde_json::json!(length))
+    );
+}
+
+#[test]
+fn one_client_commands_at_a_time() {
+    let here = Identity {
+        name: "first".into(),
+        process: std::process::id(),
+    };
+    let there = Identity {
+        name: "second".into(),
+        process: 1,
+    };
+    let gone = Identity {
+        name: "gone".into(),
+        process: u32::MAX,
+    };
+    let ask = |client: &Identity, ask: Verb| Request {
+        client: client.clone(),
+        ask,
+    };
+    let mut ownership = Ownership::default();
+    ownership.admit(&ask(&here, Verb::Resume), false).unwrap();
+    let refusal = ownership
+        .admit(&ask(&there, Verb::Resume), true)
+        .unwrap_err();
+    assert!(refusal.message.contains("first"), "{}", refusal.message);
+    ownership
+        .admit(&ask(&there, Verb::Stop { fast: true }), true)
+        .unwrap();
+    ownership.admit(&ask(&there, Verb::Resume), false).unwrap();
+    ownership.admit(&ask(&gone, Verb::Resume), false).unwrap();
+    ownership.admit(&ask(&here, Verb::Resume), true).unwrap();
+}

@@ -1,0 +1,74 @@
+//! The byte layout of the messages is a promise to drivers in other languages.
+
+use core::mem::{align_of, offset_of, size_of};
+
+use ipc::{Hello, HelloAck, Setpoint, State, ToolCommand, ToolFeedback};
+
+#[test]
+fn setpoint() {
+    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (736, 8));
+    let offsets = [
+        (offset_of!(Setpoint, protocol), 0),
+        (offset_of!(Setpoint, joints), 4),
+        (offset_of!(Setpoint, session), 8),
+        (offset_of!(Setpoint, sequence), 16),
+        (offset_of!(Setpoint, tick), 24),
+        (offset_of!(Setpoint, published_ns), 32),
+        (offset_of!(Setpoint, tick_ns), 40),
+        (offset_of!(Setpoint, period_ns), 48),
+        (offset_of!(Setpoint, watchdog_ns), 56),
+        (offset_of!(Setpoint, state_sequence), 64),
+        (offset_of!(Setpoint, command), 72),
+        (offset_of!(Setpoint, flags), 76),
+        (offset_of!(Setpoint, valid), 80),
+        (offset_of!(Setpoint, path_time), 88),
+        (offset_of!(Setpoint, path_rate), 96),
+        (offset_of!(Setpoint, position), 104),
+        (offset_of!(Setpoint, velocity), 232),
+        (offset_of!(Setpoint, acceleration), 360),
+        (offset_of!(Setpoint, effort), 488),
+        (offset_of!(Setpoint, tools), 616),
+        (offset_of!(Setpoint, digital_outputs), 680),
+    ];
+    for (found, promised) in offsets {
+        assert_eq!(found, promised);
+    }
+}
+
+#[test]
+fn state() {
+    assert_eq!((size_of::<State>(), align_of::<State>()), (608, 8));
+    let offsets = [
+        (offset_of!(State, session), 8),
+        (offset_of!(State, sequence), 16),
+        (offset_of!(State, measured_ns), 24),
+        (offset_of!(State, published_ns), 32),
+        (offset_of!(State, setpoint_sequence), 40),
+        (offset_of!(State, setpoint_published_ns), 48),
+        (offset_of!(State, setpoint_received_ns), 56),
+        (offset_of!(State, driver_state), 64),
+        (offset_of!(State, fault), 68),
+        (offset_of!(State, fault_joint), 72),
+        (offset_of!(State, missed), 80),
+        (offset_of!(State, position), 88),
+        (offset_of!(State, velocity), 216),
+        (offset_of!(State, effort), 344),
+        (offset_of!(State, tools), 472),
+        (offset_of!(State, digital_inputs), 536),
+        (offset_of!(State, hardware_ns), 544),
+    ];
+    for (found, promised) in offsets {
+        assert_eq!(found, promised);
+    }
+}
+
+#[test]
+fn handshake_and_tools() {
+    assert_eq!(size_of::<ToolCommand>(), 32);
+    assert_eq!(size_of::<ToolFeedback>(), 32);
+    assert_eq!(size_of::<Hello>(), 144);
+    assert_eq!(size_of::<HelloAck>(), 768);
+    assert_eq!(offset_of!(HelloAck, session), 24);
+    assert_eq!(offset_of!(HelloAck, position), 40);
+    assert_eq!(offset_of!(HelloAck, name), 552);
+}
