@@ -15,7 +15,13 @@ use crate::world::{Class, Model};
 #[must_use]
 pub fn check(plan: &Plan, world: Option<&Model>) -> Vec<Finding> {
     let scope = Scope::new(plan);
-    let mut checker = Checker { plan, scope: &scope, world, findings: Vec::new(), folded: BTreeSet::new() };
+    let mut checker = Checker {
+        plan,
+        scope: &scope,
+        world,
+        findings: Vec::new(),
+        folded: BTreeSet::new(),
+    };
     checker.declarations();
     checker.frame();
     checker.list(&plan.todo);
@@ -35,15 +41,18 @@ pub(super) struct Checker<'a> {
 
 impl Checker<'_> {
     pub(super) fn error(&mut self, code: &'static str, message: String, span: Span) {
-        self.findings.push(Finding::error(code, message, span.range()));
+        self.findings
+            .push(Finding::error(code, message, span.range()));
     }
 
     pub(super) fn warning(&mut self, code: &'static str, message: String, span: Span) {
-        self.findings.push(Finding::warning(code, message, span.range()));
+        self.findings
+            .push(Finding::warning(code, message, span.range()));
     }
 
     pub(super) fn note(&mut self, code: &'static str, message: String, help: &str, span: Span) {
-        self.findings.push(Finding::note(code, message, span.range()).help(help));
+        self.findings
+            .push(Finding::note(code, message, span.range()).help(help));
     }
 
     /// Role and type of a declared name; a name that differs in capitals is warned of once.
@@ -134,7 +143,9 @@ impl Checker<'_> {
         if let Some(sku) = &variable.sku {
             self.check_sku(sku, variable.span);
         }
-        let Some(name) = &variable.requirement else { return };
+        let Some(name) = &variable.requirement else {
+            return;
+        };
         let Some(requirement) = self.plan.requirements.iter().find(|r| r.name == *name) else {
             let message = format!("no requirement is called {name}");
             return self.error("plan::unknown_name", message, variable.span);
@@ -161,7 +172,11 @@ impl Checker<'_> {
         {
             self.error("plan::stop", "a plan ends with Stop".into(), last.span);
         }
-        let starts = self.plan.statements().into_iter().filter(|s| s.action == (Action::Start {}));
+        let starts = self
+            .plan
+            .statements()
+            .into_iter()
+            .filter(|s| s.action == (Action::Start {}));
         let late: Vec<Span> = starts.skip(1).map(|s| s.span).collect();
         for span in late {
             self.error("plan::start", "a plan starts only once".into(), span);
@@ -231,15 +246,25 @@ impl Checker<'_> {
     fn simple(&mut self, action: &Action, span: Span) {
         let object = Type::Object(Class::SolidObject);
         match action {
-            Action::Bind { variable, location, .. } => self.bind(variable, *location),
+            Action::Bind {
+                variable, location, ..
+            } => self.bind(variable, *location),
             Action::Set { target, value } => self.set(target, value),
-            Action::SetPose { variable, reference, pose } => {
+            Action::SetPose {
+                variable,
+                reference,
+                pose,
+            } => {
                 self.target(variable, Some(Type::Pose));
                 self.expect(reference, object, None);
                 self.expect(pose, Type::Pose, None);
                 self.lint_box(pose);
             }
-            Action::CreateInstance { variable, object: part, property } => {
+            Action::CreateInstance {
+                variable,
+                object: part,
+                property,
+            } => {
                 self.create(variable, part, property, span);
             }
             Action::DestroyInstance { variable }
@@ -248,7 +273,11 @@ impl Checker<'_> {
             Action::FactotumRefill { variable } => {
                 self.target(variable, Some(object));
                 let name = self.scope.declared(&variable.text);
-                let declared = self.plan.variables.iter().find(|v| Some(v.name.as_str()) == name);
+                let declared = self
+                    .plan
+                    .variables
+                    .iter()
+                    .find(|v| Some(v.name.as_str()) == name);
                 if declared.is_some_and(|v| v.requirement.is_none()) {
                     let message = format!("{} has no requirement to refill", variable.text);
                     self.error("plan::requirement", message, variable.span);
@@ -272,8 +301,15 @@ impl Checker<'_> {
 
     fn check_effector(&mut self, id: &str, span: Span) {
         let Some(world) = self.world else { return };
-        if !world.named(id).is_some_and(|object| object.class.is_a(Class::EndEffector)) {
-            self.error("plan::world", format!("the world has no end effector {id}"), span);
+        if !world
+            .named(id)
+            .is_some_and(|object| object.class.is_a(Class::EndEffector))
+        {
+            self.error(
+                "plan::world",
+                format!("the world has no end effector {id}"),
+                span,
+            );
         }
     }
 
@@ -296,7 +332,11 @@ impl Checker<'_> {
 
     fn bind(&mut self, variable: &Name, location: Keyword) {
         self.target(variable, Some(Type::Object(Class::SolidObject)));
-        let name = self.scope.declared(&variable.text).unwrap_or_default().to_owned();
+        let name = self
+            .scope
+            .declared(&variable.text)
+            .unwrap_or_default()
+            .to_owned();
         let declared = self.plan.variables.iter().find(|v| v.name == name);
         let Some(declared) = declared else { return };
         let requirement = declared.requirement.as_ref();
@@ -320,9 +360,14 @@ impl Checker<'_> {
         let found = self.infer(value, None);
         let wanted = match &target.term {
             Term::Name(name) => {
-                let name = Name { text: name.clone(), span: target.span };
+                let name = Name {
+                    text: name.clone(),
+                    span: target.span,
+                };
                 self.target(&name, None);
-                self.scope.lookup(&name.text).map_or(Type::Unknown, |(_, kind)| kind)
+                self.scope
+                    .lookup(&name.text)
+                    .map_or(Type::Unknown, |(_, kind)| kind)
             }
             Term::Property(..) => self.infer(target, None),
             _ => {
@@ -338,7 +383,9 @@ impl Checker<'_> {
 
     fn create(&mut self, variable: &Name, part: &Expression, property: &str, span: Span) {
         self.target(variable, Some(Type::Object(Class::SolidObject)));
-        let Some((_, Type::Object(class))) = self.scope.lookup(&variable.text) else { return };
+        let Some((_, Type::Object(class))) = self.scope.lookup(&variable.text) else {
+            return;
+        };
         match crate::world::class::derived_property(class, property) {
             Some((component, _)) => self.expect(part, Type::Object(component), None),
             None => {
@@ -350,12 +397,18 @@ impl Checker<'_> {
 
     /// The place of a box is its bottom, also when there is something in it.
     fn lint_box(&mut self, pose: &Expression) {
-        let Term::Property(object, property) = &pose.term else { return };
+        let Term::Property(object, property) = &pose.term else {
+            return;
+        };
         if property != "hasSolidObject_PhysicalLocation" {
             return;
         }
-        let Term::Name(name) = &object.term else { return };
-        if self.scope.lookup(name).map(|(_, kind)| kind) == Some(Type::Object(Class::LargeContainer)) {
+        let Term::Name(name) = &object.term else {
+            return;
+        };
+        if self.scope.lookup(name).map(|(_, kind)| kind)
+            == Some(Type::Object(Class::LargeContainer))
+        {
             let message = format!("the pose of {name} ignores what is in it");
             let help = "GetFreePose(container, object) is the lowest free place";
             self.note("plan::box_pose", message, help, pose.span);
@@ -373,7 +426,10 @@ impl Checker<'_> {
                 let message = format!("the index {} is used twice", triple.index);
                 self.error("plan::precondition", message, triple.statement.span);
             }
-            if matches!(triple.statement.action, Action::ElseIf { .. } | Action::Else { .. }) {
+            if matches!(
+                triple.statement.action,
+                Action::ElseIf { .. } | Action::Else { .. }
+            ) {
                 let message = "an entry cannot be an ElseIf or Else".to_owned();
                 self.error("plan::else", message, triple.statement.span);
             } else {
@@ -381,7 +437,11 @@ impl Checker<'_> {
             }
         }
         for triple in triples {
-            for before in triple.before.iter().filter(|before| !known.contains(before)) {
+            for before in triple
+                .before
+                .iter()
+                .filter(|before| !known.contains(before))
+            {
                 let message = format!("there is no entry {before}");
                 self.error("plan::precondition", message, triple.statement.span);
             }
@@ -390,7 +450,9 @@ impl Checker<'_> {
         loop {
             let ready = |t: &&Triple| {
                 !done.contains(&t.index)
-                    && t.before.iter().all(|b| done.contains(b) || !known.contains(b))
+                    && t.before
+                        .iter()
+                        .all(|b| done.contains(b) || !known.contains(b))
             };
             let next: Vec<u32> = triples.iter().filter(ready).map(|t| t.index).collect();
             if next.is_empty() {
@@ -406,7 +468,9 @@ impl Checker<'_> {
 
     /// What must be in the workstation is in it.
     fn against_world(&mut self) {
-        let (Some(world), plan) = (self.world, self.plan) else { return };
+        let (Some(world), plan) = (self.world, self.plan) else {
+            return;
+        };
         let about = |name: &str| plan.about.iter().find(|field| field.name == name);
         if let (Some(field), Ok(workstation)) = (about("PlanWorkstation"), world.workstation())
             && field.value != workstation.name
@@ -424,7 +488,10 @@ impl Checker<'_> {
             let place = requirement.location.unwrap_or(Keyword::Workstation);
             let skus = requirement.sku.iter().chain(&requirement.contents_type);
             skus.for_each(|sku| self.check_sku(sku, requirement.span));
-            if !world.objects().any(|object| matches(world, plan, requirement, object, place)) {
+            if !world
+                .objects()
+                .any(|object| matches(world, plan, requirement, object, place))
+            {
                 let message = format!("the world has nothing that meets {}", requirement.name);
                 self.error("plan::world", message, requirement.span);
             }

@@ -73,12 +73,18 @@ impl Effects {
                     _ => self.read(target, scope),
                 }
             }
-            Action::SetPose { variable, reference, pose } => {
+            Action::SetPose {
+                variable,
+                reference,
+                pose,
+            } => {
                 self.read(reference, scope);
                 self.read(pose, scope);
                 self.write(&variable.text, scope);
             }
-            Action::CreateInstance { variable, object, .. } => {
+            Action::CreateInstance {
+                variable, object, ..
+            } => {
                 self.read(object, scope);
                 self.write(&variable.text, scope);
             }
@@ -112,7 +118,8 @@ impl Effects {
             Action::LoopInGivenOrderWhile { test, body }
             | Action::LoopInAnyOrderWhile { test, body } => {
                 self.read(test, scope);
-                body.iter().for_each(|statement| self.add_perhaps(statement, scope));
+                body.iter()
+                    .for_each(|statement| self.add_perhaps(statement, scope));
             }
             Action::DoOne(list) => list.iter().for_each(|s| self.add_perhaps(s, scope)),
             Action::DoInAnyOrder(_) | Action::DoInPreconditionOrder(_) => {
@@ -134,9 +141,11 @@ impl Effects {
     /// Whether the order of two statements matters for the variables: one may write what the other
     /// reads before writing it itself.
     #[must_use]
-    pub fn conflicts_with(&self, other: &Self) -> Option<&str> {
+    pub fn conflicts_with<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
         let clash = self.writes.intersection(&other.reads).next();
-        clash.or_else(|| other.writes.intersection(&self.reads).next()).map(String::as_str)
+        clash
+            .or_else(|| other.writes.intersection(&self.reads).next())
+            .map(String::as_str)
     }
 }
 
@@ -145,7 +154,10 @@ impl Effects {
 pub fn steps(list: &[Statement]) -> Vec<std::ops::Range<usize>> {
     let mut steps: Vec<std::ops::Range<usize>> = Vec::new();
     for (index, statement) in list.iter().enumerate() {
-        let follows = matches!(statement.action, Action::ElseIf { .. } | Action::Else { .. });
+        let follows = matches!(
+            statement.action,
+            Action::ElseIf { .. } | Action::Else { .. }
+        );
         match steps.last_mut() {
             Some(last) if follows => last.end = index + 1,
             _ => steps.push(index..index + 1),
@@ -162,7 +174,9 @@ pub fn conflicts(list: &[Statement], scope: &Scope) -> Vec<(usize, usize, String
         .into_iter()
         .map(|range| {
             let mut effects = Effects::default();
-            list[range].iter().for_each(|statement| effects.add(statement, scope));
+            list[range]
+                .iter()
+                .for_each(|statement| effects.add(statement, scope));
             effects
         })
         .collect();

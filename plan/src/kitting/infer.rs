@@ -20,7 +20,10 @@ pub(crate) const FUNCTIONS: [(&str, usize); 8] = [
 
 /// Properties of poses, points, units and designs: name and type.
 pub(crate) const DATA_PROPERTIES: [(&str, Type); 24] = [
-    ("hasPhysicalLocation_RefObject", Type::Object(Class::SolidObject)),
+    (
+        "hasPhysicalLocation_RefObject",
+        Type::Object(Class::SolidObject),
+    ),
     ("hasPose_Point", Type::Data),
     ("hasPose_Rpy", Type::Data),
     ("hasPoint_X", NUMBER),
@@ -52,7 +55,11 @@ pub(crate) fn property_type(class: Class, property: &str) -> Option<Type> {
         return Some(Type::Pose);
     }
     if let Some((value, many)) = derived_property(class, property) {
-        return Some(if many { Type::List(value) } else { Type::Object(value) });
+        return Some(if many {
+            Type::List(value)
+        } else {
+            Type::Object(value)
+        });
     }
     if let Some(kind) = stored_property(class, property) {
         return Some(match kind {
@@ -70,7 +77,10 @@ impl Checker<'_> {
     /// Type of an expression; `subject` is the class of the implied subject of a condition.
     pub(super) fn infer(&mut self, expression: &Expression, subject: Option<Class>) -> Type {
         match &expression.term {
-            Term::Number(number) => Type::Number { whole: number.fract() == 0.0, least: None },
+            Term::Number(number) => Type::Number {
+                whole: number.fract() == 0.0,
+                least: None,
+            },
             Term::Text(_) => Type::Text,
             Term::Null => Type::Null,
             Term::Truth(_) => Type::Truth,
@@ -83,14 +93,24 @@ impl Checker<'_> {
                 Type::Unknown
             }
             Term::Name(name) => self.infer_name(name, expression, subject),
-            Term::Property(object, property) => self.infer_property(object, property, expression, subject),
-            Term::Call(function, arguments) => self.infer_call(function, arguments, expression, subject),
+            Term::Property(object, property) => {
+                self.infer_property(object, property, expression, subject)
+            }
+            Term::Call(function, arguments) => {
+                self.infer_call(function, arguments, expression, subject)
+            }
             Term::Unary(operator, operand) => {
-                let wanted = if *operator == Operator::Not { Type::Truth } else { NUMBER };
+                let wanted = if *operator == Operator::Not {
+                    Type::Truth
+                } else {
+                    NUMBER
+                };
                 self.expect(operand, wanted, subject);
                 wanted
             }
-            Term::Binary(operator, left, right) => self.infer_binary(*operator, left, right, subject),
+            Term::Binary(operator, left, right) => {
+                self.infer_binary(*operator, left, right, subject)
+            }
         }
     }
 
@@ -120,9 +140,10 @@ impl Checker<'_> {
             Type::Object(class) => property_type(class, property)
                 // A variable of a general class may hold an object of a special one.
                 .or_else(|| below(class).find_map(|class| property_type(class, property))),
-            Type::Pose | Type::Data => {
-                DATA_PROPERTIES.iter().find(|(known, _)| *known == property).map(|(_, kind)| *kind)
-            }
+            Type::Pose | Type::Data => DATA_PROPERTIES
+                .iter()
+                .find(|(known, _)| *known == property)
+                .map(|(_, kind)| *kind),
             Type::Unknown => return Type::Unknown,
             _ => None,
         };
@@ -141,11 +162,18 @@ impl Checker<'_> {
         subject: Option<Class>,
     ) -> Type {
         let Some((_, count)) = FUNCTIONS.iter().find(|(known, _)| *known == function) else {
-            self.error("plan::unknown_function", format!("unknown function {function}"), at.span);
+            self.error(
+                "plan::unknown_function",
+                format!("unknown function {function}"),
+                at.span,
+            );
             return Type::Unknown;
         };
         if arguments.len() != *count {
-            let message = format!("{function} takes {count} argument(s), found {}", arguments.len());
+            let message = format!(
+                "{function} takes {count} argument(s), found {}",
+                arguments.len()
+            );
             self.error("plan::arguments", message, at.span);
             return Type::Unknown;
         }
@@ -154,7 +182,10 @@ impl Checker<'_> {
                 self.expect(container, Type::Object(Class::SolidObject), subject);
                 self.sku_argument(sku);
                 self.expect(levels, NUMBER, subject);
-                Type::Number { whole: true, least: Some(0) }
+                Type::Number {
+                    whole: true,
+                    least: Some(0),
+                }
             }
             ("GetTop" | "GetFirst", [list]) => match self.infer(list, subject) {
                 Type::List(class) => Type::Object(class),
@@ -183,7 +214,9 @@ impl Checker<'_> {
                 Type::Pose
             }
             (_, numbers) => {
-                numbers.iter().for_each(|number| self.expect(number, NUMBER, subject));
+                numbers
+                    .iter()
+                    .for_each(|number| self.expect(number, NUMBER, subject));
                 Type::Data
             }
         }
@@ -255,14 +288,17 @@ impl Checker<'_> {
         match (one, other) {
             (Type::Object(_), Type::Text) | (Type::Text, Type::Object(_)) => {
                 let message = "an object is compared with a text; its id is meant";
-                self.warning("plan::object_and_text", message.into(), left.span.to(right.span));
+                self.warning(
+                    "plan::object_and_text",
+                    message.into(),
+                    left.span.to(right.span),
+                );
             }
             (one, other) if one.accepts(other) || other.accepts(one) => {
                 self.lint_capacity(left, right);
             }
             (one, other) => {
-                let message =
-                    format!("{} is never equal to {}", one.describe(), other.describe());
+                let message = format!("{} is never equal to {}", one.describe(), other.describe());
                 self.error("plan::type", message, left.span.to(right.span));
             }
         }
@@ -282,5 +318,8 @@ impl Checker<'_> {
 }
 
 fn below(class: Class) -> impl Iterator<Item = Class> {
-    crate::world::class::CLASSES.into_iter().map(|(c, _)| c).filter(move |c| c.is_a(class))
+    crate::world::class::CLASSES
+        .into_iter()
+        .map(|(c, _)| c)
+        .filter(move |c| c.is_a(class))
 }

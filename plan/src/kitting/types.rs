@@ -34,7 +34,10 @@ pub enum Type {
 }
 
 /// Any number.
-pub(crate) const NUMBER: Type = Type::Number { whole: false, least: None };
+pub(crate) const NUMBER: Type = Type::Number {
+    whole: false,
+    least: None,
+};
 
 impl Type {
     /// The type of this name.
@@ -63,9 +66,7 @@ impl Type {
             (_, Self::Unknown) | (Self::Unknown, _) => true,
             (Self::Object(_) | Self::Pose | Self::Data | Self::Text, Self::Null) => true,
             (Self::Number { .. }, Self::Number { .. }) => true,
-            (Self::Object(wanted), Self::Object(given)) => {
-                given.is_a(wanted) || wanted.is_a(given)
-            }
+            (Self::Object(wanted), Self::Object(given)) => given.is_a(wanted) || wanted.is_a(given),
             (wanted, given) => wanted == given,
         }
     }
@@ -74,7 +75,9 @@ impl Type {
     #[must_use]
     pub fn describe(self) -> String {
         match self {
-            Self::Number { least: Some(least), .. } => format!("a whole number from {least} on"),
+            Self::Number {
+                least: Some(least), ..
+            } => format!("a whole number from {least} on"),
             Self::Number { whole: true, .. } => "a whole number".into(),
             Self::Number { .. } => "a number".into(),
             Self::Truth => "true or false".into(),
@@ -110,12 +113,21 @@ impl Scope {
     #[must_use]
     pub fn new(plan: &Plan) -> Self {
         let mut scope = Self::default();
-        let parameters = plan.parameters.iter().map(|p| (Role::Parameter, &p.name, &p.class));
-        let variables = plan.variables.iter().map(|v| (Role::Variable, &v.name, &v.class));
+        let parameters = plan
+            .parameters
+            .iter()
+            .map(|p| (Role::Parameter, &p.name, &p.class));
+        let variables = plan
+            .variables
+            .iter()
+            .map(|v| (Role::Variable, &v.name, &v.class));
         for (role, name, class) in parameters.chain(variables) {
             let kind = Type::from_name(class).unwrap_or(Type::Unknown);
             scope.names.entry(name.clone()).or_insert((role, kind));
-            scope.folded.entry(name.to_lowercase()).or_insert_with(|| name.clone());
+            scope
+                .folded
+                .entry(name.to_lowercase())
+                .or_insert_with(|| name.clone());
         }
         scope
     }
@@ -123,14 +135,19 @@ impl Scope {
     /// The declared name that `name` means: the same, or the same but for capitals.
     #[must_use]
     pub fn declared(&self, name: &str) -> Option<&str> {
-        let exact = self.names.get_key_value(name).map(|(known, _)| known.as_str());
+        let exact = self
+            .names
+            .get_key_value(name)
+            .map(|(known, _)| known.as_str());
         exact.or_else(|| self.folded.get(&name.to_lowercase()).map(String::as_str))
     }
 
     /// Role and type of a name.
     #[must_use]
     pub fn lookup(&self, name: &str) -> Option<(Role, Type)> {
-        self.declared(name).and_then(|name| self.names.get(name)).copied()
+        self.declared(name)
+            .and_then(|name| self.names.get(name))
+            .copied()
     }
 
     /// All declared names.

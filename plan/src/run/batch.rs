@@ -42,12 +42,15 @@ impl Batch {
 
     /// Adds a straight move of the controlled point to a pose (m) in the frame of the workstation.
     pub fn straight(&mut self, pose: &Isometry3<f64>) {
-        self.push(Command::MoveStraightTo { pose: canonical(pose) });
+        self.push(Command::MoveStraightTo {
+            pose: canonical(pose),
+        });
     }
 
     /// The tool changed with the last command.
     pub fn tool(&mut self, tool: Option<Tool>) {
-        self.tools.push((self.commands.len().saturating_sub(1), tool));
+        self.tools
+            .push((self.commands.len().saturating_sub(1), tool));
     }
 }
 

@@ -16,8 +16,8 @@ use super::robot::{Robot, RobotOptions, situation};
 use super::value::Value;
 use crate::PlanError;
 use crate::finding::{Severity, has_errors};
-use crate::kitting::{Reading, check, read};
 use crate::kitting::types::Type;
+use crate::kitting::{Reading, check, read};
 use crate::world::{Change, Model, Reader, StoredRun, Writer};
 
 /// What to do when a motion or an errand fails.
@@ -46,7 +46,11 @@ pub struct RunOptions {
 
 impl Default for RunOptions {
     fn default() -> Self {
-        Self { robot: RobotOptions::default(), policy: Policy::Stop, choose_order: true }
+        Self {
+            robot: RobotOptions::default(),
+            policy: Policy::Stop,
+            choose_order: true,
+        }
     }
 }
 
@@ -130,11 +134,17 @@ pub fn prepare(source: &str, model: &Model) -> Result<(Program, Vec<String>), Pl
     if !has_errors(&findings) {
         findings.extend(check(&plan, Some(model)));
     }
-    let errors: Vec<_> = findings.iter().filter(|f| f.severity == Severity::Error).collect();
+    let errors: Vec<_> = findings
+        .iter()
+        .filter(|f| f.severity == Severity::Error)
+        .collect();
     if let Some(first) = errors.first() {
         let (line, column) = first.position(source);
         let first = format!("{} (line {line}, column {column})", first.message);
-        return Err(PlanError::Invalid { count: errors.len(), first });
+        return Err(PlanError::Invalid {
+            count: errors.len(),
+            first,
+        });
     }
     let warnings = findings.iter().filter(|f| f.severity == Severity::Warning);
     let warnings = warnings.map(|f| f.message.clone()).collect();
@@ -149,11 +159,16 @@ pub fn parameters(
     program: &Program,
     given: &BTreeMap<String, String>,
 ) -> Result<BTreeMap<String, Value>, PlanError> {
-    let fail = |name: &str, why: String| PlanError::Parameter { name: name.to_owned(), why };
+    let fail = |name: &str, why: String| PlanError::Parameter {
+        name: name.to_owned(),
+        why,
+    };
     let mut values = BTreeMap::new();
     for parameter in &program.plan.parameters {
         let name = &parameter.name;
-        let text = given.get(name).ok_or_else(|| fail(name, "it has no value".into()))?;
+        let text = given
+            .get(name)
+            .ok_or_else(|| fail(name, "it has no value".into()))?;
         let kind = Type::from_name(&parameter.class).unwrap_or(Type::Text);
         let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
         let value = match (kind, number) {
@@ -165,7 +180,12 @@ pub fn parameters(
             }
             (Type::Truth, _) if text == "true" || text == "false" => Value::Truth(text == "true"),
             (Type::Text, _) => Value::Text(text.clone()),
-            _ => return Err(fail(name, format!("expected {}, got {text}", kind.describe()))),
+            _ => {
+                return Err(fail(
+                    name,
+                    format!("expected {}, got {text}", kind.describe()),
+                ));
+            }
         };
         values.insert(name.clone(), value);
     }
@@ -200,7 +220,11 @@ impl<'a> Controller<'a> {
             model.apply_all(&changes)?;
         }
         situation(&model)?;
-        let machine = Machine { program: &program, model: &model, options: &options.robot };
+        let machine = Machine {
+            program: &program,
+            model: &model,
+            options: &options.robot,
+        };
         let state = machine.start(&values)?;
         let run = cell.writer.begin_run(&StoredRun {
             id: 0,
@@ -212,10 +236,28 @@ impl<'a> Controller<'a> {
             outcome: None,
             under_way: None,
         })?;
-        let Cell { writer, reader, motion, factotum } = cell;
+        let Cell {
+            writer,
+            reader,
+            motion,
+            factotum,
+        } = cell;
         let source = source.to_owned();
         let resumed = false;
-        Ok(Self { writer, reader, motion, factotum, options, program, source, model, state, run, resumed, warnings })
+        Ok(Self {
+            writer,
+            reader,
+            motion,
+            factotum,
+            options,
+            program,
+            source,
+            model,
+            state,
+            run,
+            resumed,
+            warnings,
+        })
     }
 
     /// Prepares to go on with the last run of the database, after it was killed.
@@ -226,16 +268,36 @@ impl<'a> Controller<'a> {
         let missing = || PlanError::Resume("the database knows no run".into());
         let stored = cell.writer.last_run()?.ok_or_else(missing)?;
         if let Some(outcome) = &stored.outcome {
-            return Err(PlanError::Resume(format!("the last run has ended: {outcome}")));
+            return Err(PlanError::Resume(format!(
+                "the last run has ended: {outcome}"
+            )));
         }
         let model = cell.reader.model()?;
         let program = Program::new(read(&stored.source).plan);
         let state: State = serde_json::from_str(&stored.state)
             .map_err(|error| PlanError::Resume(error.to_string()))?;
-        let Cell { writer, reader, motion, factotum } = cell;
+        let Cell {
+            writer,
+            reader,
+            motion,
+            factotum,
+        } = cell;
         let (run, source, warnings) = (stored.id, stored.source, Vec::new());
         let resumed = true;
-        Ok(Self { writer, reader, motion, factotum, options, program, source, model, state, run, resumed, warnings })
+        Ok(Self {
+            writer,
+            reader,
+            motion,
+            factotum,
+            options,
+            program,
+            source,
+            model,
+            state,
+            run,
+            resumed,
+            warnings,
+        })
     }
 
     /// The state of the plan.
@@ -286,8 +348,12 @@ impl<'a> Controller<'a> {
     fn open(&mut self) -> Result<(), String> {
         let mut batch = Batch::default();
         batch.push(Command::InitCanon);
-        batch.push(Command::SetLengthUnits { unit: crcl::LengthUnit::Meter });
-        batch.push(Command::SetAngleUnits { unit: crcl::AngleUnit::Radian });
+        batch.push(Command::SetLengthUnits {
+            unit: crcl::LengthUnit::Meter,
+        });
+        batch.push(Command::SetAngleUnits {
+            unit: crcl::AngleUnit::Radian,
+        });
         if let Some(percent) = self.options.robot.percent {
             batch.push(Command::SetRelativeSpeed { percent });
             batch.push(Command::SetRelativeAcceleration { percent });
@@ -296,12 +362,19 @@ impl<'a> Controller<'a> {
             batch.push(Command::OpenGripper);
         }
         self.move_only(&batch)?;
-        if self.resumed { self.bring_back() } else { Ok(()) }
+        if self.resumed {
+            self.bring_back()
+        } else {
+            Ok(())
+        }
     }
 
     fn move_only(&mut self, batch: &Batch) -> Result<(), String> {
         let start = situation(&self.model).map_err(|error| error.to_string())?;
-        let seconds = self.motion.execute(&start, batch).map_err(|failure| failure.to_string())?;
+        let seconds = self
+            .motion
+            .execute(&start, batch)
+            .map_err(|failure| failure.to_string())?;
         self.state.counters.motion_s += seconds;
         Ok(())
     }
@@ -310,16 +383,25 @@ impl<'a> Controller<'a> {
     /// is left alone: a step that was under way is executed again from its beginning, and all steps
     /// come to the same end when some of their motion has been made before.
     fn bring_back(&mut self) -> Result<(), String> {
-        let Some(arm) = self.motion.arm() else { return Ok(()) };
+        let Some(arm) = self.motion.arm() else {
+            return Ok(());
+        };
         let text = |error: PlanError| error.to_string();
         let wanted = situation(&self.model).map_err(text)?;
-        let from_tip = wanted.tool.as_ref().map(|tool| tool.arm_from_tip()).unwrap_or_default();
+        let from_tip = wanted
+            .tool
+            .as_ref()
+            .map(|tool| tool.arm_from_tip())
+            .unwrap_or_default();
         let (here, there) = (arm * from_tip, wanted.arm * from_tip);
         let difference = here.inv_mul(&there);
         if difference.translation.vector.norm() < 1e-3 && difference.rotation.angle() < 1e-2 {
             return Ok(());
         }
-        let robot = Robot { model: &self.model, options: &self.options.robot };
+        let robot = Robot {
+            model: &self.model,
+            options: &self.options.robot,
+        };
         let height = robot.travel_height().map_err(text)?;
         let raised = |pose: &nalgebra::Isometry3<f64>| {
             let mut raised = *pose;
@@ -345,7 +427,14 @@ impl<'a> Controller<'a> {
                 return self.end(Outcome::Failed { code: 2, reason });
             }
         };
-        let Step { name, span, act, mut changes, mut state, warning } = step;
+        let Step {
+            name,
+            span,
+            act,
+            mut changes,
+            mut state,
+            warning,
+        } = step;
         let line = crate::finding::position(&self.source, span.start).0;
         let mut seconds = 0.0;
         match act {
@@ -366,7 +455,8 @@ impl<'a> Controller<'a> {
                 }
                 state.counters.motion_s += seconds;
                 for (_, tool) in &batch.tools {
-                    tool.iter().for_each(|tool| observer(&Event::EndEffector(tool.name.clone())));
+                    tool.iter()
+                        .for_each(|tool| observer(&Event::EndEffector(tool.name.clone())));
                 }
                 changes.extend(batch.changes);
             }
@@ -386,7 +476,12 @@ impl<'a> Controller<'a> {
         let kits = self.state.counters.kits;
         self.commit(&changes, state)?;
         let number = self.state.counters.statements;
-        observer(&Event::Statement { name, line, number, seconds });
+        observer(&Event::Statement {
+            name,
+            line,
+            number,
+            seconds,
+        });
         if self.state.counters.kits > kits {
             observer(&Event::Kit(self.state.counters.kits));
         }
@@ -401,10 +496,21 @@ impl<'a> Controller<'a> {
 
     fn interpret(&mut self) -> Result<Step, PlanError> {
         let options = &self.options.robot;
-        let machine = Machine { program: &self.program, model: &self.model, options };
+        let machine = Machine {
+            program: &self.program,
+            model: &self.model,
+            options,
+        };
         if self.options.choose_order {
             let factotum = &*self.factotum;
-            machine.step(&self.state, &mut Foresight { motion: self.motion, factotum, options })
+            machine.step(
+                &self.state,
+                &mut Foresight {
+                    motion: self.motion,
+                    factotum,
+                    options,
+                },
+            )
         } else {
             machine.step(&self.state, &mut super::order::Written)
         }
@@ -415,8 +521,9 @@ impl<'a> Controller<'a> {
         self.model.apply_all(changes)?;
         let outcome = state.outcome.as_ref().map(json).transpose()?;
         let run = (self.run, json(&state)?, outcome);
-        self.model.revision =
-            self.writer.commit(changes, Some((run.0, run.1.as_str(), run.2.as_deref())))?;
+        self.model.revision = self
+            .writer
+            .commit(changes, Some((run.0, run.1.as_str(), run.2.as_deref())))?;
         self.state = state;
         Ok(())
     }
@@ -442,12 +549,14 @@ impl<'a> Controller<'a> {
                 Err(failure) => failure.to_string(),
             };
             attempt += 1;
-            let again = matches!(self.options.policy, Policy::Repair { attempts } if attempt <= attempts);
+            let again =
+                matches!(self.options.policy, Policy::Repair { attempts } if attempt <= attempts);
             if !again || !self.motion.recover() {
                 return Ok(Err(failure));
             }
             observer(&Event::Retry(format!("{mark}: {failure}")));
-            self.warnings.push(format!("{mark}: {failure}; tried again"));
+            self.warnings
+                .push(format!("{mark}: {failure}; tried again"));
             self.resumed = true;
             if let Err(failure) = self.open() {
                 return Ok(Err(failure));

@@ -81,28 +81,40 @@ impl Context<'_> {
     pub(crate) fn truth(&self, expression: &Expression) -> Result<bool> {
         match self.value(expression)? {
             Value::Truth(truth) => Ok(truth),
-            other => fail(format!("expected true or false, got {}", other.describe(self.model))),
+            other => fail(format!(
+                "expected true or false, got {}",
+                other.describe(self.model)
+            )),
         }
     }
 
     pub(crate) fn number(&self, expression: &Expression) -> Result<f64> {
         match self.value(expression)? {
             Value::Number(number) => Ok(number),
-            other => fail(format!("expected a number, got {}", other.describe(self.model))),
+            other => fail(format!(
+                "expected a number, got {}",
+                other.describe(self.model)
+            )),
         }
     }
 
     pub(crate) fn object(&self, expression: &Expression) -> Result<ObjectId> {
         match self.value(expression)? {
             Value::Object(id) => self.model.object(id).map(|object| object.id),
-            other => fail(format!("expected an object, got {}", other.describe(self.model))),
+            other => fail(format!(
+                "expected an object, got {}",
+                other.describe(self.model)
+            )),
         }
     }
 
     pub(crate) fn pose(&self, expression: &Expression) -> Result<PoseValue> {
         match self.value(expression)? {
             Value::Pose(pose) => Ok(pose),
-            other => fail(format!("expected a Pose, got {}", other.describe(self.model))),
+            other => fail(format!(
+                "expected a Pose, got {}",
+                other.describe(self.model)
+            )),
         }
     }
 
@@ -145,9 +157,10 @@ impl Context<'_> {
     /// Equality; an object equals a text that is its id or name.
     fn equal(&self, one: &Value, other: &Value) -> bool {
         match (one, other) {
-            (Value::Object(id), Value::Text(text)) | (Value::Text(text), Value::Object(id)) => {
-                self.model.object(*id).is_ok_and(|object| object.is_called(text))
-            }
+            (Value::Object(id), Value::Text(text)) | (Value::Text(text), Value::Object(id)) => self
+                .model
+                .object(*id)
+                .is_ok_and(|object| object.is_called(text)),
             (Value::Sku(id), Value::Text(text)) | (Value::Text(text), Value::Sku(id)) => id == text,
             (one, other) => one == other,
         }
@@ -204,15 +217,28 @@ impl Context<'_> {
 
     fn object_property(&self, object: &Object, property: &str) -> Option<Value> {
         if property == "hasSolidObject_PhysicalLocation" {
-            let Location { reference, relation, pose } = object.location;
-            return Some(Value::Pose(PoseValue { reference, pose, known: relation.has_pose() }));
+            let Location {
+                reference,
+                relation,
+                pose,
+            } = object.location;
+            return Some(Value::Pose(PoseValue {
+                reference,
+                pose,
+                known: relation.has_pose(),
+            }));
         }
         if let Some((class, many)) = derived_property(object.class, property) {
-            let mut found = self.model.children(object.id).filter(|c| c.class.is_a(class));
+            let mut found = self
+                .model
+                .children(object.id)
+                .filter(|c| c.class.is_a(class));
             return Some(if many {
                 Value::List(found.map(|child| child.id).collect())
             } else {
-                found.next().map_or(Value::Null, |child| Value::Object(child.id))
+                found
+                    .next()
+                    .map_or(Value::Null, |child| Value::Object(child.id))
             });
         }
         if object.class == Class::KittingWorkstation {
@@ -241,12 +267,15 @@ impl Context<'_> {
         match (function, arguments) {
             ("Contains", [container, sku, levels]) => {
                 let levels = self.number(levels)?.clamp(0.0, 32.0) as u32;
-                let count = self.model.count(self.object(container)?, self.sku(sku)?, levels);
+                let count = self
+                    .model
+                    .count(self.object(container)?, self.sku(sku)?, levels);
                 Ok(Value::Number(count as f64))
             }
-            ("GetFirst", [list]) => {
-                Ok(self.list(list)?.first().map_or(Value::Null, |id| Value::Object(*id)))
-            }
+            ("GetFirst", [list]) => Ok(self
+                .list(list)?
+                .first()
+                .map_or(Value::Null, |id| Value::Object(*id))),
             ("GetTop", [list]) => self.top(&self.list(list)?),
             ("GetPartPose", [tray, sku, index]) => {
                 self.part_pose(self.object(tray)?, self.sku(sku)?, self.number(index)?)
@@ -270,12 +299,19 @@ impl Context<'_> {
                         let rotation = from_roll_pitch_yaw(roll, pitch, yaw);
                         let pose = Isometry3::from_parts(Translation3::from(point), rotation);
                         let reference = self.object(reference)?;
-                        Ok(Value::Pose(PoseValue { reference, pose, known: true }))
+                        Ok(Value::Pose(PoseValue {
+                            reference,
+                            pose,
+                            known: true,
+                        }))
                     }
                     _ => fail("a Pose is made of a Point and RollPitchYaw".into()),
                 }
             }
-            _ => fail(format!("no function {function} with {} arguments", arguments.len())),
+            _ => fail(format!(
+                "no function {function} with {} arguments",
+                arguments.len()
+            )),
         }
     }
 
@@ -286,7 +322,10 @@ impl Context<'_> {
     fn list(&self, expression: &Expression) -> Result<Vec<ObjectId>> {
         match self.value(expression)? {
             Value::List(list) => Ok(list),
-            other => fail(format!("expected a list, got {}", other.describe(self.model))),
+            other => fail(format!(
+                "expected a list, got {}",
+                other.describe(self.model)
+            )),
         }
     }
 
@@ -319,17 +358,24 @@ impl Context<'_> {
         if tray.sku() != Some(design.tray_sku.as_str()) {
             let found = tray.sku().unwrap_or("nothing known");
             let wanted = &design.tray_sku;
-            return fail(format!("{} is a {found}, the design {id} needs a {wanted}", tray.name));
+            return fail(format!(
+                "{} is a {found}, the design {id} needs a {wanted}",
+                tray.name
+            ));
         }
         let mut parts = design.parts.iter().filter(|part| part.sku == sku);
         let count = parts.clone().count();
         if index < 1.0 || index.fract() != 0.0 || index > count as f64 {
-            return fail(format!("the design {id} has {count} {sku}, number {index} was asked for"));
+            return fail(format!(
+                "the design {id} has {count} {sku}, number {index} was asked for"
+            ));
         }
         match parts.nth(index as usize - 1) {
-            Some(part) => {
-                Ok(Value::Pose(PoseValue { reference: tray.id, pose: part.pose, known: true }))
-            }
+            Some(part) => Ok(Value::Pose(PoseValue {
+                reference: tray.id,
+                pose: part.pose,
+                known: true,
+            })),
             None => fail(format!("the design {id} has no {sku} number {index}")),
         }
     }
@@ -339,7 +385,11 @@ impl Context<'_> {
         let place = self.model.workstation_from(container)?;
         let height = self.model.free_height(container, &place, object)?;
         let pose = Isometry3::translation(0.0, 0.0, height - place.translation.z);
-        Ok(Value::Pose(PoseValue { reference: container, pose, known: true }))
+        Ok(Value::Pose(PoseValue {
+            reference: container,
+            pose,
+            known: true,
+        }))
     }
 }
 
@@ -354,32 +404,54 @@ pub(crate) fn matches(
     object: &Object,
     place: Keyword,
 ) -> bool {
-    let Ok(class) = requirement.class.parse::<Class>() else { return false };
+    let Ok(class) = requirement.class.parse::<Class>() else {
+        return false;
+    };
     if !object.class.is_a(class)
-        || requirement.sku.as_deref().is_some_and(|sku| object.sku() != Some(sku))
+        || requirement
+            .sku
+            .as_deref()
+            .is_some_and(|sku| object.sku() != Some(sku))
     {
         return false;
     }
     let tables = [requirement.location, Some(place)].contains(&Some(Keyword::Table));
-    let on_table = |table: &Object| {
-        table.class == Class::WorkTable && world.is_within(object.id, table.id)
-    };
+    let on_table =
+        |table: &Object| table.class == Class::WorkTable && world.is_within(object.id, table.id);
     if tables && !world.objects().any(on_table) {
         return false;
     }
     if let Some(contents) = &requirement.contents_type {
         let movable = |child: &&Object| {
-            matches!(child.class, Class::KitTray | Class::KitInstance | Class::Part)
+            matches!(
+                child.class,
+                Class::KitTray | Class::KitInstance | Class::Part
+            )
         };
-        let others =
-            world.children(object.id).filter(movable).any(|c| c.sku() != Some(contents.as_str()));
+        let others = world
+            .children(object.id)
+            .filter(movable)
+            .any(|c| c.sku() != Some(contents.as_str()));
         let count = world.count(object.id, contents, 1) as u64;
-        if others || requirement.contents_quantity.is_some_and(|wanted| wanted != count) {
+        if others
+            || requirement
+                .contents_quantity
+                .is_some_and(|wanted| wanted != count)
+        {
             return false;
         }
     }
     let (scope, bindings) = (Scope::default(), BTreeMap::new());
     let subject = Some(object.id);
-    let context = Context { plan, scope: &scope, model: world, bindings: &bindings, subject };
-    requirement.conditions.iter().all(|condition| context.truth(condition).unwrap_or(false))
+    let context = Context {
+        plan,
+        scope: &scope,
+        model: world,
+        bindings: &bindings,
+        subject,
+    };
+    requirement
+        .conditions
+        .iter()
+        .all(|condition| context.truth(condition).unwrap_or(false))
 }

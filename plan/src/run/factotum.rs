@@ -38,7 +38,12 @@ pub trait Factotum {
     ///
     /// # Errors
     /// A text that says why it could not; then nothing has changed.
-    fn perform(&mut self, model: &Model, plan: &Plan, request: &Request) -> Result<Delivery, String>;
+    fn perform(
+        &mut self,
+        model: &Model,
+        plan: &Plan,
+        request: &Request,
+    ) -> Result<Delivery, String>;
 
     /// What an errand would do, without doing it.
     ///
@@ -77,9 +82,13 @@ impl Stock {
         let mut stock = Self::default();
         for requirement in &plan.requirements {
             let place = requirement.location.unwrap_or(Keyword::Workstation);
-            let found = model.objects().find(|o| matches(model, plan, requirement, o, place));
+            let found = model
+                .objects()
+                .find(|o| matches(model, plan, requirement, o, place));
             if let Some(object) = found {
-                stock.supplies.insert(requirement.name.clone(), copy(model, object.id));
+                stock
+                    .supplies
+                    .insert(requirement.name.clone(), copy(model, object.id));
             }
         }
         stock
@@ -101,7 +110,10 @@ impl Stock {
         let object = model.object(request.object?).ok()?;
         let alike = |items: &&Vec<Item>| {
             items.first().is_some_and(|item| {
-                let sku = object.class.sku_property().and_then(|p| item.properties.get(p));
+                let sku = object
+                    .class
+                    .sku_property()
+                    .and_then(|p| item.properties.get(p));
                 item.class == object.class.name() && sku.and_then(Scalar::text) == object.sku()
             })
         };
@@ -115,9 +127,15 @@ fn copy(model: &Model, root: ObjectId) -> Vec<Item> {
         let object = model.object(*id).ok()?;
         let reference = model.object(object.location.reference).ok()?;
         Some(Item {
-            stem: object.name.trim_end_matches(|c: char| c == '_' || c.is_ascii_digit()).to_owned(),
+            stem: object
+                .name
+                .trim_end_matches(|c: char| c == '_' || c.is_ascii_digit())
+                .to_owned(),
             class: object.class.name().to_owned(),
-            parent: members.iter().position(|m| *m == reference.id).filter(|_| *id != root),
+            parent: members
+                .iter()
+                .position(|m| *m == reference.id)
+                .filter(|_| *id != root),
             reference: reference.name.clone(),
             relation: object.location.relation.name().to_owned(),
             pose: pose_to_text(&object.location.pose),
@@ -144,7 +162,13 @@ impl SimulatedFactotum {
     /// A factotum with this stock, 5 s an errand.
     #[must_use]
     pub fn new(stock: Stock) -> Self {
-        Self { stock, seconds: 5.0, limits: BTreeMap::new(), errands: 0, failure: None }
+        Self {
+            stock,
+            seconds: 5.0,
+            limits: BTreeMap::new(),
+            errands: 0,
+            failure: None,
+        }
     }
 
     fn deliver(&self, model: &Model, request: &Request) -> Result<Delivery, String> {
@@ -161,7 +185,11 @@ impl SimulatedFactotum {
             model.apply_all(&changes).map_err(text)?;
         }
         if request.errand == Errand::Remove {
-            return Ok(Delivery { changes, object: None, seconds: self.seconds });
+            return Ok(Delivery {
+                changes,
+                object: None,
+                seconds: self.seconds,
+            });
         }
         let name = request.requirement.clone().unwrap_or_default();
         if self.limits.get(&name) == Some(&0) {
@@ -174,7 +202,11 @@ impl SimulatedFactotum {
         let created = create(&mut model, items, place).map_err(text)?;
         let object = created.first().map(|object| object.id);
         changes.extend(created.into_iter().map(Change::Create));
-        Ok(Delivery { changes, object, seconds: self.seconds })
+        Ok(Delivery {
+            changes,
+            object,
+            seconds: self.seconds,
+        })
     }
 }
 
@@ -189,14 +221,25 @@ fn create(
         let class: Class = item.class.parse().map_err(PlanError::Value)?;
         let relation = Relation::from_name(&item.relation).unwrap_or(Relation::Pose);
         let pose: Isometry3<f64> = pose_from_text(&item.pose, &item.stem)?;
-        let parent = item.parent.and_then(|parent| created.get(parent)).map(|parent| parent.id);
+        let parent = item
+            .parent
+            .and_then(|parent| created.get(parent))
+            .map(|parent| parent.id);
         let location = match (parent, place) {
-            (Some(reference), _) => Location { reference, relation, pose },
+            (Some(reference), _) => Location {
+                reference,
+                relation,
+                pose,
+            },
             (None, Some(place)) => place,
             (None, None) => {
                 let reference = model.named(&item.reference);
                 let missing = || PlanError::NoObject(item.reference.clone());
-                Location { reference: reference.ok_or_else(missing)?.id, relation, pose }
+                Location {
+                    reference: reference.ok_or_else(missing)?.id,
+                    relation,
+                    pose,
+                }
             }
         };
         let name = model.free_name(&item.stem);
@@ -214,7 +257,10 @@ impl Factotum for SimulatedFactotum {
         self.failure = result.as_ref().err().cloned();
         if result.is_ok() {
             self.errands += 1;
-            let limit = request.requirement.as_ref().and_then(|name| self.limits.get_mut(name));
+            let limit = request
+                .requirement
+                .as_ref()
+                .and_then(|name| self.limits.get_mut(name));
             if let Some(limit) = limit
                 && request.errand != Errand::Remove
             {

@@ -42,7 +42,11 @@ pub(crate) struct Frame {
 
 impl Frame {
     pub(crate) fn new(node: usize) -> Self {
-        Self { node, order: None, next: usize::MAX }
+        Self {
+            node,
+            order: None,
+            next: usize::MAX,
+        }
     }
 }
 
@@ -160,7 +164,13 @@ impl Machine<'_> {
     fn context<'s>(&'s self, state: &'s State) -> Context<'s> {
         let Self { program, model, .. } = self;
         let (plan, scope) = (&program.plan, &program.scope);
-        Context { plan, scope, model, bindings: &state.bindings, subject: None }
+        Context {
+            plan,
+            scope,
+            model,
+            bindings: &state.bindings,
+            subject: None,
+        }
     }
 
     /// Interprets the next statement. The world is not changed; the step says how it will be.
@@ -168,19 +178,24 @@ impl Machine<'_> {
         let mut next = state.clone();
         let Some(node) = self.next_leaf(&mut next, chooser)? else {
             next.outcome = Some(Outcome::Stopped);
-            return Ok(Step { act: Act::Exhausted, ..nothing("Stop", Span::default(), next) });
+            return Ok(Step {
+                act: Act::Exhausted,
+                ..nothing("Stop", Span::default(), next)
+            });
         };
         let Node::Leaf(action, span) = &self.program.nodes[node] else {
             return Err(PlanError::Resume(format!("node {node} is no statement")));
         };
         next.counters.statements += 1;
-        let mut step = self.execute(action, *span, next).map_err(|error| match error {
-            error @ PlanError::Statement { .. } => error,
-            error => PlanError::Statement {
-                statement: action.name().to_owned(),
-                why: error.to_string(),
-            },
-        })?;
+        let mut step = self
+            .execute(action, *span, next)
+            .map_err(|error| match error {
+                error @ PlanError::Statement { .. } => error,
+                error => PlanError::Statement {
+                    statement: action.name().to_owned(),
+                    why: error.to_string(),
+                },
+            })?;
         if let Act::Motion(batch) = &mut step.act {
             step.state.counters.commands += batch.commands.len();
         }
@@ -190,11 +205,22 @@ impl Machine<'_> {
     /// Goes through lists and tests to the next statement.
     fn next_leaf(&self, state: &mut State, chooser: &mut dyn Chooser) -> Result<Option<usize>> {
         loop {
-            let Some(frame) = state.stack.last() else { return Ok(None) };
-            let (index, position) = (frame.node, if frame.next == usize::MAX { 0 } else { frame.next });
-            let node = self.program.nodes.get(index).ok_or_else(|| {
-                PlanError::Resume(format!("the plan has no node {index}"))
-            })?;
+            let Some(frame) = state.stack.last() else {
+                return Ok(None);
+            };
+            let (index, position) = (
+                frame.node,
+                if frame.next == usize::MAX {
+                    0
+                } else {
+                    frame.next
+                },
+            );
+            let node = self
+                .program
+                .nodes
+                .get(index)
+                .ok_or_else(|| PlanError::Resume(format!("the plan has no node {index}")))?;
             match node {
                 Node::Leaf(..) => {
                     state.stack.pop();
@@ -254,7 +280,10 @@ impl Machine<'_> {
         if let Some(frame) = state.stack.last_mut() {
             if frame.next == statements {
                 let why = "a pass did nothing, so it would go on for ever".into();
-                return Err(PlanError::Statement { statement: "LoopWhile".into(), why });
+                return Err(PlanError::Statement {
+                    statement: "LoopWhile".into(),
+                    why,
+                });
             }
             frame.next = statements;
         }
@@ -271,7 +300,9 @@ impl Machine<'_> {
                 Ok(done(name, span, state))
             }
             Action::Quit {} => Ok(quit(name, span, state, "the plan gave up (Quit)".into())),
-            Action::Bind { variable, location, .. } => match self.find(variable, *location, &state) {
+            Action::Bind {
+                variable, location, ..
+            } => match self.find(variable, *location, &state) {
                 Some(object) => {
                     self.assign(variable, Value::Object(object), &mut state)?;
                     Ok(nothing(name, span, state))
@@ -282,21 +313,35 @@ impl Machine<'_> {
                 }
             },
             Action::Set { target, value } => self.set(target, value, span, state),
-            Action::SetPose { variable, reference, pose } => {
+            Action::SetPose {
+                variable,
+                reference,
+                pose,
+            } => {
                 let context = self.context(&state);
                 let reference = context.object(reference)?;
                 let place = context.in_workstation(&context.pose(pose)?)?;
                 let pose = self.model.workstation_from(reference)?.inv_mul(&place);
-                let value = Value::Pose(PoseValue { reference, pose, known: true });
+                let value = Value::Pose(PoseValue {
+                    reference,
+                    pose,
+                    known: true,
+                });
                 self.assign(variable, value, &mut state)?;
                 Ok(nothing(name, span, state))
             }
-            Action::CreateInstance { variable, object, property } => {
-                self.create(variable, object, property, span, state)
-            }
+            Action::CreateInstance {
+                variable,
+                object,
+                property,
+            } => self.create(variable, object, property, span, state),
             Action::DestroyInstance { variable } => self.destroy(variable, span, state),
-            Action::FactotumRefill { variable } => self.errand(Errand::Refill, variable, name, span, state),
-            Action::FactotumRemove { variable } => self.errand(Errand::Remove, variable, name, span, state),
+            Action::FactotumRefill { variable } => {
+                self.errand(Errand::Refill, variable, name, span, state)
+            }
+            Action::FactotumRemove { variable } => {
+                self.errand(Errand::Remove, variable, name, span, state)
+            }
             Action::FactotumReplace { variable } => {
                 self.errand(Errand::Replace, variable, name, span, state)
             }
@@ -310,7 +355,12 @@ impl Machine<'_> {
 
     fn assign(&self, variable: &Name, value: Value, state: &mut State) -> Result<()> {
         let missing = || PlanError::Value(format!("nothing is called {}", variable.text));
-        let declared = self.program.scope.declared(&variable.text).ok_or_else(missing)?.to_owned();
+        let declared = self
+            .program
+            .scope
+            .declared(&variable.text)
+            .ok_or_else(missing)?
+            .to_owned();
         self.accepts(&declared, &value)?;
         state.bindings.insert(declared, value);
         Ok(())
@@ -318,14 +368,26 @@ impl Machine<'_> {
 
     /// The value has the type of the variable and, for objects, its stock keeping unit.
     fn accepts(&self, declared: &str, value: &Value) -> Result<()> {
-        let kind = self.program.scope.lookup(declared).map_or(Type::Unknown, |(_, kind)| kind);
-        let object = if let Value::Object(id) = value { Some(self.model.object(*id)?) } else { None };
+        let kind = self
+            .program
+            .scope
+            .lookup(declared)
+            .map_or(Type::Unknown, |(_, kind)| kind);
+        let object = if let Value::Object(id) = value {
+            Some(self.model.object(*id)?)
+        } else {
+            None
+        };
         let fits = match (kind, value) {
             (Type::Object(class), Value::Object(_)) => object.is_some_and(|o| o.class.is_a(class)),
             (Type::Number { whole, least }, Value::Number(number)) => {
-                (!whole || number.fract() == 0.0) && least.is_none_or(|least| *number >= least as f64)
+                (!whole || number.fract() == 0.0)
+                    && least.is_none_or(|least| *number >= least as f64)
             }
-            (Type::Object(_) | Type::Pose | Type::Data | Type::Text | Type::Unknown, Value::Null)
+            (
+                Type::Object(_) | Type::Pose | Type::Data | Type::Text | Type::Unknown,
+                Value::Null,
+            )
             | (Type::Pose, Value::Pose(_))
             | (Type::Text, Value::Text(_))
             | (Type::Truth, Value::Truth(_))
@@ -337,7 +399,12 @@ impl Machine<'_> {
             let message = format!("{declared} is {}, not {}", kind.describe(), description());
             return Err(PlanError::Value(message));
         }
-        let variable = self.program.plan.variables.iter().find(|v| v.name == declared);
+        let variable = self
+            .program
+            .plan
+            .variables
+            .iter()
+            .find(|v| v.name == declared);
         if let (Some(sku), Some(object)) = (variable.and_then(|v| v.sku.as_deref()), object)
             && object.sku().is_some_and(|own| own != sku)
         {
@@ -358,7 +425,10 @@ impl Machine<'_> {
         let plan = &self.program.plan;
         let declared = self.program.scope.declared(&variable.text)?;
         let own = plan.variables.iter().find(|v| v.name == declared)?;
-        let requirement = plan.requirements.iter().find(|r| Some(&r.name) == own.requirement.as_ref())?;
+        let requirement = plan
+            .requirements
+            .iter()
+            .find(|r| Some(&r.name) == own.requirement.as_ref())?;
         let taken = |id: ObjectId| {
             plan.variables.iter().any(|other| {
                 other.requirement.is_some()
@@ -372,16 +442,29 @@ impl Machine<'_> {
         self.model.objects().find(fits).map(|object| object.id)
     }
 
-    fn set(&self, target: &Expression, value: &Expression, span: Span, mut state: State) -> Result<Step> {
+    fn set(
+        &self,
+        target: &Expression,
+        value: &Expression,
+        span: Span,
+        mut state: State,
+    ) -> Result<Step> {
         let value = self.context(&state).value(value)?;
         let (object, property) = match &target.term {
             Term::Property(object, property) => (object, property),
             Term::Name(text) => {
-                let name = Name { text: text.clone(), span: target.span };
+                let name = Name {
+                    text: text.clone(),
+                    span: target.span,
+                };
                 self.assign(&name, value, &mut state)?;
                 return Ok(nothing("Set", span, state));
             }
-            _ => return Err(PlanError::Value("only variables and properties can be set".into())),
+            _ => {
+                return Err(PlanError::Value(
+                    "only variables and properties can be set".into(),
+                ));
+            }
         };
         let object = self.model.object(self.context(&state).object(object)?)?;
         let missing =
@@ -401,8 +484,15 @@ impl Machine<'_> {
         if property == "isKitInstance_Finished" && value == Scalar::Truth(true) {
             state.counters.kits += 1;
         }
-        let change = Change::Set { object: object.id, property: property.clone(), value };
-        Ok(Step { changes: vec![change], ..nothing("Set", span, state) })
+        let change = Change::Set {
+            object: object.id,
+            property: property.clone(),
+            value,
+        };
+        Ok(Step {
+            changes: vec![change],
+            ..nothing("Set", span, state)
+        })
     }
 
     /// The new object takes the place of its first component, which becomes relative to it.
@@ -425,7 +515,10 @@ impl Machine<'_> {
             return Err(PlanError::Value(message));
         }
         if class.is_composite() && self.model.composite_of(part.id).is_some() {
-            return Err(PlanError::Value(format!("{} is already part of another", part.name)));
+            return Err(PlanError::Value(format!(
+                "{} is already part of another",
+                part.name
+            )));
         }
         let mut fresh = self.model.clone();
         let name = fresh.free_name(class.name());
@@ -433,20 +526,40 @@ impl Machine<'_> {
         let mut object = Object::new(id, name, class, part.location);
         if class == Class::KitInstance {
             let design = self.program.plan.about("TargetSKU").to_owned();
-            let tray = self.model.design(&design).map(|design| design.tray_sku.as_str());
+            let tray = self
+                .model
+                .design(&design)
+                .map(|design| design.tray_sku.as_str());
             if tray != part.sku() {
                 let message = format!("{} is not the tray of the design {design}", part.name);
                 return Err(PlanError::Value(message));
             }
-            object.properties.insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
-            object.properties.insert("isKitInstance_Finished".into(), Scalar::Truth(false));
+            object
+                .properties
+                .insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
+            object
+                .properties
+                .insert("isKitInstance_Finished".into(), Scalar::Truth(false));
         }
         let location = Location::pose(id, Isometry3::identity());
-        let changes =
-            vec![Change::Create(object), Change::Place { object: part.id, location }];
-        let declared = self.program.scope.declared(&variable.text).unwrap_or_default().to_owned();
+        let changes = vec![
+            Change::Create(object),
+            Change::Place {
+                object: part.id,
+                location,
+            },
+        ];
+        let declared = self
+            .program
+            .scope
+            .declared(&variable.text)
+            .unwrap_or_default()
+            .to_owned();
         state.bindings.insert(declared, Value::Object(id));
-        Ok(Step { changes, ..nothing("CreateInstance", span, state) })
+        Ok(Step {
+            changes,
+            ..nothing("CreateInstance", span, state)
+        })
     }
 
     /// The one component takes the place of the object.
@@ -454,26 +567,45 @@ impl Machine<'_> {
         let object = self.model.object(self.bound(variable, &state)?)?;
         let components: Vec<&Object> = self.model.children(object.id).collect();
         let [component] = components[..] else {
-            let message =
-                format!("{} has {} components, not one", object.name, components.len());
+            let message = format!(
+                "{} has {} components, not one",
+                object.name,
+                components.len()
+            );
             return Err(PlanError::Value(message));
         };
         let pose = object.location.pose * component.location.pose;
         let changes = vec![
-            Change::Place { object: component.id, location: Location { pose, ..object.location } },
+            Change::Place {
+                object: component.id,
+                location: Location {
+                    pose,
+                    ..object.location
+                },
+            },
             Change::Delete(object.id),
         ];
         self.assign(variable, Value::Null, &mut state)?;
-        Ok(Step { changes, ..nothing("DestroyInstance", span, state) })
+        Ok(Step {
+            changes,
+            ..nothing("DestroyInstance", span, state)
+        })
     }
 
     fn bound(&self, variable: &Name, state: &State) -> Result<ObjectId> {
-        let declared = self.program.scope.declared(&variable.text).unwrap_or_default();
+        let declared = self
+            .program
+            .scope
+            .declared(&variable.text)
+            .unwrap_or_default();
         match state.bindings.get(declared) {
             Some(Value::Object(id)) => Ok(*id),
             other => {
                 let found = other.map_or("nothing".into(), |value| value.describe(self.model));
-                Err(PlanError::Value(format!("{} is {found}, not an object", variable.text)))
+                Err(PlanError::Value(format!(
+                    "{} is {found}, not an object",
+                    variable.text
+                )))
             }
         }
     }
@@ -490,17 +622,38 @@ impl Machine<'_> {
             Errand::Refill => None,
             _ => Some(self.bound(variable, &state)?),
         };
-        let declared = self.program.scope.declared(&variable.text).unwrap_or_default().to_owned();
-        let own = self.program.plan.variables.iter().find(|v| v.name == declared);
+        let declared = self
+            .program
+            .scope
+            .declared(&variable.text)
+            .unwrap_or_default()
+            .to_owned();
+        let own = self
+            .program
+            .plan
+            .variables
+            .iter()
+            .find(|v| v.name == declared);
         let requirement = own.and_then(|v| v.requirement.clone());
         state.counters.factotum_calls += 1;
         state.bindings.insert(declared.clone(), Value::Null);
-        let request = Request { errand, object, requirement, variable: declared };
-        Ok(Step { act: Act::Errand(request), ..nothing(name, span, state) })
+        let request = Request {
+            errand,
+            object,
+            requirement,
+            variable: declared,
+        };
+        Ok(Step {
+            act: Act::Errand(request),
+            ..nothing(name, span, state)
+        })
     }
 
     fn motion(&self, action: &Action, span: Span, mut state: State) -> Result<Step> {
-        let robot = Robot { model: self.model, options: self.options };
+        let robot = Robot {
+            model: self.model,
+            options: self.options,
+        };
         let mut warning = None;
         let context = self.context(&state);
         let batch = match action {
@@ -537,17 +690,35 @@ impl Machine<'_> {
             }
             _ => Batch::default(),
         };
-        let act = if batch.commands.is_empty() { Act::Nothing } else { Act::Motion(batch) };
-        Ok(Step { act, warning, ..nothing(action.name(), span, state) })
+        let act = if batch.commands.is_empty() {
+            Act::Nothing
+        } else {
+            Act::Motion(batch)
+        };
+        Ok(Step {
+            act,
+            warning,
+            ..nothing(action.name(), span, state)
+        })
     }
 }
 
 fn nothing(name: &'static str, span: Span, state: State) -> Step {
-    Step { name, span, act: Act::Nothing, changes: Vec::new(), state, warning: None }
+    Step {
+        name,
+        span,
+        act: Act::Nothing,
+        changes: Vec::new(),
+        state,
+        warning: None,
+    }
 }
 
 fn done(name: &'static str, span: Span, state: State) -> Step {
-    Step { act: Act::End, ..nothing(name, span, state) }
+    Step {
+        act: Act::End,
+        ..nothing(name, span, state)
+    }
 }
 
 fn quit(name: &'static str, span: Span, mut state: State, reason: String) -> Step {

@@ -41,7 +41,9 @@ fn ready(count: usize, pairs: &[(usize, usize)], order: &[usize]) -> Vec<usize> 
     (0..count)
         .filter(|member| !order.contains(member))
         .filter(|member| {
-            pairs.iter().all(|(before, after)| after != member || order.contains(before))
+            pairs
+                .iter()
+                .all(|(before, after)| after != member || order.contains(before))
         })
         .collect()
 }
@@ -84,7 +86,14 @@ impl Chooser for Foresight<'_> {
         if list.len() < 2 || !program.moves(node) {
             return (first, 0.0);
         }
-        let mut search = Search { program, list, pairs, length, best: None, branches: 0 };
+        let mut search = Search {
+            program,
+            list,
+            pairs,
+            length,
+            best: None,
+            branches: 0,
+        };
         let mut at = Some((0.0, state.clone(), model.clone()));
         for member in &first {
             at = at.and_then(|(time, state, model)| {
@@ -110,7 +119,11 @@ impl Foresight<'_> {
         (time, state, model): (f64, &State, &Model),
     ) {
         if order.len() == search.length {
-            if search.best.as_ref().is_none_or(|(best, _)| time < best - 1e-9) {
+            if search
+                .best
+                .as_ref()
+                .is_none_or(|(best, _)| time < best - 1e-9)
+            {
                 search.best = Some((time, order.clone()));
             }
             return;
@@ -125,7 +138,11 @@ impl Foresight<'_> {
             else {
                 continue;
             };
-            if search.best.as_ref().is_some_and(|(best, _)| later >= best - 1e-9) {
+            if search
+                .best
+                .as_ref()
+                .is_some_and(|(best, _)| later >= best - 1e-9)
+            {
                 continue;
             }
             order.push(member);
@@ -145,9 +162,16 @@ impl Foresight<'_> {
     ) -> Option<(f64, State, Model)> {
         let mut time = time;
         let mut model = model.clone();
-        let mut state = State { stack: vec![Frame::new(node)], ..state.clone() };
+        let mut state = State {
+            stack: vec![Frame::new(node)],
+            ..state.clone()
+        };
         for _ in 0..MOST_STATEMENTS {
-            let machine = Machine { program, model: &model, options: self.options };
+            let machine = Machine {
+                program,
+                model: &model,
+                options: self.options,
+            };
             let step = machine.step(&state, &mut Written).ok()?;
             state = step.state;
             let mut changes = step.changes;
@@ -159,8 +183,10 @@ impl Foresight<'_> {
                     changes.extend(batch.changes);
                 }
                 Act::Errand(request) => {
-                    let delivery =
-                        self.factotum.preview(&model, &program.plan, &request).ok()?;
+                    let delivery = self
+                        .factotum
+                        .preview(&model, &program.plan, &request)
+                        .ok()?;
                     time += delivery.seconds;
                     let value = delivery.object.map_or(Value::Null, Value::Object);
                     state.bindings.insert(request.variable, value);
@@ -178,4 +204,3 @@ impl Foresight<'_> {
         None
     }
 }
-

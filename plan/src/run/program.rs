@@ -35,7 +35,11 @@ impl Program {
     #[must_use]
     pub fn new(plan: Plan) -> Self {
         let scope = Scope::new(&plan);
-        let mut program = Self { plan: Plan::default(), scope, nodes: Vec::new() };
+        let mut program = Self {
+            plan: Plan::default(),
+            scope,
+            nodes: Vec::new(),
+        };
         let members = program.members(&plan.todo);
         program.add(Node::Sequence(members));
         program.plan = plan;
@@ -54,7 +58,10 @@ impl Program {
 
     /// One node for each step of a list; an If with its ElseIf and Else is one step.
     fn members(&mut self, list: &[Statement]) -> Vec<usize> {
-        steps(list).into_iter().map(|range| self.step(&list[range])).collect()
+        steps(list)
+            .into_iter()
+            .map(|range| self.step(&list[range]))
+            .collect()
     }
 
     fn step(&mut self, chain: &[Statement]) -> usize {
@@ -64,7 +71,9 @@ impl Program {
                 Action::If { test, then } | Action::ElseIf { test, then } => {
                     choices.push((Some(test.clone()), self.step(std::slice::from_ref(then))));
                 }
-                Action::Else { then } => choices.push((None, self.step(std::slice::from_ref(then)))),
+                Action::Else { then } => {
+                    choices.push((None, self.step(std::slice::from_ref(then))))
+                }
                 _ => return self.statement(statement),
             }
         }
@@ -83,7 +92,10 @@ impl Program {
                     .collect();
                 let position = |index| triples.iter().position(|t| t.index == index);
                 let pairs = triples.iter().enumerate().flat_map(|(later, triple)| {
-                    triple.before.iter().filter_map(move |b| Some((position(*b)?, later)))
+                    triple
+                        .before
+                        .iter()
+                        .filter_map(move |b| Some((position(*b)?, later)))
                 });
                 Node::AnyOrder(members, pairs.collect())
             }
@@ -104,7 +116,10 @@ impl Program {
 
     fn any_order(&mut self, list: &[Statement]) -> Node {
         let members = self.members(list);
-        let pairs = conflicts(list, &self.scope).into_iter().map(|(a, b, _)| (a, b)).collect();
+        let pairs = conflicts(list, &self.scope)
+            .into_iter()
+            .map(|(a, b, _)| (a, b))
+            .collect();
         Node::AnyOrder(members, pairs)
     }
 

@@ -25,7 +25,13 @@ pub struct RobotOptions {
 
 impl Default for RobotOptions {
     fn default() -> Self {
-        Self { clearance: 0.04, settle: 0.0, straight: true, stack: true, percent: None }
+        Self {
+            clearance: 0.04,
+            settle: 0.0,
+            straight: true,
+            stack: true,
+            percent: None,
+        }
     }
 }
 
@@ -37,17 +43,28 @@ pub(crate) struct Robot<'a> {
 
 /// The tool that an end effector is.
 pub(crate) fn tool_of(effector: &Object) -> Tool {
-    Tool { name: effector.name.clone(), length: effector.effector_length() }
+    Tool {
+        name: effector.name.clone(),
+        length: effector.effector_length(),
+    }
 }
 
 /// Where the arm is, as the model has it.
 pub(crate) fn situation(model: &Model) -> Result<Situation, PlanError> {
-    let arm = model.arm.ok_or_else(|| PlanError::Missing("known pose of the arm".into()))?;
-    Ok(Situation { arm, tool: model.effector().map(tool_of) })
+    let arm = model
+        .arm
+        .ok_or_else(|| PlanError::Missing("known pose of the arm".into()))?;
+    Ok(Situation {
+        arm,
+        tool: model.effector().map(tool_of),
+    })
 }
 
 fn fail<T>(statement: &str, why: String) -> Result<T, PlanError> {
-    Err(PlanError::Statement { statement: statement.to_owned(), why })
+    Err(PlanError::Statement {
+        statement: statement.to_owned(),
+        why,
+    })
 }
 
 /// The pose with another height.
@@ -72,9 +89,13 @@ impl Robot<'_> {
 
     /// How far the lowest point of the held object is below the controlled point (m).
     fn below_tip(&self) -> Result<f64, PlanError> {
-        let Some(held) = self.model.held() else { return Ok(0.0) };
+        let Some(held) = self.model.held() else {
+            return Ok(0.0);
+        };
         let bounds = self.model.bounds(held.id)?;
-        Ok(bounds.map_or(0.0, |b| (self.tip().map_or(0.0, |tip| tip.translation.z) - b.minimum[2]).max(0.0)))
+        Ok(bounds.map_or(0.0, |b| {
+            (self.tip().map_or(0.0, |tip| tip.translation.z) - b.minimum[2]).max(0.0)
+        }))
     }
 
     /// Height of the controlled point (m) at which nothing can be touched.
@@ -93,13 +114,17 @@ impl Robot<'_> {
 
     fn settle(&self, batch: &mut Batch) {
         if self.options.settle > 0.0 {
-            batch.push(Command::Dwell { seconds: self.options.settle });
+            batch.push(Command::Dwell {
+                seconds: self.options.settle,
+            });
         }
     }
 
     /// Records that the controlled point ends at `tip`.
     fn ends_at(&self, batch: &mut Batch, tip: &Isometry3<f64>) -> Result<(), PlanError> {
-        batch.changes.extend(self.model.arm_changes(&(tip * self.tip_from_arm()))?);
+        batch
+            .changes
+            .extend(self.model.arm_changes(&(tip * self.tip_from_arm()))?);
         Ok(())
     }
 
@@ -110,12 +135,16 @@ impl Robot<'_> {
         let height = self.travel_height()?;
         let rotation = match (self.model.held(), self.model.effector()) {
             (Some(held), Some(effector)) => {
-                let tip_from_object = tool_of(effector).arm_from_tip().inverse() * held.location.pose;
+                let tip_from_object =
+                    tool_of(effector).arm_from_tip().inverse() * held.location.pose;
                 pose.rotation * tip_from_object.rotation.inverse()
             }
             _ => pose.rotation * pointing_down(),
         };
-        let target = Isometry3::from_parts([pose.translation.x, pose.translation.y, height].into(), rotation);
+        let target = Isometry3::from_parts(
+            [pose.translation.x, pose.translation.y, height].into(),
+            rotation,
+        );
         let mut batch = Batch::default();
         let now = self.tip()?;
         if now.translation.z < height - 1e-6 {
@@ -139,7 +168,10 @@ impl Robot<'_> {
         self.suits(effector, object)?;
         let object_from_tip = self.model.grasp(object.id)?;
         let goal = self.model.workstation_from(object.id)? * object_from_tip;
-        let lowest = self.model.bounds(object.id)?.map_or(goal.translation.z, |b| b.minimum[2]);
+        let lowest = self
+            .model
+            .bounds(object.id)?
+            .map_or(goal.translation.z, |b| b.minimum[2]);
         let rise = (self.tip()?.translation.z - lowest).max(0.0);
         let up = at_height(&goal, goal.translation.z + rise);
         let mut batch = Batch::default();
@@ -150,7 +182,10 @@ impl Robot<'_> {
         batch.straight(&up);
         let pose = tool_of(effector).arm_from_tip() * object_from_tip.inverse();
         let location = Location::pose(effector.id, pose);
-        batch.changes.push(Change::Place { object: object.id, location });
+        batch.changes.push(Change::Place {
+            object: object.id,
+            location,
+        });
         self.ends_at(&mut batch, &up)?;
         Ok(batch)
     }
@@ -158,18 +193,24 @@ impl Robot<'_> {
     /// The end effector can hold this kind of object.
     fn suits(&self, effector: &Object, object: &Object) -> Result<(), PlanError> {
         let sku = match object.class {
-            Class::KitInstance => {
-                self.model.children(object.id).find(|c| c.class == Class::KitTray)
-            }
+            Class::KitInstance => self
+                .model
+                .children(object.id)
+                .find(|c| c.class == Class::KitTray),
             _ => Some(object),
         };
-        let sku = sku.and_then(Object::sku).and_then(|sku| self.model.sku(sku));
+        let sku = sku
+            .and_then(Object::sku)
+            .and_then(|sku| self.model.sku(sku));
         let Some(sku) = sku else { return Ok(()) };
         if sku.effectors.is_empty() || sku.effectors.iter().any(|id| effector.is_called(id)) {
             return Ok(());
         }
         let wanted = sku.effectors.join(" or ");
-        fail("RobotPickUp", format!("{} cannot hold a {}, {wanted} can", effector.name, sku.id))
+        fail(
+            "RobotPickUp",
+            format!("{} cannot hold a {}, {wanted} can", effector.name, sku.id),
+        )
     }
 
     /// Into the pose, open, up until the tip is as high as the lowest point of the object was. The
@@ -185,10 +226,15 @@ impl Robot<'_> {
             return fail(NAME, format!("the gripper does not hold {}", object.name));
         };
         if held.id != object.id {
-            return fail(NAME, format!("the gripper holds {}, not {}", held.name, object.name));
+            return fail(
+                NAME,
+                format!("the gripper holds {}, not {}", held.name, object.name),
+            );
         }
         let t = pose.translation;
-        let support = self.model.support(object.class, [t.x, t.y, t.z], object.id)?;
+        let support = self
+            .model
+            .support(object.class, [t.x, t.y, t.z], object.id)?;
         let (place, warning) = self.place(object, pose, support)?;
         let object_from_tip = held.location.pose.inverse() * tool_of(effector).arm_from_tip();
         let goal = place * object_from_tip;
@@ -202,7 +248,10 @@ impl Robot<'_> {
         batch.straight(&up);
         let pose = self.model.workstation_from(support)?.inv_mul(&place);
         let location = Location::pose(support, pose);
-        batch.changes.push(Change::Place { object: object.id, location });
+        batch.changes.push(Change::Place {
+            object: object.id,
+            location,
+        });
         self.ends_at(&mut batch, &up)?;
         Ok((batch, warning))
     }
@@ -239,7 +288,10 @@ impl Robot<'_> {
     /// To the changing station: put the present end effector into an empty holder, take the other.
     pub(crate) fn change_effector(&self, id: &str) -> Result<Batch, PlanError> {
         const NAME: &str = "RobotChangeEndEffector";
-        let wanted = self.model.named(id).filter(|object| object.class.is_a(Class::EndEffector));
+        let wanted = self
+            .model
+            .named(id)
+            .filter(|object| object.class.is_a(Class::EndEffector));
         let Some(wanted) = wanted else {
             return fail(NAME, format!("the world has no end effector {id}"));
         };
@@ -262,15 +314,21 @@ impl Robot<'_> {
     /// An empty holder of the changing station, best the one whose name speaks of the effector.
     fn holder_for(&self, effector: &Object) -> Result<&Object, PlanError> {
         let empty = |object: &&Object| {
-            object.class == Class::EndEffectorHolder && self.model.children(object.id).next().is_none()
+            object.class == Class::EndEffectorHolder
+                && self.model.children(object.id).next().is_none()
         };
-        let named = format!("{}holder", effector.name).to_lowercase().replace('_', "");
+        let named = format!("{}holder", effector.name)
+            .to_lowercase()
+            .replace('_', "");
         let mut holders: Vec<&Object> = self.model.objects().filter(empty).collect();
         holders.sort_by_key(|holder| holder.name.to_lowercase().replace('_', "") != named);
-        holders.first().copied().ok_or_else(|| PlanError::Statement {
-            statement: "RobotChangeEndEffector".into(),
-            why: format!("no holder is empty for {}", effector.name),
-        })
+        holders
+            .first()
+            .copied()
+            .ok_or_else(|| PlanError::Statement {
+                statement: "RobotChangeEndEffector".into(),
+                why: format!("no holder is empty for {}", effector.name),
+            })
     }
 
     /// Puts the end effector into an empty holder.
@@ -303,7 +361,10 @@ impl Robot<'_> {
         let up = at_height(&arm, height.max(arm.translation.z));
         batch.straight(&up);
         let location = Location::pose(holder.id, in_holder);
-        batch.changes.push(Change::Place { object: effector.id, location });
+        batch.changes.push(Change::Place {
+            object: effector.id,
+            location,
+        });
         batch.changes.push(Change::Arm(up));
         Ok(())
     }
@@ -332,7 +393,10 @@ impl Robot<'_> {
         let up = tip * tool.arm_from_tip().inverse();
         let robot = self.model.robot()?.id;
         let pose = self.model.workstation_from(robot)?.inv_mul(&up);
-        batch.changes.push(Change::Place { object: effector.id, location: Location::pose(robot, pose) });
+        batch.changes.push(Change::Place {
+            object: effector.id,
+            location: Location::pose(robot, pose),
+        });
         batch.changes.push(Change::Arm(up));
         Ok(())
     }

@@ -59,13 +59,26 @@ fn rest_to_rest(distance: f64, speed: f64, acceleration: f64) -> f64 {
 impl SimulatedMotion {
     fn time(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         let difference = from.inv_mul(to);
-        let line = rest_to_rest(difference.translation.vector.norm(), self.speed, self.acceleration);
+        let line = rest_to_rest(
+            difference.translation.vector.norm(),
+            self.speed,
+            self.acceleration,
+        );
         let angle = difference.rotation.angle();
-        line.max(rest_to_rest(angle, self.angular_speed, self.angular_acceleration))
+        line.max(rest_to_rest(
+            angle,
+            self.angular_speed,
+            self.angular_acceleration,
+        ))
     }
 
     fn target(&self, pose: &Pose, command: usize) -> Result<Isometry3<f64>, MotionFailure> {
-        let Pose::Axes { point, z_axis, x_axis } = pose else {
+        let Pose::Axes {
+            point,
+            z_axis,
+            x_axis,
+        } = pose
+        else {
             let reason = "a pose without axes".into();
             return Err(MotionFailure { command, reason });
         };
@@ -94,7 +107,10 @@ impl Motion for SimulatedMotion {
             let at = self.failures.remove(failure);
             self.executed = range.end;
             let reason = "the arm was made to fail here".into();
-            return Err(MotionFailure { command: at - range.start, reason });
+            return Err(MotionFailure {
+                command: at - range.start,
+                reason,
+            });
         }
         self.executed = range.end;
         Ok(seconds)
@@ -122,7 +138,9 @@ impl Motion for SimulatedMotion {
                 _ => {}
             }
             if let Some((_, changed)) = batch.tools.iter().find(|(after, _)| *after == index) {
-                let arm = tool.as_ref().map_or(at, |tool| at * tool.arm_from_tip().inverse());
+                let arm = tool
+                    .as_ref()
+                    .map_or(at, |tool| at * tool.arm_from_tip().inverse());
                 tool.clone_from(changed);
                 at = tip(&arm, &tool);
             }

@@ -56,7 +56,9 @@ impl Value {
     #[must_use]
     pub fn describe(&self, model: &Model) -> String {
         let name = |id: ObjectId| {
-            model.object(id).map_or_else(|_| format!("object {}", id.0), |o| o.name.clone())
+            model
+                .object(id)
+                .map_or_else(|_| format!("object {}", id.0), |o| o.name.clone())
         };
         match self {
             Self::Null => "Null".into(),

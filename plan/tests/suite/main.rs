@@ -3,4 +3,5 @@
 
 mod fixtures;
 mod reading;
+mod running;
 mod world;

@@ -83,3 +83,31 @@ fn layouts_agree() {
     let json = serde_json::to_string(&plan).unwrap();
     assert_eq!(read(&json).plan, plan);
 }
+
+/// Reading and checking the document's plan finds its known oddities, and nothing else.
+#[test]
+fn the_documents_oddities_are_found() {
+    let Some(text) = document_plan() else { return };
+    let reading = read(&text);
+    let world = plan::world::import_toml(&crate::fixtures::repository_text(
+        "examples/kitting/workstation-kitABCPlan.toml",
+    ))
+    .unwrap();
+    let mut findings = reading.findings;
+    findings.extend(plan::kitting::check(&reading.plan, Some(&world)));
+    let mut codes = BTreeMap::new();
+    for finding in findings.iter().filter(|f| f.severity != Severity::Note) {
+        assert_eq!(finding.severity, Severity::Warning, "{finding:?}");
+        *codes.entry(finding.code).or_insert(0) += 1;
+    }
+    let expected = [
+        ("plan::label", 1),
+        ("plan::capitals", 1),
+        ("plan::unquoted_type", 3),
+        ("plan::parentheses", 2),
+        ("plan::quoted_name", 2),
+        ("plan::single_equal", 3),
+        ("plan::object_and_text", 1),
+    ];
+    assert_eq!(codes, expected.into_iter().collect(), "13 warnings");
+}
