@@ -16,6 +16,8 @@ mod exit;
 mod failure;
 mod logging;
 mod output;
+#[allow(dead_code)]
+mod plot;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;
