@@ -4,6 +4,7 @@
 
 mod completions;
 mod fk;
+mod ik;
 mod man;
 mod robots;
 
@@ -15,20 +16,22 @@ use crate::failure::Failure;
 /// What `canter` can do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Fk(fk::Fk),
-    Robots(robots::Robots),
     Completions(completions::Completions),
+    Fk(fk::Fk),
+    Ik(ik::Ik),
     Man(man::Man),
+    Robots(robots::Robots),
 }
 
 impl Command {
     /// Runs the command that was given.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
-            Self::Fk(command) => command.run(),
-            Self::Robots(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Fk(command) => command.run(),
+            Self::Ik(command) => command.run(),
             Self::Man(command) => command.run(),
+            Self::Robots(command) => command.run(),
         }
     }
 }
