@@ -138,6 +138,21 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         &self.setpoint
     }
 
+    /// The command under way, or the last one.
+    pub fn command(&self) -> u32 {
+        self.command
+    }
+
+    /// Planned time since the command's start (s).
+    pub fn path_time(&self) -> f64 {
+        self.path_time
+    }
+
+    /// Share of the planned speed.
+    pub fn path_rate(&self) -> f64 {
+        self.governor.factor
+    }
+
     /// Forgets the plan; only at rest, says whether it did.
     pub fn flush(&mut self) -> bool {
         let resting = self.is_resting();
