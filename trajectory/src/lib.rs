@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod extrema;
 mod hermite_path;
 mod joint_line;
 mod limits;
@@ -20,6 +21,7 @@ pub mod timing;
 mod trajectory;
 
 pub use error::TimingError;
+pub use extrema::JointPeaks;
 pub use hermite_path::HermitePath;
 pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
