@@ -3,6 +3,7 @@
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
 mod completions;
+mod driver;
 mod fk;
 mod ik;
 mod man;
@@ -17,6 +18,7 @@ use crate::failure::Failure;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Completions(completions::Completions),
+    Driver(driver::Driver),
     Fk(fk::Fk),
     Ik(ik::Ik),
     Man(man::Man),
@@ -28,6 +30,7 @@ impl Command {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
             Self::Completions(command) => command.run(),
+            Self::Driver(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
             Self::Man(command) => command.run(),
