@@ -12,7 +12,9 @@ mod extrema;
 mod hermite_path;
 mod joint_line;
 mod limits;
+mod line;
 mod path;
+pub mod smooth;
 pub mod timing;
 mod trajectory;
 
@@ -21,6 +23,7 @@ pub use extrema::JointPeaks;
 pub use hermite_path::HermitePath;
 pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
+pub use line::Line;
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;

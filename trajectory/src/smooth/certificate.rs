@@ -1,0 +1,321 @@
+//! What is known of a motion for every moment, as data.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::options::SmoothOptions;
+use super::pass::{self, Pass, RESOLUTION};
+use super::poly::{bernstein, halve};
+use super::span::Span;
+
+/// Greatest ratio of a quantity to its limit, and when.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peak {
+    /// Upper bound of quantity / limit over the whole motion.
+    pub ratio: f64,
+    /// Middle of the stretch where the bound is reached, s.
+    pub time: f64,
+}
+
+impl Peak {
+    fn raise(&mut self, ratio: f64, time: f64) {
+        // `!(<=)`: a number that is not a number must fail the certificate.
+        if !(ratio <= self.ratio) {
+            *self = Self { ratio, time };
+        }
+    }
+}
+
+/// What holds for every moment of a smooth motion, not only at samples: bounds
+/// come from the convex hull of Bernstein coefficients.
+///
+/// # Source
+/// Convex hull property and subdivision: G. Farin, "Curves and Surfaces for
+/// CAGD", 5th edition 2002, chapter 5.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Certificate {
+    /// Each intermediate pose is passed within tolerance, in order, on its
+    /// first local closest approach.
+    pub in_order: bool,
+    /// Distance from the leg travelled / half width of the corridor.
+    pub corridor: Peak,
+    /// Speed of the controlled point / limit.
+    pub speed: Peak,
+    /// Acceleration of the controlled point / limit.
+    pub acceleration: Peak,
+    /// Jerk of the controlled point / limit.
+    pub jerk: Peak,
+    /// Angular speed / limit.
+    pub angular_speed: Peak,
+    /// Angular acceleration / limit.
+    pub angular_acceleration: Peak,
+    /// Angular jerk / limit.
+    pub angular_jerk: Peak,
+}
+
+/// Room for rounding in a ratio: 1 part in 1e9.
+const ROUNDING: f64 = 1.0 + 1e-9;
+
+impl Certificate {
+    /// True when the order, the tolerances, the corridor and all limits hold.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.in_order && self.corridor.ratio <= ROUNDING && self.worst_limit() <= ROUNDING
+    }
+
+    /// The greatest ratio over the six limits of motion.
+    #[must_use]
+    pub fn worst_limit(&self) -> f64 {
+        let mut worst = Peak::default();
+        for peak in self.limits() {
+            worst.raise(peak.ratio, 0.0);
+        }
+        worst.ratio
+    }
+
+    /// The factor by which time must be stretched so that all limits hold; 1
+    /// when they do. Stretching never changes the way.
+    pub(crate) fn stretch(&self) -> f64 {
+        let second = self
+            .acceleration
+            .ratio
+            .max(self.angular_acceleration.ratio)
+            .sqrt();
+        let third = self.jerk.ratio.max(self.angular_jerk.ratio).cbrt();
+        self.speed
+            .ratio
+            .max(self.angular_speed.ratio)
+            .max(second)
+            .max(third)
+            .max(1.0)
+    }
+
+    fn limits(&self) -> [Peak; 6] {
+        [
+            self.speed,
+            self.acceleration,
+            self.jerk,
+            self.angular_speed,
+            self.angular_acceleration,
+            self.angular_jerk,
+        ]
+    }
+}
+
+/// Certificate and passes of a motion.
+pub(crate) fn certify(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> (Certificate, Vec<Pass>) {
+    let mut certificate = Certificate::default();
+    for span in spans {
+        limits_of(span, options, &mut certificate);
+    }
+    let passes = pass::passes(spans, poses, options);
+    certificate.in_order = passes.iter().all(Pass::holds);
+    certificate.corridor = corridor(spans, poses, &passes, options.corridor());
+    (certificate, passes)
+}
+
+/// Raises the six peaks by one span.
+fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate) {
+    let (limits, d) = (&options.limits, span.duration);
+    let velocity = span.velocity_control(0.0, d);
+    let acceleration = span.acceleration_control(0.0, d);
+    let bounds = [
+        hull(&velocity, limits.speed, 6),
+        hull(&acceleration, limits.acceleration, 6),
+        hull(&span.jerk_control(0.0, d), limits.jerk, 0),
+    ];
+    let time = span.start + d / 2.0;
+    certificate.speed.raise(bounds[0], time);
+    certificate.acceleration.raise(bounds[1], time);
+    certificate.jerk.raise(bounds[2], time);
+    if !span.turns.is_empty() {
+        let angular = angular_bounds(span, options);
+        certificate.angular_speed.raise(angular[0], time);
+        certificate.angular_acceleration.raise(angular[1], time);
+        certificate.angular_jerk.raise(angular[2], time);
+    }
+}
+
+/// Upper bound of the norm of a Bernstein form over `limit`, refined by halving
+/// while it is above the limit and above what the ends show.
+fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> f64 {
+    let norms = control.map(|c| c.norm() / limit);
+    let bound = norms
+        .iter()
+        .fold(0.0, |worst: f64, n| if *n <= worst { worst } else { *n });
+    let ends = norms[0].max(norms[M - 1]);
+    if depth == 0 || bound <= 0.9 || bound <= ends * (1.0 + 1e-4) {
+        return bound;
+    }
+    let (left, right) = halve(control);
+    hull(&left, limit, depth - 1).max(hull(&right, limit, depth - 1))
+}
+
+/// Upper bounds of angular speed, acceleration and jerk over their limits.
+///
+/// On each of a few stretches the world axes of the turns are frozen at the
+/// middle, which leaves a polynomial to bound by its hull; what the axes move
+/// is bounded by norms and added.
+fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
+    let parts: u32 = if span.turns.len() == 1 { 1 } else { 4 };
+    let width = span.duration / f64::from(parts);
+    let limits = &options.limits;
+    let caps = [
+        limits.angular_speed,
+        limits.angular_acceleration,
+        limits.angular_jerk,
+    ];
+    let mut worst = [0.0_f64; 3];
+    for part in 0..parts {
+        let from = width * f64::from(part);
+        let bound = angular_stretch(span, from, from + width);
+        for k in 0..3 {
+            worst[k] = worst[k].max(bound[k] / caps[k]);
+        }
+    }
+    worst
+}
+
+/// Bounds of the norms of angular velocity and its two derivatives on the
+/// local interval `[from, to]`, rad/s, rad/s2, rad/s3.
+fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
+    let half = (to - from) / 2.0;
+    let mut rotation = span.base;
+    let (mut rate, mut rate2, mut rate3) = (
+        [Vector3::zeros(); 4],
+        [Vector3::zeros(); 3],
+        [Vector3::zeros(); 2],
+    );
+    // Bounds of the angular velocity and its derivative of the factors before.
+    let (mut before, mut before2, mut rest) = (0.0, 0.0, [0.0_f64; 3]);
+    let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(span.turns.len());
+    for turn in &span.turns {
+        let [c0, c1, c2, c3, c4] = turn.angle;
+        let middle = super::poly::quartic(&turn.angle, from + half)[0];
+        let axis = rotation * turn.axis;
+        let length = axis.norm();
+        let first = bernstein(&[c1, 2.0 * c2, 3.0 * c3, 4.0 * c4], from, to);
+        let second = bernstein(&[2.0 * c2, 6.0 * c3, 12.0 * c4], from, to);
+        let third = bernstein(&[6.0 * c3, 24.0 * c4], from, to);
+        let _ = c0;
+        let (m1, m2, m3) = (largest(&first), largest(&second), largest(&third));
+        // The axis turns with the factors before it; where they share its
+        // direction it does not turn at all.
+        let skew = axes
+            .iter()
+            .fold(0.0_f64, |worst, other| worst.max(sine(other, &axis)));
+        let skew = if skew < 1e-12 {
+            0.0
+        } else {
+            (skew + 2.0 * before * half).min(1.0)
+        };
+        let axis1 = length * before * skew;
+        let axis2 =
+            length * before2 * skew.max(if skew > 0.0 { 1.0 } else { 0.0 }) + before * axis1;
+        let drift = axis1 * half;
+        for (sum, c) in rate.iter_mut().zip(first) {
+            *sum += axis * c;
+        }
+        for (sum, c) in rate2.iter_mut().zip(second) {
+            *sum += axis * c;
+        }
+        for (sum, c) in rate3.iter_mut().zip(third) {
+            *sum += axis * c;
+        }
+        rest[0] += m1 * drift;
+        rest[1] += m2 * drift + m1 * axis1;
+        rest[2] += m3 * drift + 2.0 * m2 * axis1 + m1 * axis2;
+        before2 += length * m2 + axis1 * m1;
+        before += length * m1;
+        axes.push(axis);
+        rotation *= nalgebra::UnitQuaternion::from_scaled_axis(turn.axis * middle);
+    }
+    [
+        hull(&rate, 1.0, 4) + rest[0],
+        hull(&rate2, 1.0, 4) + rest[1],
+        hull(&rate3, 1.0, 0) + rest[2],
+    ]
+}
+
+fn largest<const M: usize>(control: &[f64; M]) -> f64 {
+    control.iter().fold(0.0, |worst: f64, c| worst.max(c.abs()))
+}
+
+/// Sine of the angle between two vectors; 0 when either vanishes.
+fn sine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    let product = a.norm() * b.norm();
+    if product > 0.0 {
+        a.cross(b).norm() / product
+    } else {
+        0.0
+    }
+}
+
+/// Greatest distance from the leg being travelled over the half width.
+fn corridor(spans: &[Span], poses: &[Isometry3<f64>], passes: &[Pass], width: f64) -> Peak {
+    let mut peak = Peak::default();
+    if width.is_infinite() {
+        return peak;
+    }
+    let room = width + RESOLUTION;
+    let mut at = 0;
+    let end = spans.last().map_or(0.0, Span::end);
+    for leg in 1..poses.len() {
+        let until = passes.get(leg - 1).map_or(end, |pass| pass.time);
+        let ends = [
+            poses[leg - 1].translation.vector,
+            poses[leg].translation.vector,
+        ];
+        let since = if leg == 1 { 0.0 } else { passes[leg - 2].time };
+        while at < spans.len() {
+            let span = &spans[at];
+            let from = (since - span.start).clamp(0.0, span.duration);
+            let to = (until - span.start).clamp(0.0, span.duration);
+            if to > from {
+                let control = span.position_control(from, to);
+                peak.raise(
+                    away(&control, &ends, room, 5) / room,
+                    span.start + (from + to) / 2.0,
+                );
+            }
+            if span.end() > until || at + 1 == spans.len() {
+                break;
+            }
+            at += 1;
+        }
+    }
+    peak
+}
+
+/// Upper bound of the distance of a Bernstein form from a segment: the
+/// distance to a convex set is convex, so the control points bound it.
+fn away(control: &[Vector3<f64>; 5], ends: &[Vector3<f64>; 2], room: f64, depth: u32) -> f64 {
+    let mut bound = 0.0;
+    for c in control {
+        let distance = to_segment(c, ends);
+        if !(distance <= bound) {
+            bound = distance;
+        }
+    }
+    if depth == 0 || bound <= 0.98 * room {
+        return bound;
+    }
+    let (left, right) = halve(control);
+    away(&left, ends, room, depth - 1).max(away(&right, ends, room, depth - 1))
+}
+
+/// Distance of a point from a segment, m.
+pub(crate) fn to_segment(point: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
+    let way = ends[1] - ends[0];
+    let square = way.norm_squared();
+    let share = if square > 0.0 {
+        ((point - ends[0]).dot(&way) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (point - ends[0] - way * share).norm()
+}

@@ -1,0 +1,162 @@
+//! What a smooth motion may do, and why one cannot be planned.
+
+use nalgebra::Isometry3;
+use thiserror::Error;
+
+use crate::ToolLimits;
+
+/// Lever arm (m) that turns a length tolerance into the default angular one.
+const LEVER: f64 = 0.1;
+
+/// Greatest default angular tolerance, rad.
+const WIDEST_ANGLE: f64 = 0.2;
+
+/// What a smooth motion may do.
+///
+/// ```
+/// use trajectory::{ToolLimits, smooth::SmoothOptions};
+/// let limits = ToolLimits {
+///     speed: 0.5, acceleration: 5.0, jerk: 100.0,
+///     angular_speed: 2.0, angular_acceleration: 20.0, angular_jerk: 400.0,
+/// };
+/// let options = SmoothOptions::new(0.001, limits);
+/// assert_eq!(options.corridor(), 0.001);
+/// assert!((options.angular_tolerance() - 0.01).abs() < 1e-15);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SmoothOptions {
+    /// Greatest distance at which an intermediate pose may be passed, m. Zero:
+    /// exact stop at every pose.
+    pub tolerance: f64,
+    /// Greatest distance of the controlled point from the leg it travels, m;
+    /// `None` means the tolerance, infinity means no corridor. A corridor
+    /// narrower than the tolerance narrows the tolerance too.
+    pub corridor: Option<f64>,
+    /// Greatest angle to the orientation of an intermediate pose at its
+    /// closest approach, rad; `None` means the angle whose arc at a lever of
+    /// 0.1 m is the tolerance, at most 0.2 rad.
+    pub angular_tolerance: Option<f64>,
+    /// Limits of the controlled point; infinity means no limit.
+    pub limits: ToolLimits,
+    /// Poses planned at once in a long list; 2 at least.
+    pub window: usize,
+}
+
+impl SmoothOptions {
+    /// Options with the defaults that follow from a tolerance (m) and limits.
+    #[must_use]
+    pub fn new(tolerance: f64, limits: ToolLimits) -> Self {
+        Self {
+            tolerance,
+            corridor: None,
+            angular_tolerance: None,
+            limits,
+            window: 25,
+        }
+    }
+
+    /// Half width of the corridor in force, m.
+    #[must_use]
+    pub fn corridor(&self) -> f64 {
+        self.corridor.unwrap_or(self.tolerance)
+    }
+
+    /// Angular tolerance in force, rad.
+    #[must_use]
+    pub fn angular_tolerance(&self) -> f64 {
+        self.angular_tolerance
+            .unwrap_or((self.tolerance / LEVER).min(WIDEST_ANGLE))
+    }
+
+    /// The options with each infinite limit replaced by a huge one, so that
+    /// ratios to it stay numbers.
+    pub(crate) fn finite(&self) -> Self {
+        let mut options = self.clone();
+        let limits = &mut options.limits;
+        for value in [&mut limits.speed, &mut limits.angular_speed] {
+            *value = value.min(1e6);
+        }
+        for value in [&mut limits.acceleration, &mut limits.angular_acceleration] {
+            *value = value.min(1e8);
+        }
+        for value in [&mut limits.jerk, &mut limits.angular_jerk] {
+            *value = value.min(1e10);
+        }
+        options
+    }
+
+    /// Checks every number of the options and of the poses.
+    pub(crate) fn check(&self, poses: &[Isometry3<f64>]) -> Result<(), SmoothError> {
+        if poses.is_empty() {
+            return Err(SmoothError::NoPose);
+        }
+        for (index, pose) in poses.iter().enumerate() {
+            let numbers = pose
+                .translation
+                .vector
+                .iter()
+                .chain(pose.rotation.coords.iter());
+            if let Some(value) = numbers.copied().find(|x| !(x.abs() <= 1e6)) {
+                return Err(SmoothError::BadPose { index, value });
+            }
+        }
+        let limits = &self.limits;
+        for (quantity, value) in [
+            ("speed", limits.speed),
+            ("acceleration", limits.acceleration),
+            ("jerk", limits.jerk),
+            ("angular speed", limits.angular_speed),
+            ("angular acceleration", limits.angular_acceleration),
+            ("angular jerk", limits.angular_jerk),
+        ] {
+            if !(value >= 1e-9) {
+                return Err(SmoothError::BadLimit { quantity, value });
+            }
+        }
+        for (quantity, value) in [
+            ("tolerance", self.tolerance),
+            ("corridor", self.corridor()),
+            ("angular tolerance", self.angular_tolerance()),
+        ] {
+            if !(value >= 0.0) {
+                return Err(SmoothError::BadTolerance { quantity, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why no smooth motion was planned. Each is a fault of the input; a list of
+/// sane poses always has a motion.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SmoothError {
+    /// The list is empty; the first pose is the start.
+    #[error("expected the start pose at least, got no pose")]
+    NoPose,
+    /// A pose has a number that is not finite, or beyond 1e6 m.
+    #[error("pose {index}: expected numbers within 1e6 of zero, got {value}")]
+    BadPose {
+        /// Which pose, the start being 0.
+        index: usize,
+        /// The number at fault.
+        value: f64,
+    },
+    /// A limit is below 1e-9 (SI) or not a number.
+    #[error("{quantity} limit: expected 1e-9 or more, got {value}")]
+    BadLimit {
+        /// Which limit.
+        quantity: &'static str,
+        /// The value at fault, SI.
+        value: f64,
+    },
+    /// A tolerance is negative or not a number.
+    #[error("{quantity}: expected zero or more, got {value}")]
+    BadTolerance {
+        /// Which tolerance.
+        quantity: &'static str,
+        /// The value at fault, m or rad.
+        value: f64,
+    },
+}

@@ -1,0 +1,235 @@
+//! The planned motion, and how it is chosen.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::certificate::{self, Certificate};
+use super::exact_stop;
+use super::options::{SmoothError, SmoothOptions};
+use super::pass::Pass;
+use super::span::Span;
+use crate::{ToolCurve, ToolPoint};
+
+/// How a motion, or a part of it, was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Method {
+    /// Nothing moves.
+    Still,
+    /// Straight legs with a stop at each pose.
+    ExactStop,
+}
+
+/// A certified motion through a list of poses, as a curve of time.
+///
+/// As a [`ToolCurve`] its parameter is time in s, from 0 to
+/// [`SmoothPlan::duration`]; it is at rest at both ends, and the derivatives
+/// are velocity, acceleration and jerk (m/s^k, rad/s^k).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothPlan {
+    start: Isometry3<f64>,
+    goal: Isometry3<f64>,
+    spans: Vec<Span>,
+    passes: Vec<Pass>,
+    certificate: Certificate,
+    method: Method,
+    exact_stop: f64,
+}
+
+impl SmoothPlan {
+    /// Time of the whole motion, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.spans.last().map_or(0.0, Span::end)
+    }
+
+    /// How each intermediate pose is passed, in order.
+    #[must_use]
+    pub fn passes(&self) -> &[Pass] {
+        &self.passes
+    }
+
+    /// What holds for every moment of the motion.
+    #[must_use]
+    pub fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+
+    /// How the motion was made.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Time the motion would take with a stop at each pose, s.
+    #[must_use]
+    pub fn exact_stop(&self) -> f64 {
+        self.exact_stop
+    }
+
+    /// The span of a time and the time within it.
+    fn span(&self, time: f64) -> Option<(&Span, f64)> {
+        let next = self.spans.partition_point(|span| span.start <= time);
+        let span = self.spans.get(next.saturating_sub(1))?;
+        Some((span, (time - span.start).clamp(0.0, span.duration)))
+    }
+}
+
+impl ToolCurve for SmoothPlan {
+    fn end(&self) -> f64 {
+        self.duration()
+    }
+
+    fn knots(&self) -> Vec<f64> {
+        let starts = self.spans.iter().map(|span| span.start);
+        starts.chain([self.duration()]).collect()
+    }
+
+    fn at(&self, u: f64) -> ToolPoint {
+        let still = |pose| ToolPoint {
+            pose,
+            linear: [Vector3::zeros(); 3],
+            angular: [Vector3::zeros(); 3],
+        };
+        match self.span(u) {
+            _ if u >= self.duration() => still(self.goal),
+            Some((span, local)) => span.at(local),
+            None => still(self.start),
+        }
+    }
+}
+
+/// Plans a motion from the first pose to the last that passes those between in
+/// order, each within tolerance: the fastest motion that is certified.
+///
+/// Poses are in one frame of the caller's choice, lengths in m. It is at rest
+/// at both ends. A list of one pose, or of equal poses, gives a plan of no
+/// duration.
+///
+/// # Errors
+/// [`SmoothError`] when a number of the input is unusable; never because a
+/// motion is hard.
+///
+/// ```
+/// use nalgebra::Isometry3;
+/// use trajectory::{ToolLimits, smooth};
+/// let limits = ToolLimits {
+///     speed: 0.5, acceleration: 5.0, jerk: 100.0,
+///     angular_speed: 2.0, angular_acceleration: 20.0, angular_jerk: 400.0,
+/// };
+/// let corner = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]];
+/// let poses = corner.map(|[x, y]| Isometry3::translation(x, y, 0.0));
+/// let plan = smooth::plan(&poses, &smooth::SmoothOptions::new(0.001, limits))?;
+/// assert!(plan.certificate().holds());
+/// assert!(plan.passes()[0].deviation <= 0.001);
+/// assert!(plan.duration() <= plan.exact_stop());
+/// # Ok::<(), smooth::SmoothError>(())
+/// ```
+pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
+    options.check(poses)?;
+    let options = &options.finite();
+    let spans = exact_stop::plan(poses, &options.limits);
+    let (certificate, passes) = certificate::certify(&spans, poses, options);
+    let method = if spans.is_empty() {
+        Method::Still
+    } else {
+        Method::ExactStop
+    };
+    let exact_stop = spans.last().map_or(0.0, Span::end);
+    let (start, goal) = (poses[0], poses[poses.len() - 1]);
+    Ok(SmoothPlan {
+        start,
+        goal,
+        spans,
+        passes,
+        certificate,
+        method,
+        exact_stop,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ToolLimits;
+
+    fn limits() -> ToolLimits {
+        ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 2.0,
+            angular_acceleration: 20.0,
+            angular_jerk: 400.0,
+        }
+    }
+
+    fn check(poses: &[Isometry3<f64>], tolerance: f64) -> SmoothPlan {
+        let plan = plan(poses, &SmoothOptions::new(tolerance, limits())).unwrap();
+        assert!(
+            plan.certificate().holds(),
+            "{:?} {:?}",
+            plan.certificate(),
+            plan.passes()
+        );
+        assert!(plan.duration() <= plan.exact_stop());
+        plan
+    }
+
+    #[test]
+    fn degenerate_lists() {
+        let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+        let turned =
+            |x: f64, angle: f64| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::z() * angle);
+        for tolerance in [0.0, 1e-5, 1e-3, 10.0] {
+            check(&[at(0.0, 0.0)], tolerance);
+            check(&[at(0.1, 0.0); 4], tolerance);
+            check(&[at(0.0, 0.0), at(0.1, 0.0)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.0), at(0.2, 0.0)],
+                tolerance,
+            );
+            check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 0.0)], tolerance);
+            check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 1e-4)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(1e-6, 0.0), at(0.0, 1e-6), at(1e-6, 1e-6)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 1.0)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 0.0)],
+                tolerance,
+            );
+            check(
+                &[
+                    turned(0.0, 0.0),
+                    turned(0.1, 0.5),
+                    turned(0.1, 1.0),
+                    turned(0.2, 0.0),
+                ],
+                tolerance,
+            );
+        }
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let options = SmoothOptions::new(0.001, limits());
+        assert_eq!(plan(&[], &options).unwrap_err(), SmoothError::NoPose);
+        let bad = [
+            Isometry3::identity(),
+            Isometry3::translation(f64::NAN, 0.0, 0.0),
+        ];
+        assert!(matches!(
+            plan(&bad, &options),
+            Err(SmoothError::BadPose { index: 1, .. })
+        ));
+        let negative = SmoothOptions::new(-1.0, limits());
+        assert!(matches!(
+            plan(&bad[..1], &negative),
+            Err(SmoothError::BadTolerance { .. })
+        ));
+    }
+}

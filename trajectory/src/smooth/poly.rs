@@ -1,0 +1,139 @@
+//! Polynomials on an interval: power form, Bernstein form, products.
+//!
+//! The curve of a polynomial lies in the convex hull of its Bernstein
+//! coefficients, so a bound on the coefficients is a bound for every moment.
+//!
+//! # Source
+//! G. Farin, "Curves and Surfaces for CAGD", 5th edition 2002, chapters 5, 6.
+
+use std::ops::{Add, Mul};
+
+use nalgebra::Vector3;
+
+/// Binomial coefficients up to row 7.
+const CHOOSE: [[f64; 8]; 8] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 3.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 4.0, 6.0, 4.0, 1.0, 0.0, 0.0, 0.0],
+    [1.0, 5.0, 10.0, 10.0, 5.0, 1.0, 0.0, 0.0],
+    [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0, 0.0],
+    [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0],
+];
+
+/// Bernstein coefficients on `[from, to]` of the polynomial
+/// `sum_k power[k] t^k` of degree `M - 1 <= 7`.
+pub(crate) fn bernstein<T, const M: usize>(power: &[T; M], from: f64, to: f64) -> [T; M]
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let mut shifted = *power;
+    // Taylor shift to `from` by repeated synthetic division.
+    if from != 0.0 {
+        for low in 0..M.saturating_sub(1) {
+            for k in (low..M - 1).rev() {
+                shifted[k] = shifted[k] + shifted[k + 1] * from;
+            }
+        }
+    }
+    let (mut scale, degree) = (1.0, M - 1);
+    for (k, value) in shifted.iter_mut().enumerate() {
+        *value = *value * (scale / CHOOSE[degree][k]);
+        scale *= to - from;
+    }
+    let mut result = shifted;
+    for (i, value) in result.iter_mut().enumerate().skip(1) {
+        *value = shifted[0];
+        for k in 1..=i {
+            *value = *value + shifted[k] * CHOOSE[i][k];
+        }
+    }
+    result
+}
+
+/// Both halves of a polynomial in Bernstein form (de Casteljau).
+pub(crate) fn halve<T, const M: usize>(control: &[T; M]) -> ([T; M], [T; M])
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let (mut left, mut right) = (*control, *control);
+    for level in 1..M {
+        for k in 0..M - level {
+            right[k] = (right[k] + right[k + 1]) * 0.5;
+        }
+        left[level] = right[0];
+    }
+    (left, right)
+}
+
+/// Bernstein coefficients of the dot product of a quartic and a cubic.
+pub(crate) fn dot(quartic: &[Vector3<f64>; 5], cubic: &[Vector3<f64>; 4]) -> [f64; 8] {
+    let mut product = [0.0; 8];
+    for (i, a) in quartic.iter().enumerate() {
+        for (j, b) in cubic.iter().enumerate() {
+            product[i + j] += a.dot(b) * CHOOSE[4][i] * CHOOSE[3][j] / CHOOSE[7][i + j];
+        }
+    }
+    product
+}
+
+/// Value and three derivatives at `t` of the quartic `sum_k power[k] t^k`.
+pub(crate) fn quartic<T>(power: &[T; 5], t: f64) -> [T; 4]
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let [c0, c1, c2, c3, c4] = *power;
+    [
+        c0 + (c1 + (c2 + (c3 + c4 * t) * t) * t) * t,
+        c1 + (c2 * 2.0 + (c3 * 3.0 + c4 * (4.0 * t)) * t) * t,
+        c2 * 2.0 + (c3 * 6.0 + c4 * (12.0 * t)) * t,
+        c3 * 6.0 + c4 * (24.0 * t),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+
+    fn value(power: &[f64; 5], t: f64) -> f64 {
+        quartic(power, t)[0]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(2), ..ProptestConfig::default() })]
+
+        /// Ends are interpolated, the hull holds, and halves agree with the whole.
+        #[test]
+        fn hull_holds(power in prop::array::uniform5(-2.0..2.0_f64), from in -1.0..1.0_f64, width in 0.01..2.0_f64) {
+            let to = from + width;
+            let control = bernstein(&power, from, to);
+            assert_relative_eq!(control[0], value(&power, from), epsilon = 1e-10);
+            assert_relative_eq!(control[4], value(&power, to), epsilon = 1e-10);
+            let (low, high) = control.iter().fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(*c), h.max(*c)));
+            for i in 0..=20 {
+                let x = value(&power, from + width * f64::from(i) / 20.0);
+                prop_assert!(low - 1e-10 <= x && x <= high + 1e-10);
+            }
+            let (left, right) = halve(&control);
+            assert_relative_eq!(left[4], value(&power, from + width / 2.0), epsilon = 1e-10);
+            assert_relative_eq!(right[0], left[4], epsilon = 1e-12);
+            assert_relative_eq!(right[4], control[4], epsilon = 1e-12);
+        }
+
+        /// The product's Bernstein form is the product.
+        #[test]
+        fn product_is_a_product(a in prop::array::uniform5(-2.0..2.0_f64), b in prop::array::uniform4(-2.0..2.0_f64)) {
+            let q = a.map(|x| Vector3::new(x, 1.0 - x, 0.5));
+            let c = b.map(|x| Vector3::new(x, x * x, 2.0));
+            let product = dot(&q, &c);
+            assert_relative_eq!(product[0], q[0].dot(&c[0]), epsilon = 1e-12);
+            assert_relative_eq!(product[7], q[4].dot(&c[3]), epsilon = 1e-12);
+            let middle = halve(&product).0[7];
+            assert_relative_eq!(middle, halve(&q).0[4].dot(&halve(&c).0[3]), epsilon = 1e-12);
+        }
+    }
+}

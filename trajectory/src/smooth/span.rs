@@ -1,0 +1,164 @@
+//! One stretch of a smooth motion: a polynomial in time.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use super::poly;
+use crate::ToolPoint;
+
+/// One factor of the orientation: a turn by a polynomial angle about an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Turn {
+    /// Axis times a constant scale, in the axes left by the factors before.
+    pub(crate) axis: Vector3<f64>,
+    /// Quartic `sum_k angle[k] t^k`; the rotation vector is `axis * angle(t)`.
+    pub(crate) angle: [f64; 5],
+}
+
+/// One stretch: for `0 <= t <= duration` (s) the controlled point is
+/// `sum_k point[k] t^k` (m) and the orientation
+/// `base * exp(axis_0 angle_0(t)) * exp(axis_1 angle_1(t)) * ..`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Span {
+    /// Time at which the span starts, s.
+    pub(crate) start: f64,
+    pub(crate) duration: f64,
+    pub(crate) point: [Vector3<f64>; 5],
+    pub(crate) base: UnitQuaternion<f64>,
+    pub(crate) turns: Vec<Turn>,
+}
+
+impl Span {
+    /// Time at which the span ends, s.
+    pub(crate) fn end(&self) -> f64 {
+        self.start + self.duration
+    }
+
+    /// Position, velocity, acceleration and jerk at local time `t`.
+    pub(crate) fn motion(&self, t: f64) -> [Vector3<f64>; 4] {
+        poly::quartic(&self.point, t)
+    }
+
+    /// Orientation at local time `t`.
+    pub(crate) fn rotation(&self, t: f64) -> UnitQuaternion<f64> {
+        self.turns.iter().fold(self.base, |rotation, turn| {
+            let angle = poly::quartic(&turn.angle, t)[0];
+            rotation * UnitQuaternion::from_scaled_axis(turn.axis * angle)
+        })
+    }
+
+    /// Pose and derivatives to time at local time `t`.
+    ///
+    /// With the world axis `a_j` of factor `j` and the angular velocity
+    /// `W_j` of the factors before it, `a_j' = W_j x a_j`; the angular velocity
+    /// is the sum of `angle_j' a_j`, and its derivatives follow.
+    pub(crate) fn at(&self, t: f64) -> ToolPoint {
+        let [point, velocity, acceleration, jerk] = self.motion(t);
+        let mut rotation = self.base;
+        let mut angular = [Vector3::zeros(); 3];
+        for turn in &self.turns {
+            let [angle, rate, rate2, rate3] = poly::quartic(&turn.angle, t);
+            let axis = rotation * turn.axis;
+            let axis1 = angular[0].cross(&axis);
+            let axis2 = angular[1].cross(&axis) + angular[0].cross(&axis1);
+            angular[0] += axis * rate;
+            angular[1] += axis * rate2 + axis1 * rate;
+            angular[2] += axis * rate3 + axis1 * (2.0 * rate2) + axis2 * rate;
+            rotation *= UnitQuaternion::from_scaled_axis(turn.axis * angle);
+        }
+        ToolPoint {
+            pose: Isometry3::from_parts(point.into(), rotation),
+            linear: [velocity, acceleration, jerk],
+            angular,
+        }
+    }
+
+    /// Position in Bernstein form on the local interval `[from, to]`.
+    pub(crate) fn position_control(&self, from: f64, to: f64) -> [Vector3<f64>; 5] {
+        poly::bernstein(&self.point, from, to)
+    }
+
+    /// Velocity in Bernstein form on the local interval `[from, to]`.
+    pub(crate) fn velocity_control(&self, from: f64, to: f64) -> [Vector3<f64>; 4] {
+        poly::bernstein(&first(&self.point), from, to)
+    }
+
+    /// Acceleration in Bernstein form on the local interval `[from, to]`.
+    pub(crate) fn acceleration_control(&self, from: f64, to: f64) -> [Vector3<f64>; 3] {
+        let [_, _, c2, c3, c4] = self.point;
+        poly::bernstein(&[c2 * 2.0, c3 * 6.0, c4 * 12.0], from, to)
+    }
+
+    /// Jerk at both ends of the local interval `[from, to]`; linear between.
+    pub(crate) fn jerk_control(&self, from: f64, to: f64) -> [Vector3<f64>; 2] {
+        let [_, _, _, c3, c4] = self.point;
+        [c3 * 6.0 + c4 * (24.0 * from), c3 * 6.0 + c4 * (24.0 * to)]
+    }
+}
+
+/// Power form of the first derivative of a quartic.
+fn first(power: &[Vector3<f64>; 5]) -> [Vector3<f64>; 4] {
+    let [_, c1, c2, c3, c4] = *power;
+    [c1, c2 * 2.0, c3 * 3.0, c4 * 4.0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn span() -> Span {
+        let turn = |x: f64, y: f64| Turn {
+            axis: Vector3::new(x, y, 0.3),
+            angle: [0.1, 0.4 * x, -0.3, 0.2 * y, 0.5],
+        };
+        Span {
+            start: 1.0,
+            duration: 2.0,
+            point: [0.1, 0.2, -0.3, 0.4, 0.05].map(|x| Vector3::new(x, -x, x * x)),
+            base: UnitQuaternion::from_euler_angles(0.1, 0.2, 0.3),
+            turns: vec![turn(1.0, 0.2), turn(-0.3, 0.8), turn(0.0, 1.0)],
+        }
+    }
+
+    /// Angular velocity and its derivatives agree with difference quotients.
+    #[test]
+    fn derivatives_are_derivatives() {
+        let (span, t, d) = (span(), 0.7, 1e-5);
+        let (a, b, c) = (span.at(t - d), span.at(t), span.at(t + d));
+        let turned = (c.pose.rotation * a.pose.rotation.inverse()).scaled_axis() / (2.0 * d);
+        assert_relative_eq!(turned, b.angular[0], epsilon = 1e-7);
+        for k in 0..2 {
+            assert_relative_eq!(
+                (c.angular[k] - a.angular[k]) / (2.0 * d),
+                b.angular[k + 1],
+                epsilon = 1e-6
+            );
+            assert_relative_eq!(
+                (c.linear[k] - a.linear[k]) / (2.0 * d),
+                b.linear[k + 1],
+                epsilon = 1e-6
+            );
+        }
+        assert_relative_eq!(b.pose.rotation, span.rotation(t), epsilon = 1e-14);
+    }
+
+    /// The control forms interpolate the motion at the ends of any interval.
+    #[test]
+    fn control_forms_interpolate() {
+        let span = span();
+        let (low, high) = (span.motion(0.3), span.motion(1.1));
+        let p = span.position_control(0.3, 1.1);
+        let v = span.velocity_control(0.3, 1.1);
+        let a = span.acceleration_control(0.3, 1.1);
+        let j = span.jerk_control(0.3, 1.1);
+        for (first, last, k) in [
+            (p[0], p[4], 0),
+            (v[0], v[3], 1),
+            (a[0], a[2], 2),
+            (j[0], j[1], 3),
+        ] {
+            assert_relative_eq!(first, low[k], epsilon = 1e-12);
+            assert_relative_eq!(last, high[k], epsilon = 1e-12);
+        }
+    }
+}
