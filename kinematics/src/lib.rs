@@ -9,10 +9,15 @@
 //! | [`urdf`] | reads a URDF, checks it, finds the chain of joints from root to tip |
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
 #![doc = ""]
+//! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
+//! | [`measure`] | manipulability, singular values, condition number |
 
 mod arith;
 pub mod chain;
+pub mod ik;
+pub mod measure;
 pub mod urdf;
 
 pub use chain::Chain;
+pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
 pub use urdf::{Model, UrdfError};

@@ -2,4 +2,5 @@
 
 mod arms;
 mod chain;
+mod ik;
 mod urdf;
