@@ -14,7 +14,9 @@ mod joint_line;
 mod limits;
 mod line;
 mod path;
+
 pub mod smooth;
+mod spline_path;
 pub mod timing;
 mod trajectory;
 
@@ -25,5 +27,7 @@ pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
 pub use line::Line;
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
+pub use spline_path::SplinePath;
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
+pub mod otg;
