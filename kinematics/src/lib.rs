@@ -10,10 +10,12 @@
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
 #![doc = ""]
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
+//! | [`follow`] | joint positions and derivatives along a curve of the tool |
 //! | [`measure`] | manipulability, singular values, condition number |
 
 mod arith;
 pub mod chain;
+pub mod follow;
 pub mod ik;
 pub mod measure;
 pub mod urdf;
