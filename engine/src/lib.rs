@@ -12,6 +12,7 @@ pub mod command_error;
 pub mod controller;
 mod dof;
 pub mod dry_run;
+pub mod executor;
 pub mod modal;
 pub mod planner;
 pub mod queue;

@@ -10,7 +10,7 @@
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
 #![doc = ""]
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
-//! | [`follow`] | joint positions and derivatives along a curve of the tool |
+//! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
 //! | [`measure`] | manipulability, singular values, condition number |
 
 mod arith;
@@ -21,5 +21,6 @@ pub mod measure;
 pub mod urdf;
 
 pub use chain::Chain;
+pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
 pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
 pub use urdf::{Model, UrdfError};

@@ -1,7 +1,7 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
 use kinematics::Chain;
-use kinematics::follow::{self, Cause, FollowError, FollowPoint, TwistPoint};
+use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 use trajectory::{
@@ -86,15 +86,13 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let mut grid = first_grid(curve);
-        let mut points = self.solved(curve, &grid, start, towards)?;
+        let mut points = self.solved(curve, &first_grid(curve), start, towards)?;
         for _ in 0..REFINEMENTS {
             let finer = refined(self.chain(), &points, curve);
-            if finer.len() == grid.len() || finer.len() > MOST_POINTS {
+            if finer.len() == points.len() || finer.len() > MOST_POINTS {
                 break;
             }
-            grid = finer;
-            points = self.solved(curve, &grid, start, towards)?;
+            points = self.solved(curve, &finer, start, towards)?;
         }
         Ok(points)
     }
@@ -121,13 +119,18 @@ impl<const N: usize> Planner<N> {
         end: f64,
         towards: &dyn Fn(f64) -> usize,
     ) -> MotionError {
-        let cause = match error.cause {
-            Cause::Limit { joint, beyond } => format!(
-                "joint {} would have to go {} beyond its limit",
-                self.joint_name(joint),
-                self.amount(joint, beyond)
+        let joint = error.joint.map_or_else(String::new, |joint| self.joint_name(joint));
+        let cause = match (error.cause, error.joint) {
+            (FollowCause::Limit, Some(index)) => format!(
+                "joint {joint} would pass its limit by {}",
+                self.amount(index, error.amount)
             ),
-            other => other.to_string(),
+            (FollowCause::Singular, _) => format!(
+                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                error.amount
+            ),
+            (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
+            (_, _) => error.to_string(),
         };
         MotionError::Blocked { pose: towards(error.u), percent: 100.0 * error.u / end, cause }
     }

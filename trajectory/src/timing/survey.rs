@@ -7,7 +7,7 @@ use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
 /// Cells that a survey spreads over the path, besides those at the knots.
-const CELLS: usize = 96;
+const CELLS: usize = 256;
 /// Least number of cells from one knot to the next.
 const PER_KNOT: f64 = 4.0;
 /// Share of the path parameter by which one-sided values stand aside from a knot.
@@ -148,7 +148,7 @@ fn places<const N: usize>(
     if let Some(last) = knots.last_mut() {
         *last = end;
     }
-    let wanted = options.cells.unwrap_or(CELLS).clamp(16, 400);
+    let wanted = CELLS;
     let step = end / wanted as f64;
     let mut at = Vec::new();
     for pair in knots.windows(2) {
