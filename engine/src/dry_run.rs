@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crcl::Program;
+use crcl::{LengthUnit, Program};
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
@@ -10,7 +10,6 @@ use trajectory::Trajectory;
 
 use crate::command_error::CommandError;
 use crate::controller::{Controller, Step};
-use crate::modal::LengthUnit;
 use crate::planner::MoveCertificate;
 use crate::robot::{Robot, RobotError};
 use crate::with_dof;
@@ -188,7 +187,7 @@ fn plan_with<const N: usize>(
     let mut controller = Controller::<N>::new(robot, options.rate_hz, options.default_length)?;
     let mut plan = Plan {
         schema: 1,
-        robot: robot.name().to_owned(),
+        robot: robot.name.clone(),
         dof: N,
         duration_s: 0.0,
         planning_s: 0.0,
@@ -292,5 +291,52 @@ impl<const N: usize> Motion for ArmMotion<N> {
             dddq: list(&joints.jerk),
             workstation_from_tool: self.chain.forward(&joints.position),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROGRAM: &str = r#"
+InitCanon()
+SetRelativeSpeed(50)
+SetRelativeAcceleration(50)
+SetIntermediatePointTolerance(2)
+MoveTo({{400, -100, 300}, {0, 0, -1}, {1, 0, 0}})
+MoveStraightTo({{400, 100, 300}, {0, 0, -1}, {1, 0, 0}})
+OpenGripper()
+Dwell(0.1)
+MoveSmoothlyTo({{{400, 100, 200}, {0, 0, -1}, {1, 0, 0}}, {{400, -100, 200}, {0, 0, -1}, {1, 0, 0}},
+  {{400, -100, 300}, {0, 0, -1}, {1, 0, 0}}}, 3)
+EndCanon(0)
+"#;
+
+    fn planned(robot: &str) -> Plan {
+        let robot = crate::robot::load(robot).unwrap();
+        let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
+        plan_program(&robot, &program, &PlanOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_program_is_planned_and_certified() {
+        for robot in ["ur5e", "panda", "irb120"] {
+            let plan = planned(robot);
+            assert!(plan.refusals.is_empty(), "{robot}: {:?}", plan.refusals);
+            assert_eq!(plan.commands.len(), 10);
+            for command in plan.commands.iter().filter_map(|c| c.certificate.as_ref()) {
+                assert!(command.peaks.largest() <= 1.0 + 1e-9, "{robot}: {command:?}");
+            }
+            println!("{robot} {} s planned in {} s", plan.duration_s, plan.planning_s);
+            for command in &plan.commands {
+                println!("{} {} {} {:?}", command.name, command.duration_s, command.planning_s, command.certificate);
+            }
+        }
+    }
+
+    #[test]
+    fn two_dry_runs_are_equal() {
+        let (a, b) = (planned("ur5e"), planned("ur5e"));
+        assert!(a.samples(0.01).eq(b.samples(0.01)));
     }
 }

@@ -24,7 +24,6 @@ pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 
-use audit::Audit;
 use grid::{Bounded, Grid};
 use survey::Survey;
 
