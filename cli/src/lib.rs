@@ -17,9 +17,12 @@ mod exit;
 mod failure;
 mod logging;
 mod output;
-#[allow(dead_code)]
+mod picture;
+
 mod plot;
+mod program;
 mod robot;
+mod samples;
 mod table;
 
 use std::panic::catch_unwind;
