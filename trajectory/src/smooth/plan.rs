@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, Vector3};
 use super::certificate::{self, Certificate};
 use super::exact_stop;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::Pass;
+use super::pass::{Pass, RESOLUTION};
 use super::span::Span;
+use super::spline::{self, Effort};
 use crate::{ToolCurve, ToolPoint};
 
 /// How a motion, or a part of it, was made.
@@ -17,6 +18,8 @@ pub enum Method {
     Still,
     /// Straight legs with a stop at each pose.
     ExactStop,
+    /// The time-optimal spline.
+    Spline,
 }
 
 /// A certified motion through a list of poses, as a curve of time.
@@ -58,6 +61,12 @@ impl SmoothPlan {
     #[must_use]
     pub fn method(&self) -> Method {
         self.method
+    }
+
+    /// Parts of the motion that are not the time-optimal spline.
+    #[must_use]
+    pub fn fallbacks(&self) -> usize {
+        usize::from(self.method == Method::ExactStop && self.passes.len() > 0)
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -127,24 +136,28 @@ impl ToolCurve for SmoothPlan {
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
     let options = &options.finite();
-    let spans = exact_stop::plan(poses, &options.limits);
-    let (certificate, passes) = certificate::certify(&spans, poses, options);
-    let method = if spans.is_empty() {
-        Method::Still
-    } else {
-        Method::ExactStop
-    };
-    let exact_stop = spans.last().map_or(0.0, Span::end);
+    let stop = exact_stop::plan(poses, &options.limits);
+    let exact_stop = stop.last().map_or(0.0, Span::end);
+    let method = if stop.is_empty() { Method::Still } else { Method::ExactStop };
+    let (certificate, passes) = certificate::certify(&stop, poses, options);
     let (start, goal) = (poses[0], poses[poses.len() - 1]);
-    Ok(SmoothPlan {
-        start,
-        goal,
-        spans,
-        passes,
-        certificate,
-        method,
-        exact_stop,
-    })
+    let mut best = SmoothPlan { start, goal, spans: stop, passes, certificate, method, exact_stop };
+    if let Some(better) = blend(poses, options, &best) {
+        best = better;
+    }
+    Ok(best)
+}
+
+/// The spline, when it is certified and faster.
+fn blend(poses: &[Isometry3<f64>], options: &SmoothOptions, stop: &SmoothPlan) -> Option<SmoothPlan> {
+    if poses.len() < 3 || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
+        return None;
+    }
+    let effort = Effort { steps: 120, gap: 3e-3 };
+    let spans = spline::plan(poses, options, None, effort, 1.0)?;
+    let (certificate, passes) = certificate::certify(&spans, poses, options);
+    let plan = SmoothPlan { spans, passes, certificate, method: Method::Spline, ..stop.clone() };
+    (plan.certificate.holds() && plan.duration() < stop.duration()).then_some(plan)
 }
 
 #[cfg(test)]
