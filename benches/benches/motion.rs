@@ -66,6 +66,7 @@ fn cases() -> Vec<Case> {
 }
 
 fn main() {
+    if let Ok(name) = std::env::var("CASE") { let l = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED }; for c in cases() { if c.name == name { println!("{:?}", measure(&c.poses, &SmoothOptions::new(c.tolerance, l))); } } return; }
     let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
     println!("case        poses motion_s exact_s plan_ms first_ms deviat corrid veloc  accel  jerk   ok fallbacks");
     let (mut sum, mut lines, mut worst) = (0.0, Vec::new(), 0.0_f64);

@@ -1,6 +1,7 @@
 //! Passing times: the closest approach to each ball, in order; and how much
 //! room an iterate needs.
 
+use super::basis::{FIRST, SECOND, THIRD};
 use super::problem::{Point, Problem, Room, offset, part, square};
 
 /// Iterates are held this far inside the widened bounds.
@@ -47,6 +48,27 @@ pub(crate) fn miss<const D: usize>(problem: &Problem<D>, point: &Point<D>, i: us
     square(&[p[0] - goal[0], p[1] - goal[1], p[2] - goal[2]]).sqrt()
 }
 
+/// Greatest ratio of the differences of order 1 to 3 to their bounds, by group.
+pub(crate) fn ratios<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[f64; 3]; 2] {
+    let mut worst = [[0.0_f64; 3]; 2];
+    let (last, h) = (point.control.len() - 1, problem.spacing(point.z));
+    for g in 0..Problem::<D>::GROUPS {
+        for k in 0..last {
+            worst[g][0] = worst[g][0].max(square(&point.sum(k, &FIRST, g)));
+            if k + 2 <= last {
+                worst[g][1] = worst[g][1].max(square(&point.sum(k, &SECOND, g)));
+            }
+            if k + 3 <= last {
+                worst[g][2] = worst[g][2].max(square(&point.sum(k, &THIRD, g)));
+            }
+        }
+        for k in 0..3 {
+            worst[g][k] = worst[g][k].sqrt() / (problem.groups[g].caps[k] * h.powi(k as i32 + 1));
+        }
+    }
+    worst
+}
+
 impl Room {
     /// Room for an iterate about which nothing is known yet.
     pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
@@ -64,8 +86,8 @@ impl Room {
     /// corridor samples to their legs. True when nothing is widened any more.
     pub(crate) fn tighten<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>) -> bool {
         let mut tight = true;
-        for g in 0..Problem::<D>::GROUPS {
-            tight &= self.tighten_caps(problem, point, g);
+        for (g, ratios) in ratios(problem, point).iter().enumerate().take(Problem::<D>::GROUPS) {
+            tight &= self.tighten_caps(ratios, g);
             let radius = problem.groups[g].radius;
             for i in 0..point.passes.len() {
                 let need = (WIDEN * miss(problem, point, i, g)).max(radius);
@@ -79,24 +101,10 @@ impl Room {
         tight
     }
 
-    fn tighten_caps<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>, g: usize) -> bool {
-        use super::basis::{FIRST, SECOND, THIRD};
-        let mut worst = [0.0_f64; 3];
-        let last = point.control.len() - 1;
-        for k in 0..last {
-            worst[0] = worst[0].max(square(&point.sum(k, &FIRST, g)));
-            if k + 2 <= last {
-                worst[1] = worst[1].max(square(&point.sum(k, &SECOND, g)));
-            }
-            if k + 3 <= last {
-                worst[2] = worst[2].max(square(&point.sum(k, &THIRD, g)));
-            }
-        }
-        let h = problem.spacing(point.z);
+    fn tighten_caps(&mut self, ratios: &[f64; 3], g: usize) -> bool {
         let mut tight = true;
         for k in 0..3 {
-            let ratio = worst[k].sqrt() / (problem.groups[g].caps[k] * h.powi(k as i32 + 1));
-            self.caps[g][k] = self.caps[g][k].min((WIDEN * ratio).max(1.0));
+            self.caps[g][k] = self.caps[g][k].min((WIDEN * ratios[k]).max(1.0));
             tight &= self.caps[g][k] <= 1.0;
         }
         tight

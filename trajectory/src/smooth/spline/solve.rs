@@ -17,6 +17,10 @@ pub(crate) struct Effort {
 /// Growth of the weight on `z` at each centre.
 const GROWTH: f64 = 8.0;
 
+/// Steps between two narrowings of widened bounds: the steps between take the
+/// iterate well inside, so that each narrowing is a large one.
+const PATIENCE: usize = 4;
+
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
 
@@ -35,35 +39,54 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let mut system = System::<D, B>::new(point.control.len());
     problem.pin(point);
     project(problem, point, 20);
+    slow_down(problem, point);
     let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
-    let mut tight = false;
+    let (mut tight, mut since) = (room.tighten(problem, point), 0);
     for count in 0..effort.steps {
-        let was = tight;
-        tight = room.tighten(problem, point);
-        if was && !tight {
-            return None;
+        since += 1;
+        if tight || since > PATIENCE {
+            tight = room.tighten(problem, point);
+            since = 0;
         }
         let Some(step) = system.step(problem, point, &room, weight) else {
             return tight.then_some(count);
         };
+        if std::env::var("TRACE").is_ok() { eprintln!("{count} tight {tight} gap {:.2e} dec {:.2e} z {:.5} h {:.5} K {} caps {:?}", parameter/weight/point.z, step.decrement, point.z, problem.spacing(point.z), point.spans(), room.caps[0]); }
         let moved = search(problem, point, &room, weight, &step);
         let centred = step.decrement < 3.0;
         if !moved || centred {
             if tight && parameter / weight <= effort.gap * point.z {
                 return Some(count);
             }
-            if !tight && !moved {
-                return None;
-            }
-            if tight {
+            if !tight {
+                let stuck = since == 0 && !moved;
+                if stuck {
+                    return None;
+                }
+                since = PATIENCE;
+            } else {
                 weight *= GROWTH;
                 weight = weight.min(1.01 * parameter / (effort.gap * point.z));
             }
         }
     }
     tight.then_some(effort.steps)
+}
+
+/// Raises `z` until speed, acceleration and jerk hold with room to spare. A
+/// start in motion fixes the first control points, so there time is left alone.
+fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
+    if problem.start[1..].iter().flatten().any(|x| *x != 0.0) {
+        return;
+    }
+    let mut need = 0.0_f64;
+    for ratios in super::project::ratios(problem, point) {
+        let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
+        need = need.max(speed.powi(3)).max(acceleration.powf(1.5)).max(jerk);
+    }
+    point.z *= need.max(1e-9);
 }
 
 /// Moves the iterate along the step as far as the barrier falls; false when it
@@ -93,6 +116,7 @@ fn search<const D: usize>(
             && there < here - 0.01 * share * step.decrement
         {
             *point = trial;
+            if std::env::var("TRACE").is_ok() { eprintln!("   share {share}"); }
             return true;
         }
         share *= BACK;
