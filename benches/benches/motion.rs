@@ -21,8 +21,15 @@ struct Case {
 }
 
 fn case(name: &'static str, points: &[[f64; 3]], tolerance_mm: f64, reference: f64) -> Case {
-    let poses = points.iter().map(|p| Isometry3::translation(p[0] * 1e-3, p[1] * 1e-3, p[2] * 1e-3));
-    Case { name, poses: poses.collect(), tolerance: tolerance_mm * 1e-3, reference }
+    let poses = points
+        .iter()
+        .map(|p| Isometry3::translation(p[0] * 1e-3, p[1] * 1e-3, p[2] * 1e-3));
+    Case {
+        name,
+        poses: poses.collect(),
+        tolerance: tolerance_mm * 1e-3,
+        reference,
+    }
 }
 
 fn circle(count: usize) -> Vec<[f64; 3]> {
@@ -41,18 +48,46 @@ fn spiral() -> Case {
         let tilt = Vector3::new(-angle.sin(), angle.cos(), 0.0) * (TAU / 12.0);
         Isometry3::from_parts(place.into(), UnitQuaternion::from_scaled_axis(tilt))
     });
-    Case { name: "spiral200", poses: poses.collect(), tolerance: 0.2e-3, reference: 2.499 }
+    Case {
+        name: "spiral200",
+        poses: poses.collect(),
+        tolerance: 0.2e-3,
+        reference: 2.499,
+    }
 }
 
 fn cases() -> Vec<Case> {
     let zigzag: Vec<[f64; 3]> = (0..20_i32)
-        .map(|i| [15.0 * f64::from(i), f64::from(i % 2) * 25.0, f64::from(i % 4 / 2) * 6.0])
+        .map(|i| {
+            [
+                15.0 * f64::from(i),
+                f64::from(i % 2) * 25.0,
+                f64::from(i % 4 / 2) * 6.0,
+            ]
+        })
         .collect();
     let raster: Vec<[f64; 3]> = (0..40_i32)
-        .map(|i| [if matches!(i % 4, 1 | 2) { 200.0 } else { 0.0 }, f64::from(i / 2) * 5.0, 0.0])
+        .map(|i| {
+            [
+                if matches!(i % 4, 1 | 2) { 200.0 } else { 0.0 },
+                f64::from(i / 2) * 5.0,
+                0.0,
+            ]
+        })
         .collect();
-    let square = [[0., 0., 0.], [100., 0., 0.], [100., 100., 0.], [0., 100., 0.], [0., 0., 0.]];
-    let arch = [[0., 0., 0.], [0., 0., 100.], [300., 0., 100.], [300., 0., 0.]];
+    let square = [
+        [0., 0., 0.],
+        [100., 0., 0.],
+        [100., 100., 0.],
+        [0., 100., 0.],
+        [0., 0., 0.],
+    ];
+    let arch = [
+        [0., 0., 0.],
+        [0., 0., 100.],
+        [300., 0., 100.],
+        [300., 0., 0.],
+    ];
     vec![
         case("L", &square[..3], 1.0, 0.622),
         case("square", &square, 1.0, 1.165),
@@ -66,25 +101,70 @@ fn cases() -> Vec<Case> {
 }
 
 fn main() {
-    if let Ok(name) = std::env::var("CASE") { let l = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED }; for c in cases() { if c.name == name { println!("{:?}", measure(&c.poses, &SmoothOptions::new(c.tolerance, l))); } } return; }
-    let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
-    println!("case        poses motion_s exact_s plan_ms first_ms deviat corrid veloc  accel  jerk   ok fallbacks");
+    if let Ok(name) = std::env::var("CASE") {
+        let l = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            ..ToolLimits::UNLIMITED
+        };
+        for c in cases() {
+            if c.name == name {
+                println!(
+                    "{:?}",
+                    measure(&c.poses, &SmoothOptions::new(c.tolerance, l))
+                );
+            }
+        }
+        return;
+    }
+    let limits = ToolLimits {
+        speed: 0.5,
+        acceleration: 5.0,
+        jerk: 100.0,
+        ..ToolLimits::UNLIMITED
+    };
+    println!(
+        "case        poses motion_s exact_s plan_ms first_ms deviat corrid veloc  accel  jerk   ok fallbacks"
+    );
     let (mut sum, mut lines, mut worst) = (0.0, Vec::new(), 0.0_f64);
     let cases = cases();
     for case in &cases {
         let options = SmoothOptions::new(case.tolerance, limits);
         let rows: Vec<_> = (0..5).map(|_| measure(&case.poses, &options)).collect();
-        let planning = rows.iter().map(|row| row.planning).fold(f64::INFINITY, f64::min);
+        let planning = rows
+            .iter()
+            .map(|row| row.planning)
+            .fold(f64::INFINITY, f64::min);
         let row = &rows[0];
-        let (motion, stop) = (row.motion.unwrap_or(f64::NAN), row.exact_stop.unwrap_or(f64::NAN));
+        let (motion, stop) = (
+            row.motion.unwrap_or(f64::NAN),
+            row.exact_stop.unwrap_or(f64::NAN),
+        );
         println!(
             "{:<11} {:>5} {motion:>8.4} {stop:>7.3} {:>7.2} {:>8.2} {:.4} {:.4} {:.4} {:.4} {:.4} {} {}",
-            case.name, row.poses, planning * 1e3, row.first * 1e3, row.deviation_ratio,
-            row.corridor_ratio, row.velocity_ratio, row.acceleration_ratio, row.jerk_ratio,
-            row.certified, row.fallbacks,
+            case.name,
+            row.poses,
+            planning * 1e3,
+            row.first * 1e3,
+            row.deviation_ratio,
+            row.corridor_ratio,
+            row.velocity_ratio,
+            row.acceleration_ratio,
+            row.jerk_ratio,
+            row.certified,
+            row.fallbacks,
         );
-        lines.push(format!("ratio motion-exact-stop-{} {:.4}", case.name, motion / stop));
-        lines.push(format!("ratio motion-reference-{} {:.4}", case.name, motion / case.reference));
+        lines.push(format!(
+            "ratio motion-exact-stop-{} {:.4}",
+            case.name,
+            motion / stop
+        ));
+        lines.push(format!(
+            "ratio motion-reference-{} {:.4}",
+            case.name,
+            motion / case.reference
+        ));
         sum += (motion / case.reference).ln();
         worst = worst.max(motion / case.reference);
     }
@@ -92,5 +172,8 @@ fn main() {
         println!("{line}");
     }
     println!("ratio motion-worst {worst:.4}");
-    println!("ratio motion-geomean {:.4}", (sum / cases.len() as f64).exp());
+    println!(
+        "ratio motion-geomean {:.4}",
+        (sum / cases.len() as f64).exp()
+    );
 }

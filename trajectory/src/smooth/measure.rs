@@ -56,7 +56,7 @@ pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
     let clock = Instant::now();
     let mut first = 0.0;
     let plan = Windows::new(poses, options).and_then(|mut windows| {
-        windows.next();
+        windows.advance();
         first = clock.elapsed().as_secs_f64();
         Ok(windows.finish())
     });
@@ -78,20 +78,35 @@ pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
     };
     let plan = match plan {
         Ok(plan) => plan,
-        Err(error) => return Measure { reason: Some(error.to_string()), ..empty },
+        Err(error) => {
+            return Measure {
+                reason: Some(error.to_string()),
+                ..empty
+            };
+        }
     };
     let certificate = plan.certificate();
     let ratio = |deviation: f64, tolerance: f64| {
-        if tolerance > 0.0 { deviation / tolerance } else { deviation / super::RESOLUTION * 1e-3 }
+        if tolerance > 0.0 {
+            deviation / tolerance
+        } else {
+            deviation / super::RESOLUTION * 1e-3
+        }
     };
-    let deviations = plan.passes().iter().map(|pass| ratio(pass.deviation, pass.tolerance));
+    let deviations = plan
+        .passes()
+        .iter()
+        .map(|pass| ratio(pass.deviation, pass.tolerance));
     Measure {
         motion: Some(plan.duration()),
         exact_stop: Some(plan.exact_stop()),
         deviation_ratio: deviations.fold(0.0, f64::max),
         corridor_ratio: certificate.corridor.ratio,
         velocity_ratio: certificate.speed.ratio.max(certificate.angular_speed.ratio),
-        acceleration_ratio: certificate.acceleration.ratio.max(certificate.angular_acceleration.ratio),
+        acceleration_ratio: certificate
+            .acceleration
+            .ratio
+            .max(certificate.angular_acceleration.ratio),
         jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
         certified: certificate.holds(),
         fallbacks: plan.fallbacks(),

@@ -13,6 +13,7 @@
 //! changes no geometry.
 
 mod certificate;
+mod choose;
 mod exact_stop;
 mod measure;
 mod options;

@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::certificate::{self, Certificate};
-use super::exact_stop;
+use super::certificate::Certificate;
+use super::choose::Motion;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::{Pass, RESOLUTION};
+use super::pass::Pass;
 use super::span::Span;
-use super::spline::{self, Effort};
+use super::windows::Windows;
 use crate::{ToolCurve, ToolPoint};
 
 /// How a motion, or a part of it, was made.
@@ -34,11 +34,30 @@ pub struct SmoothPlan {
     spans: Vec<Span>,
     passes: Vec<Pass>,
     certificate: Certificate,
-    method: Method,
+    parts: Vec<(Method, usize)>,
     exact_stop: f64,
 }
 
 impl SmoothPlan {
+    /// A motion through `poses` with its certificate and passes.
+    pub(crate) fn new(
+        poses: &[Isometry3<f64>],
+        motion: Motion,
+        (certificate, passes): (Certificate, Vec<Pass>),
+        exact_stop: f64,
+    ) -> Self {
+        let (start, goal) = (poses[0], poses[poses.len() - 1]);
+        Self {
+            start,
+            goal,
+            spans: motion.spans,
+            passes,
+            certificate,
+            parts: motion.parts,
+            exact_stop,
+        }
+    }
+
     /// Time of the whole motion, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
@@ -57,16 +76,27 @@ impl SmoothPlan {
         &self.certificate
     }
 
-    /// How the motion was made.
+    /// How the motion was made: the time-optimal spline, when every part was.
     #[must_use]
     pub fn method(&self) -> Method {
-        self.method
+        let stops = self.parts.iter().find(|part| part.0 != Method::Spline);
+        match (self.parts.is_empty(), stops) {
+            (true, _) => Method::Still,
+            (false, Some(stop)) => stop.0,
+            (false, None) => Method::Spline,
+        }
     }
 
-    /// Parts of the motion that are not the time-optimal spline.
+    /// Parts of the motion that are not the time-optimal spline, though they
+    /// have poses to pass.
     #[must_use]
     pub fn fallbacks(&self) -> usize {
-        usize::from(self.method == Method::ExactStop && self.passes.len() > 0)
+        let stops = self
+            .parts
+            .iter()
+            .filter(|part| part.0 != Method::Spline)
+            .count();
+        if self.passes.is_empty() { 0 } else { stops }
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -134,30 +164,7 @@ impl ToolCurve for SmoothPlan {
 /// # Ok::<(), smooth::SmoothError>(())
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
-    options.check(poses)?;
-    let options = &options.finite();
-    let stop = exact_stop::plan(poses, &options.limits);
-    let exact_stop = stop.last().map_or(0.0, Span::end);
-    let method = if stop.is_empty() { Method::Still } else { Method::ExactStop };
-    let (certificate, passes) = certificate::certify(&stop, poses, options);
-    let (start, goal) = (poses[0], poses[poses.len() - 1]);
-    let mut best = SmoothPlan { start, goal, spans: stop, passes, certificate, method, exact_stop };
-    if let Some(better) = blend(poses, options, &best) {
-        best = better;
-    }
-    Ok(best)
-}
-
-/// The spline, when it is certified and faster.
-fn blend(poses: &[Isometry3<f64>], options: &SmoothOptions, stop: &SmoothPlan) -> Option<SmoothPlan> {
-    if poses.len() < 3 || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
-        return None;
-    }
-    let effort = Effort { steps: 120, gap: 3e-3 };
-    let spans = spline::plan(poses, options, None, effort, 1.0)?;
-    let (certificate, passes) = certificate::certify(&spans, poses, options);
-    let plan = SmoothPlan { spans, passes, certificate, method: Method::Spline, ..stop.clone() };
-    (plan.certificate.holds() && plan.duration() < stop.duration()).then_some(plan)
+    Ok(Windows::new(poses, options)?.finish())
 }
 
 #[cfg(test)]

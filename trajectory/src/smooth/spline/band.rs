@@ -10,7 +10,9 @@ pub(crate) struct Band<const B: usize> {
 impl<const B: usize> Band<B> {
     /// A zero matrix of `size` rows.
     pub(crate) fn zeros(size: usize) -> Self {
-        Self { columns: vec![[0.0; B]; size] }
+        Self {
+            columns: vec![[0.0; B]; size],
+        }
     }
 
     /// Sets every entry to zero.
@@ -31,7 +33,9 @@ impl<const B: usize> Band<B> {
         let size = self.columns.len();
         for c in 0..size {
             let (done, rest) = self.columns.split_at_mut(c + 1);
-            let Some(column) = done.last_mut() else { return false };
+            let Some(column) = done.last_mut() else {
+                return false;
+            };
             let pivot = column[0];
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return false;
@@ -91,7 +95,9 @@ mod tests {
         let size = 40;
         let mut state = 1_u64;
         let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
         };
         let mut band = Band::<B>::zeros(size);

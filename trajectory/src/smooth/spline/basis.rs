@@ -19,8 +19,13 @@ const POWER: [[f64; 5]; 5] = [
 
 /// Weights of the position at a knot and in the middle of a span.
 pub(crate) const AT_KNOT: [f64; 5] = [1.0 / 24.0, 11.0 / 24.0, 11.0 / 24.0, 1.0 / 24.0, 0.0];
-pub(crate) const AT_MIDDLE: [f64; 5] =
-    [1.0 / 384.0, 76.0 / 384.0, 230.0 / 384.0, 76.0 / 384.0, 1.0 / 384.0];
+pub(crate) const AT_MIDDLE: [f64; 5] = [
+    1.0 / 384.0,
+    76.0 / 384.0,
+    230.0 / 384.0,
+    76.0 / 384.0,
+    1.0 / 384.0,
+];
 
 /// Differences of order 1 to 3, as weights of consecutive control points.
 pub(crate) const FIRST: [f64; 2] = [-1.0, 1.0];
@@ -71,8 +76,14 @@ mod tests {
         let (h, p, v, a, j) = (0.3, 0.7, -0.4, 1.2, 5.0);
         let start = START.map(|w| p + w[0] * h * v + w[1] * h * h * a + w[2] * h * h * h * j);
         let control = [start[0], start[1], start[2], start[3], 0.9, -2.0];
-        let first = power(&[control[0], control[1], control[2], control[3], control[4]], h);
-        let next = power(&[control[1], control[2], control[3], control[4], control[5]], h);
+        let first = power(
+            &[control[0], control[1], control[2], control[3], control[4]],
+            h,
+        );
+        let next = power(
+            &[control[1], control[2], control[3], control[4], control[5]],
+            h,
+        );
         for (got, wanted) in first.iter().zip([p, v, a / 2.0, j / 6.0]) {
             assert_relative_eq!(*got, wanted, epsilon = 1e-12);
         }

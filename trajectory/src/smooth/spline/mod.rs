@@ -15,5 +15,5 @@ mod project;
 mod solve;
 mod start;
 
-pub(crate) use build::{Moving, plan};
+pub(crate) use build::{Moving, Request, plan};
 pub(crate) use solve::Effort;

@@ -2,7 +2,7 @@
 
 use super::band::Band;
 use super::basis::{FIRST, SECOND, THIRD, weights};
-use super::problem::{Point, Problem, Room, offset, part, sample_weights, square};
+use super::problem::{Point, Problem, Room, part, sample_weights, square};
 
 /// Gradient and Hessian of the barrier: a band for the control points, one
 /// border column for `z`. `B = 5 D` diagonals.
@@ -50,7 +50,10 @@ pub(crate) fn value<const D: usize>(
     room: &Room,
     t: f64,
 ) -> Option<f64> {
-    let mut slacks = Slacks { product: 1.0, sum: 0.0 };
+    let mut slacks = Slacks {
+        product: 1.0,
+        sum: 0.0,
+    };
     for g in 0..Problem::<D>::GROUPS {
         let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room)[0].powi(2));
         let units = [1, 2, 3].map(|k| 1.0 / problem.cap(g, k, 1.0, room)[0].powi(2));
@@ -77,7 +80,7 @@ pub(crate) fn value<const D: usize>(
         if problem.groups[g].width.is_finite() {
             let unit = 1.0 / problem.groups[g].width.powi(2);
             for k in 0..point.samples() {
-                let away = corridor_offset(problem, point, room, k, g).0;
+                let away = problem.offset(&point.sample(k, g), room.legs[k], g).0;
                 if !slacks.take((room.widths[g][k].powi(2) - square(&away)) * unit) {
                     return None;
                 }
@@ -85,18 +88,6 @@ pub(crate) fn value<const D: usize>(
         }
     }
     Some(t * point.z - slacks.sum - slacks.product.ln())
-}
-
-fn corridor_offset<const D: usize>(
-    problem: &Problem<D>,
-    point: &Point<D>,
-    room: &Room,
-    k: usize,
-    g: usize,
-) -> ([f64; 3], [f64; 3]) {
-    let leg = room.legs[k];
-    let ends = [part(&problem.vertices[leg - 1], g), part(&problem.vertices[leg], g)];
-    offset(&point.sample(k, g), &ends[0], &ends[1])
 }
 
 impl<const D: usize, const B: usize> System<D, B> {
@@ -155,7 +146,11 @@ impl<const D: usize, const B: usize> System<D, B> {
             slope += old[0] * step;
             control.push(step);
         }
-        (slope < 0.0 && slope.is_finite()).then_some(Step { control, z, decrement: -slope })
+        (slope < 0.0 && slope.is_finite()).then_some(Step {
+            control,
+            z,
+            decrement: -slope,
+        })
     }
 
     /// Speed, acceleration and jerk of one group.
@@ -211,7 +206,7 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// Corridor samples of one group.
     fn corridor(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
         for k in 0..point.samples() {
-            let (y, slide) = corridor_offset(problem, point, room, k, g);
+            let (y, slide) = problem.offset(&point.sample(k, g), room.legs[k], g);
             let width = room.widths[g][k];
             let slack = 1.0 / (width * width - square(&y));
             let gradient = y.map(|x| 2.0 * x * slack);
@@ -295,7 +290,13 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 
     /// Adds a term that couples all coordinates.
-    fn add_ball(&mut self, first: usize, w: &[f64; 5], gradient: &[f64; D], hessian: &[[f64; D]; D]) {
+    fn add_ball(
+        &mut self,
+        first: usize,
+        w: &[f64; 5],
+        gradient: &[f64; D],
+        hessian: &[[f64; D]; D],
+    ) {
         let free = self.sides.len() / D;
         for i in 0..5 {
             if first + i < 4 || first + i - 4 >= free {

@@ -67,7 +67,9 @@ impl<const D: usize> Problem<D> {
 
     /// Inner vertices: those with a ball.
     pub(crate) fn inner(&self) -> &[[f64; D]] {
-        self.vertices.get(1..self.vertices.len().saturating_sub(1)).unwrap_or_default()
+        self.vertices
+            .get(1..self.vertices.len().saturating_sub(1))
+            .unwrap_or_default()
     }
 
     /// The first four control points at `z`, and their derivatives to `z`.
@@ -99,13 +101,71 @@ impl<const D: usize> Problem<D> {
         let h = self.spacing(z);
         let power = k as f64 / 3.0;
         let value = self.groups[g].caps[k - 1] * room.caps[g][k - 1] * h.powi(k as i32);
-        [value, value * power / z, value * power * (power - 1.0) / (z * z)]
+        [
+            value,
+            value * power / z,
+            value * power * (power - 1.0) / (z * z),
+        ]
+    }
+
+    /// Nearest point of the way near a leg: its leg and share of that leg.
+    ///
+    /// Starts at the leg and moves on to the next or back to the one before
+    /// while the nearest point is at the end of a leg and that helps: motion
+    /// along a finely divided way is not held up by its division.
+    pub(crate) fn nearest(&self, point: &[f64; 3], leg: usize, g: usize) -> (usize, f64) {
+        let (mut best, mut share) = self.on(point, leg, g);
+        let mut at = leg;
+        for _ in 0..8 {
+            let next = if share <= 0.0 {
+                at - 1
+            } else if share >= 1.0 {
+                at + 1
+            } else {
+                break;
+            };
+            if next < 1 || next >= self.vertices.len() {
+                break;
+            }
+            let (other, there) = self.on(point, next, g);
+            if square(&other) >= square(&best) {
+                break;
+            }
+            (best, share, at) = (other, there, next);
+        }
+        (at, share)
+    }
+
+    /// Offset of a point of group `g` from the nearest point of the way near a
+    /// leg, and the direction along which that nearest point slides.
+    pub(crate) fn offset(&self, point: &[f64; 3], leg: usize, g: usize) -> ([f64; 3], [f64; 3]) {
+        let (at, share) = self.nearest(point, leg, g);
+        let (from, to) = (part(&self.vertices[at - 1], g), part(&self.vertices[at], g));
+        let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+        let free = if share > 0.0 && share < 1.0 {
+            1.0 / square(&way).sqrt()
+        } else {
+            0.0
+        };
+        (self.on(point, at, g).0, way.map(|x| x * free))
+    }
+
+    fn on(&self, point: &[f64; 3], leg: usize, g: usize) -> ([f64; 3], f64) {
+        offset(
+            point,
+            &part(&self.vertices[leg - 1], g),
+            &part(&self.vertices[leg], g),
+        )
     }
 
     /// Barrier parameter: twice the number of norm constraints.
     pub(crate) fn parameter(&self, point: &Point<D>) -> f64 {
         let knots = point.control.len() as f64;
-        let corridor = if self.groups[0].width.is_finite() { 2.0 } else { 0.0 };
+        let corridor = if self.groups[0].width.is_finite() {
+            2.0
+        } else {
+            0.0
+        };
         2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + point.passes.len() as f64)
     }
 }
@@ -163,7 +223,14 @@ impl<const D: usize> Point<D> {
 
 /// First control point and weights of corridor sample `k`.
 pub(crate) fn sample_weights(k: usize) -> (usize, &'static [f64; 5]) {
-    (k / 2, if k % 2 == 0 { &basis::AT_KNOT } else { &basis::AT_MIDDLE })
+    (
+        k / 2,
+        if k % 2 == 0 {
+            &basis::AT_KNOT
+        } else {
+            &basis::AT_MIDDLE
+        },
+    )
 }
 
 /// Sum of squares.
@@ -176,18 +243,22 @@ pub(crate) fn part<const D: usize>(x: &[f64; D], g: usize) -> [f64; 3] {
     [x[3 * g], x[3 * g + 1], x[3 * g + 2]]
 }
 
-/// Offset of a point from the nearest point of a segment, and the direction
-/// along which that nearest point slides (zero at the ends).
-pub(crate) fn offset(point: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> ([f64; 3], [f64; 3]) {
+/// Offset of a point from the nearest point of a segment, and the share of the
+/// segment where that is.
+fn offset(point: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> ([f64; 3], f64) {
     let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
     let off = [point[0] - from[0], point[1] - from[1], point[2] - from[2]];
     let length = square(&way);
     if length <= 0.0 {
-        return (off, [0.0; 3]);
+        return (off, 1.0);
     }
-    let share = (off[0] * way[0] + off[1] * way[1] + off[2] * way[2]) / length;
-    let held = share.clamp(0.0, 1.0);
-    let free = if held == share { 1.0 / length.sqrt() } else { 0.0 };
-    let away = [off[0] - held * way[0], off[1] - held * way[1], off[2] - held * way[2]];
-    (away, way.map(|x| x * free))
+    let share = ((off[0] * way[0] + off[1] * way[1] + off[2] * way[2]) / length).clamp(0.0, 1.0);
+    (
+        [
+            off[0] - share * way[0],
+            off[1] - share * way[1],
+            off[2] - share * way[2],
+        ],
+        share,
+    )
 }

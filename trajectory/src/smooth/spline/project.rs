@@ -2,15 +2,21 @@
 //! room an iterate needs.
 
 use super::basis::{FIRST, SECOND, THIRD};
-use super::problem::{Point, Problem, Room, offset, part, square};
+use super::problem::{Point, Problem, Room, part, square};
 
 /// Iterates are held this far inside the widened bounds.
 const WIDEN: f64 = 1.03;
 
 /// Moves every passing time to the closest approach near by, in order.
 ///
-/// With rotation, closeness is measured in radii of both balls together.
-pub(crate) fn project<const D: usize>(problem: &Problem<D>, point: &mut Point<D>, rounds: usize) {
+/// With one group that is the least distance; with rotation it is the least
+/// barrier of both balls, so that the time carries no slope of the barrier.
+pub(crate) fn project<const D: usize>(
+    problem: &Problem<D>,
+    point: &mut Point<D>,
+    room: Option<&Room>,
+    rounds: usize,
+) {
     let end = point.spans() as f64;
     let scales = [0, 1].map(|g: usize| 1.0 / (problem.groups[g].radius * problem.groups[g].radius));
     let mut before = 0.0;
@@ -20,13 +26,30 @@ pub(crate) fn project<const D: usize>(problem: &Problem<D>, point: &mut Point<D>
         for _ in 0..rounds {
             let [p, v, a] = point.at(time);
             let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
-            for d in 0..D {
-                let scale = scales[d / 3];
-                slope += scale * (p[d] - goal[d]) * v[d];
-                bend += scale * (p[d] - goal[d]) * a[d];
-                fall += scale * v[d] * v[d];
+            for g in 0..Problem::<D>::GROUPS {
+                let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
+                for d in 3 * g..3 * g + 3 {
+                    let y = p[d] - goal[d];
+                    away += y * y;
+                    along += y * v[d];
+                    bent += y * a[d];
+                    speed += v[d] * v[d];
+                }
+                let slack = room.map_or(0.0, |room| room.balls[g][i].powi(2) - away);
+                let inside = D > 3 && slack > 0.0;
+                let scale = if inside { 1.0 / slack } else { scales[g] };
+                slope += scale * along;
+                bend += scale * bent;
+                fall += scale * speed;
+                if inside {
+                    fall += 2.0 * (scale * along).powi(2);
+                }
             }
-            let curvature = if bend > -0.5 * fall { fall + bend } else { 0.5 * fall };
+            let curvature = if bend > -0.5 * fall {
+                fall + bend
+            } else {
+                0.5 * fall
+            };
             if curvature <= 0.0 {
                 break;
             }
@@ -42,7 +65,12 @@ pub(crate) fn project<const D: usize>(problem: &Problem<D>, point: &mut Point<D>
 }
 
 /// Distance of the iterate from the centre of ball `i`, in group `g`.
-pub(crate) fn miss<const D: usize>(problem: &Problem<D>, point: &Point<D>, i: usize, g: usize) -> f64 {
+pub(crate) fn miss<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+    i: usize,
+    g: usize,
+) -> f64 {
     let [p, ..] = point.at(point.passes[i]);
     let (p, goal) = (part(&p, g), part(&problem.inner()[i], g));
     square(&[p[0] - goal[0], p[1] - goal[1], p[2] - goal[2]]).sqrt()
@@ -84,9 +112,17 @@ impl Room {
 
     /// Shrinks every widened bound to what the iterate needs, and assigns the
     /// corridor samples to their legs. True when nothing is widened any more.
-    pub(crate) fn tighten<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>) -> bool {
+    pub(crate) fn tighten<const D: usize>(
+        &mut self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+    ) -> bool {
         let mut tight = true;
-        for (g, ratios) in ratios(problem, point).iter().enumerate().take(Problem::<D>::GROUPS) {
+        for (g, ratios) in ratios(problem, point)
+            .iter()
+            .enumerate()
+            .take(Problem::<D>::GROUPS)
+        {
             tight &= self.tighten_caps(ratios, g);
             let radius = problem.groups[g].radius;
             for i in 0..point.passes.len() {
@@ -119,13 +155,14 @@ impl Room {
             }
             let wanted = next + 1;
             let fits = |leg: usize, factor: f64| {
-                (0..Problem::<D>::GROUPS).all(|g| {
-                    away(problem, point, k, g, leg) < factor * problem.groups[g].width
-                })
+                (0..Problem::<D>::GROUPS)
+                    .all(|g| away(problem, point, k, g, leg) < factor * problem.groups[g].width)
             };
             // A sample that changes legs while its point is outside the new
             // one keeps the old leg until it fits.
-            if self.legs[k] == 0 || (self.legs[k] != wanted && (fits(wanted, 0.98) || !fits(self.legs[k], 1.0))) {
+            if self.legs[k] == 0
+                || (self.legs[k] != wanted && (fits(wanted, 0.98) || !fits(self.legs[k], 1.0)))
+            {
                 self.legs[k] = wanted;
                 for g in 0..Problem::<D>::GROUPS {
                     self.widths[g][k] = f64::INFINITY;
@@ -142,8 +179,13 @@ impl Room {
     }
 }
 
-/// Distance of corridor sample `k` from a leg in group `g`.
-fn away<const D: usize>(problem: &Problem<D>, point: &Point<D>, k: usize, g: usize, leg: usize) -> f64 {
-    let ends = [part(&problem.vertices[leg - 1], g), part(&problem.vertices[leg], g)];
-    square(&offset(&point.sample(k, g), &ends[0], &ends[1]).0).sqrt()
+/// Distance of corridor sample `k` from the way near a leg, in group `g`.
+fn away<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+    k: usize,
+    g: usize,
+    leg: usize,
+) -> f64 {
+    square(&problem.offset(&point.sample(k, g), leg, g).0).sqrt()
 }

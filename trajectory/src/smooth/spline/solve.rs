@@ -38,7 +38,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
 ) -> Option<usize> {
     let mut system = System::<D, B>::new(point.control.len());
     problem.pin(point);
-    project(problem, point, 20);
+    project(problem, point, None, 20);
     slow_down(problem, point);
     let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
@@ -53,7 +53,6 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return tight.then_some(count);
         };
-        if std::env::var("TRACE").is_ok() { eprintln!("{count} tight {tight} gap {:.2e} dec {:.2e} z {:.5} h {:.5} K {} caps {:?}", parameter/weight/point.z, step.decrement, point.z, problem.spacing(point.z), point.spans(), room.caps[0]); }
         let moved = search(problem, point, &room, weight, &step);
         let centred = step.decrement < 3.0;
         if !moved || centred {
@@ -84,7 +83,10 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     let mut need = 0.0_f64;
     for ratios in super::project::ratios(problem, point) {
         let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
-        need = need.max(speed.powi(3)).max(acceleration.powf(1.5)).max(jerk);
+        need = need
+            .max(speed.powi(3))
+            .max(acceleration.powf(1.5))
+            .max(jerk);
     }
     point.z *= need.max(1e-9);
 }
@@ -98,8 +100,14 @@ fn search<const D: usize>(
     weight: f64,
     step: &newton::Step,
 ) -> bool {
-    let Some(here) = newton::value(problem, point, room, weight) else { return false };
-    let mut share: f64 = if step.z < 0.0 { (-0.9 * point.z / step.z).min(1.0) } else { 1.0 };
+    let Some(here) = newton::value(problem, point, room, weight) else {
+        return false;
+    };
+    let mut share: f64 = if step.z < 0.0 {
+        (-0.9 * point.z / step.z).min(1.0)
+    } else {
+        1.0
+    };
     let mut trial = point.clone();
     for _ in 0..40 {
         trial.z = point.z + share * step.z;
@@ -111,12 +119,11 @@ fn search<const D: usize>(
         }
         problem.pin(&mut trial);
         trial.passes.copy_from_slice(&point.passes);
-        project(problem, &mut trial, 3);
+        project(problem, &mut trial, Some(room), 3);
         if let Some(there) = newton::value(problem, &trial, room, weight)
             && there < here - 0.01 * share * step.decrement
         {
             *point = trial;
-            if std::env::var("TRACE").is_ok() { eprintln!("   share {share}"); }
             return true;
         }
         share *= BACK;

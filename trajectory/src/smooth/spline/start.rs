@@ -36,7 +36,11 @@ impl Schedule {
         let next = self.records.partition_point(|r| r[0] <= time);
         let [t, s, rate, change] = self.records[next.saturating_sub(1)];
         let dt = time - t;
-        if next == 0 { s + rate * dt } else { s + (rate + 0.5 * change * dt) * dt }
+        if next == 0 {
+            s + rate * dt
+        } else {
+            s + (rate + 0.5 * change * dt) * dt
+        }
     }
 
     /// Progress averaged over `width` around `time`.
@@ -44,7 +48,10 @@ impl Schedule {
         let parts = 8;
         let step = width / f64::from(parts);
         let first = time - 0.5 * width + 0.5 * step;
-        (0..parts).map(|i| self.at(first + step * f64::from(i))).sum::<f64>() / f64::from(parts)
+        (0..parts)
+            .map(|i| self.at(first + step * f64::from(i)))
+            .sum::<f64>()
+            / f64::from(parts)
     }
 }
 
@@ -54,7 +61,6 @@ pub(crate) fn first<const D: usize>(
     problem: &mut Problem<D>,
     moving: bool,
     spacing: Option<f64>,
-    slow: f64,
 ) -> Point<D> {
     let legs = legs(problem);
     let ramp = (0..Problem::<D>::GROUPS)
@@ -62,7 +68,7 @@ pub(crate) fn first<const D: usize>(
         .fold(0.0, f64::max);
     let coarse = spacing.unwrap_or(ramp / KNOTS_PER_RAMP);
     let start = begin(problem, &legs);
-    let mut rates = junctions(problem, &legs, coarse, slow);
+    let mut rates = junctions(problem, &legs, coarse);
     rates[0] = start[1];
     look_ahead(&legs, &mut rates);
     let schedule = schedule(&legs, &rates, start);
@@ -74,8 +80,16 @@ pub(crate) fn first<const D: usize>(
         None => coarse.min(finest).min(total / FEWEST).max(total / MOST),
     };
     let spans = (total / h).ceil().clamp(FEWEST, MOST) as usize + 3;
-    problem.scale = if moving { h } else { total / (spans - 3) as f64 };
-    let lead = if moving { 0.0 } else { 0.5 * smoothing + 1.5 * problem.scale };
+    problem.scale = if moving {
+        h
+    } else {
+        total / (spans - 3) as f64
+    };
+    let lead = if moving {
+        0.0
+    } else {
+        0.5 * smoothing + 1.5 * problem.scale
+    };
     place(problem, &legs, &schedule, [spans as f64, lead, smoothing])
 }
 
@@ -88,7 +102,9 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
         }
         let norms = norms(&way);
         let groups = &problem.groups;
-        let length = (0..D / 3).map(|g| norms[g] / groups[g].caps[0]).fold(1e-12, f64::max);
+        let length = (0..D / 3)
+            .map(|g| norms[g] / groups[g].caps[0])
+            .fold(1e-12, f64::max);
         let acceleration = (0..D / 3)
             .map(|g| {
                 let unit = norms[g] / length;
@@ -96,7 +112,11 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
                 groups[g].caps[1].min(jerk) / unit.max(1e-12)
             })
             .fold(f64::INFINITY, f64::min);
-        legs.push(Leg { length, direction: way.map(|x| x / length), acceleration });
+        legs.push(Leg {
+            length,
+            direction: way.map(|x| x / length),
+            acceleration,
+        });
     }
     legs
 }
@@ -119,7 +139,10 @@ fn begin<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>]) -> [f64; 2] {
         rate += problem.start[1][d] * problem.start[1][d] / cap;
         unit += legs[0].direction[d] * legs[0].direction[d] / cap;
     }
-    [(along / unit.max(1e-300)).clamp(0.0, legs[0].length), rate.sqrt().min(1.0)]
+    [
+        (along / unit.max(1e-300)).clamp(0.0, legs[0].length),
+        rate.sqrt().min(1.0),
+    ]
 }
 
 /// Rate at each vertex that its ball lets pass; 0 at the end.
@@ -127,7 +150,7 @@ fn begin<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>]) -> [f64; 2] {
 /// A corner of velocity jump `m v` inside a ball of radius `tol` costs what an
 /// acceleration ramp of the same jump costs; where the way bends so gently that
 /// the sagitta is below the tolerance, the curvature counts instead.
-fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64, slow: f64) -> Vec<f64> {
+fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64) -> Vec<f64> {
     let mut rates = vec![0.0; legs.len() + 1];
     for i in 1..legs.len() {
         let (before, after) = (&legs[i - 1], &legs[i]);
@@ -145,9 +168,13 @@ fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64, slow
             let tol = problem.groups[g].radius;
             let corner = ((16.0 * tol * a).sqrt() / m)
                 .min(j * (96.0 * tol / j).powf(2.0 / 3.0) / (4.0 * m))
-                .min(2.3 * slow * tol / (h * m));
+                .min(2.3 * tol / (h * m));
             let bend = 0.8 * (a * mean / m).sqrt().min((j * mean * mean / m).cbrt());
-            rate = rate.min(if m * mean < 8.0 * tol { corner.max(bend) } else { corner });
+            rate = rate.min(if m * mean < 8.0 * tol {
+                corner.max(bend)
+            } else {
+                corner
+            });
         }
         rates[i] = rate;
     }
@@ -157,7 +184,9 @@ fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64, slow
 /// Forward and backward passes: neighbouring rates differ by no more than the
 /// leg between allows.
 fn look_ahead<const D: usize>(legs: &[Leg<D>], rates: &mut [f64]) {
-    let reach = |rate: f64, leg: &Leg<D>| (rate * rate + 2.0 * SHARE * leg.acceleration * leg.length).sqrt();
+    let reach = |rate: f64, leg: &Leg<D>| {
+        (rate * rate + 2.0 * SHARE * leg.acceleration * leg.length).sqrt()
+    };
     for (i, leg) in legs.iter().enumerate() {
         rates[i + 1] = rates[i + 1].min(reach(rates[i], leg));
     }
@@ -167,14 +196,26 @@ fn look_ahead<const D: usize>(legs: &[Leg<D>], rates: &mut [f64]) {
 }
 
 fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], [skip, _]: [f64; 2]) -> Schedule {
-    let mut result = Schedule { records: Vec::with_capacity(3 * legs.len()), dips: 0, duration: 0.0 };
+    let mut result = Schedule {
+        records: Vec::with_capacity(3 * legs.len()),
+        dips: 0,
+        duration: 0.0,
+    };
     let (mut time, mut s) = (0.0, skip);
     for (i, leg) in legs.iter().enumerate() {
         let length = leg.length - if i == 0 { skip } else { 0.0 };
         let a = SHARE * leg.acceleration;
         let (v0, v1) = (rates[i], rates[i + 1]);
-        let top = (0.5 * (v0 * v0 + v1 * v1) + a * length).sqrt().min(1.0).max(v0).max(v1);
-        let ways = [(top * top - v0 * v0) / (2.0 * a), 0.0, (top * top - v1 * v1) / (2.0 * a)];
+        let top = (0.5 * (v0 * v0 + v1 * v1) + a * length)
+            .sqrt()
+            .min(1.0)
+            .max(v0)
+            .max(v1);
+        let ways = [
+            (top * top - v0 * v0) / (2.0 * a),
+            0.0,
+            (top * top - v1 * v1) / (2.0 * a),
+        ];
         let flat = (length - ways[0] - ways[2]).max(0.0);
         let times = [(top - v0) / a, flat / top.max(1e-12), (top - v1) / a];
         for ((dt, rate), change) in times.iter().zip([v0, top, top]).zip([a, 0.0, -a]) {
@@ -219,15 +260,25 @@ fn place<const D: usize>(
         }
         control.push(c);
     }
-    let mut point = Point { control, z: 1.0, passes: Vec::with_capacity(ends.len()) };
+    let mut point = Point {
+        control,
+        z: 1.0,
+        passes: Vec::with_capacity(ends.len()),
+    };
     let mut k = 0;
     for end in &ends[1..ends.len() - 1] {
         while k + 1 < knots && progress(k + 1) < *end {
             k += 1;
         }
         let (low, high) = (progress(k), progress(k + 1));
-        let share = if high > low { ((end - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
-        point.passes.push((k as f64 + share - 1.5).clamp(0.0, spans));
+        let share = if high > low {
+            ((end - low) / (high - low)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        point
+            .passes
+            .push((k as f64 + share - 1.5).clamp(0.0, spans));
     }
     blend_in(problem, &mut point);
     for c in point.control.iter_mut().rev().take(4) {
