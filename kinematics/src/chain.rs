@@ -16,7 +16,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    fn from_isometry(pose: &Isometry3<f64>) -> Self {
+    pub(crate) fn from_isometry(pose: &Isometry3<f64>) -> Self {
         let r = pose.rotation.to_rotation_matrix();
         let column = |j: usize| V4::new(r[(0, j)], r[(1, j)], r[(2, j)]);
         let t = &pose.translation.vector;
@@ -114,7 +114,7 @@ pub struct Chain<const N: usize> {
 }
 
 /// A rotation that takes z to `axis`; exact for axes along a coordinate.
-fn z_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub(crate) fn z_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), axis).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
     })
@@ -305,19 +305,41 @@ impl<const N: usize> Chain<N> {
         let (points, axes, tool) = self.frames(a, q);
         let mut j = SMatrix::zeros();
         for i in 0..N {
-            let slides = !self.all_turn && self.prismatic[i];
-            let v = if slides {
-                axes[i]
-            } else {
-                axes[i].cross(a, tool.p.sub(points[i]))
-            };
-            let w = if slides { V4::ZERO } else { axes[i] };
+            let (v, w) = self.column(a, i, points[i], axes[i], &tool);
             let column = [v.0[0], v.0[1], v.0[2], w.0[0], w.0[1], w.0[2]];
             for (row, value) in column.into_iter().enumerate() {
                 j[(row, i)] = value;
             }
         }
         (tool, j)
+    }
+
+    /// Tool frame and Jacobian as rows of eight, the last ones zero; `N` is at most 8.
+    #[inline(always)]
+    pub(crate) fn jacobian_rows<A: Arith>(
+        &self,
+        a: A,
+        q: &SVector<f64, N>,
+    ) -> (Frame, [[f64; 8]; 6]) {
+        let (points, axes, tool) = self.frames(a, q);
+        let mut rows = [[0.0; 8]; 6];
+        for i in 0..N {
+            let (v, w) = self.column(a, i, points[i], axes[i], &tool);
+            for r in 0..3 {
+                rows[r][i] = v.0[r];
+                rows[3 + r][i] = w.0[r];
+            }
+        }
+        (tool, rows)
+    }
+
+    /// Linear and angular part of a column of the Jacobian.
+    #[inline(always)]
+    fn column<A: Arith>(&self, a: A, i: usize, point: V4, axis: V4, tool: &Frame) -> (V4, V4) {
+        if !self.all_turn && self.prismatic[i] {
+            return (axis, V4::ZERO);
+        }
+        (axis.cross(a, tool.p.sub(point)), axis)
     }
 }
 

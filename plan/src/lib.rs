@@ -2,6 +2,8 @@
 
 pub mod error;
 pub mod finding;
+pub mod kitting;
+pub mod run;
 pub mod world;
 
 pub use error::PlanError;

@@ -2,4 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod fixtures;
+mod reading;
+mod running;
 mod world;

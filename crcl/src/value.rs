@@ -1,0 +1,124 @@
+//! Why a value cannot be meant: the range rules of the language, the same for text, JSON and
+//! commands made in memory.
+
+use thiserror::Error;
+
+use crate::finding::code;
+
+/// Why the value of a command is refused.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// A number is NaN or infinite.
+    #[error("{quantity} must be a finite number, got {value}")]
+    NotFinite {
+        /// What the number means.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// A number is below zero that cannot be.
+    #[error("{quantity} cannot be negative, got {value}")]
+    Negative {
+        /// What the number means.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// A percentage is outside 0 to 100.
+    #[error("{quantity} must be 0 to 100 percent, got {value}")]
+    Percent {
+        /// What the number means.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// An axis has no direction.
+    #[error("the {axis} axis has length zero")]
+    ZeroAxis {
+        /// `Z` or `X`.
+        axis: char,
+    },
+    /// The axes of a pose are not perpendicular.
+    #[error("the Z axis and the X axis must be perpendicular, but are {} degrees apart", angle(*degrees))]
+    NotOrthogonal {
+        /// Angle between the two axes (degrees).
+        degrees: f64,
+    },
+    /// A move through no pose at all.
+    #[error("a list needs at least one pose")]
+    NoPoses,
+}
+
+/// Enough digits of an angle to tell it from 90 degrees, and no more.
+fn angle(degrees: f64) -> String {
+    let off = (degrees - 90.0).abs();
+    let digits = if off >= 1.0 {
+        1
+    } else {
+        (1.0 - off.max(1e-12).log10().floor()) as usize
+    };
+    format!("{degrees:.digits$}")
+}
+
+impl ValueError {
+    /// The stable code of the finding that this error becomes.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => code::NOT_FINITE,
+            Self::Negative { .. } => code::NEGATIVE,
+            Self::Percent { .. } => code::PERCENT,
+            Self::ZeroAxis { .. } => code::ZERO_AXIS,
+            Self::NotOrthogonal { .. } => code::NOT_ORTHOGONAL,
+            Self::NoPoses => code::NO_POSES,
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => "write a plain decimal number",
+            Self::Negative { .. } => "write zero or more",
+            Self::Percent { .. } => "100 is all that the robot can do, 50 is half of it",
+            Self::ZeroAxis { .. } => {
+                "an axis is a direction, such as {0, 0, -1} for straight down; \
+                                      its length does not matter, but must not be zero"
+            }
+            Self::NotOrthogonal { .. } => {
+                "write the axes with more digits, or choose an X axis at \
+                                           90 degrees to the Z axis"
+            }
+            Self::NoPoses => "give the pose to stop at",
+        }
+    }
+}
+
+/// Checks that a number is finite.
+pub(crate) fn finite(quantity: &'static str, value: f64) -> Result<f64, ValueError> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ValueError::NotFinite { quantity, value })
+    }
+}
+
+/// Checks that a number is finite and not below zero.
+pub(crate) fn not_negative(quantity: &'static str, value: f64) -> Result<f64, ValueError> {
+    let value = finite(quantity, value)?;
+    if value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(ValueError::Negative { quantity, value })
+    }
+}
+
+/// Checks that a number is a percentage from 0 to 100.
+pub(crate) fn percent(quantity: &'static str, value: f64) -> Result<f64, ValueError> {
+    let value = finite(quantity, value)?;
+    let inside = (0.0..=100.0).contains(&value);
+    if inside {
+        Ok(value)
+    } else {
+        Err(ValueError::Percent { quantity, value })
+    }
+}

@@ -1,0 +1,379 @@
+//! Reading `robot.toml` and joining it with the URDF.
+
+use super::error::RobotError;
+use super::{EndEffector, Gripper, JointLimits, Robot, ToolChanger, ToolLimits};
+use kinematics::{Model, urdf};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use serde::Deserialize;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+
+/// Most joints that the engine drives.
+pub(super) const MOST_JOINTS: usize = 8;
+
+/// The two texts of a robot folder.
+pub(super) struct Files<'a> {
+    pub(super) name: &'a str,
+    pub(super) place: &'a Path,
+    pub(super) urdf: &'a str,
+    pub(super) toml: &'a str,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    #[serde(default)]
+    description: String,
+    tip_link: Option<String>,
+    joints: Spanned<Joints>,
+    tool_limits: Tool,
+    base: Option<Pose>,
+    home: Home,
+    tool_changer: Option<Changer>,
+    #[serde(default)]
+    end_effector: Vec<Effector>,
+    mounted: Option<Spanned<String>>,
+}
+
+/// Limits that the URDF does not give, one a joint.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Joints {
+    source: String,
+    velocity_per_s: Option<Spanned<Vec<f64>>>,
+    acceleration_per_s2: Option<Spanned<Vec<f64>>>,
+    jerk_per_s3: Option<Spanned<Vec<f64>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tool {
+    source: String,
+    speed_m_per_s: Spanned<f64>,
+    acceleration_m_per_s2: Spanned<f64>,
+    jerk_m_per_s3: Spanned<f64>,
+    angular_speed_rad_per_s: Spanned<f64>,
+    angular_acceleration_rad_per_s2: Spanned<f64>,
+    angular_jerk_rad_per_s3: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Pose {
+    position_m: Spanned<[f64; 3]>,
+    #[serde(default = "no_turn")]
+    roll_pitch_yaw_rad: Spanned<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Home {
+    joints_rad_or_m: Spanned<Vec<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Changer {
+    opening_s: Spanned<f64>,
+    closing_s: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Effector {
+    name: Spanned<String>,
+    flange_from_tcp: Pose,
+    opening_s: Option<Spanned<f64>>,
+    closing_s: Option<Spanned<f64>>,
+    workstation_from_holder: Option<Pose>,
+}
+
+fn no_turn() -> Spanned<[f64; 3]> {
+    Spanned::new(0..0, [0.0; 3])
+}
+
+impl Files<'_> {
+    /// Reads both texts.
+    pub(super) fn read(&self) -> Result<Robot, RobotError> {
+        let document: Document = toml::from_str(self.toml).map_err(|error| {
+            let (line, column) = position(self.toml, error.span().map_or(0, |span| span.start));
+            let message = error.message().trim().replace('\n', ", ");
+            RobotError::Toml {
+                file: self.toml_file(),
+                line,
+                column,
+                message,
+            }
+        })?;
+        let file = self.place.join("robot.urdf").display().to_string();
+        let model = urdf::read(self.urdf, document.tip_link.as_deref()).map_err(|source| {
+            RobotError::Urdf {
+                file: file.clone(),
+                source,
+            }
+        })?;
+        if model.dof() > MOST_JOINTS {
+            return Err(RobotError::TooManyJoints {
+                file,
+                found: model.dof(),
+                most: MOST_JOINTS,
+            });
+        }
+        let joints = self.joint_limits(&model, &document.joints)?;
+        let home = self.home(&document.home, &model)?;
+        let end_effectors = self.end_effectors(&document.end_effector)?;
+        Ok(Robot {
+            name: self.name.to_owned(),
+            description: document.description.clone(),
+            urdf: self.urdf.to_owned(),
+            joints,
+            tool: self.tool_limits(&document.tool_limits)?,
+            workstation_from_base: self
+                .optional_pose("base", document.base.as_ref())?
+                .unwrap_or_else(Isometry3::identity),
+            home,
+            mounted: self.mounted(document.mounted.as_ref(), &end_effectors)?,
+            end_effectors,
+            tool_changer: self.changer(document.tool_changer.as_ref())?,
+            model,
+        })
+    }
+
+    fn toml_file(&self) -> String {
+        self.place.join("robot.toml").display().to_string()
+    }
+
+    /// The error for a value that does not fit.
+    fn value(&self, span: Range<usize>, key: &str, expected: &str) -> RobotError {
+        let (line, column) = position(self.toml, span.start);
+        let found = self.toml.get(span).unwrap_or("").chars().take(80).collect();
+        let (key, expected) = (key.to_owned(), expected.to_owned());
+        RobotError::Value {
+            file: self.toml_file(),
+            line,
+            column,
+            key,
+            expected,
+            found,
+        }
+    }
+
+    fn positive(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
+        let number = *value.get_ref();
+        if number > 0.0 && number.is_finite() {
+            return Ok(number);
+        }
+        Err(self.value(value.span(), key, "a positive finite number"))
+    }
+
+    fn time(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
+        let number = *value.get_ref();
+        if (0.0..=600.0).contains(&number) {
+            return Ok(number);
+        }
+        Err(self.value(value.span(), key, "a time from 0 to 600 s"))
+    }
+
+    fn tool_limits(&self, tool: &Tool) -> Result<ToolLimits, RobotError> {
+        let of = |key: &str, value| self.positive(&format!("tool_limits.{key}"), value);
+        Ok(ToolLimits {
+            speed: of("speed_m_per_s", &tool.speed_m_per_s)?,
+            acceleration: of("acceleration_m_per_s2", &tool.acceleration_m_per_s2)?,
+            jerk: of("jerk_m_per_s3", &tool.jerk_m_per_s3)?,
+            angular_speed: of("angular_speed_rad_per_s", &tool.angular_speed_rad_per_s)?,
+            angular_acceleration: of(
+                "angular_acceleration_rad_per_s2",
+                &tool.angular_acceleration_rad_per_s2,
+            )?,
+            angular_jerk: of("angular_jerk_rad_per_s3", &tool.angular_jerk_rad_per_s3)?,
+            source: tool.source.clone(),
+        })
+    }
+
+    /// Limits of the URDF where it has them, of `robot.toml` elsewhere.
+    fn joint_limits(
+        &self,
+        model: &Model,
+        joints: &Spanned<Joints>,
+    ) -> Result<JointLimits, RobotError> {
+        let (span, given) = (joints.span(), joints.get_ref());
+        let of = |key: &str, ours: &Option<Spanned<Vec<f64>>>, urdf: Vec<Option<f64>>| {
+            let key = format!("joints.{key}");
+            if let Some(ours) = ours {
+                self.check_count(&key, ours, model.dof())?;
+                if !ours
+                    .get_ref()
+                    .iter()
+                    .all(|value| *value > 0.0 && value.is_finite())
+                {
+                    return Err(self.value(ours.span(), &key, "positive finite numbers"));
+                }
+            }
+            let one = |(index, urdf): (usize, Option<f64>)| {
+                let ours = ours
+                    .as_ref()
+                    .and_then(|ours| ours.get_ref().get(index).copied());
+                urdf.or(ours).ok_or_else(|| {
+                    let name = model.joints.get(index).map_or("", |joint| &joint.name);
+                    let expected = format!("a value for joint \"{name}\", as its URDF has none");
+                    let mut error = self.value(span.clone(), &key, &expected);
+                    if let RobotError::Value { found, .. } = &mut error {
+                        "no such key".clone_into(found);
+                    }
+                    error
+                })
+            };
+            urdf.into_iter()
+                .enumerate()
+                .map(one)
+                .collect::<Result<Vec<f64>, RobotError>>()
+        };
+        let each = |take: fn(&urdf::JointInfo) -> Option<f64>| -> Vec<Option<f64>> {
+            model.joints.iter().map(take).collect()
+        };
+        Ok(JointLimits {
+            lower: model.joints.iter().map(|joint| joint.lower).collect(),
+            upper: model.joints.iter().map(|joint| joint.upper).collect(),
+            velocity: of(
+                "velocity_per_s",
+                &given.velocity_per_s,
+                each(|joint| joint.velocity),
+            )?,
+            acceleration: of(
+                "acceleration_per_s2",
+                &given.acceleration_per_s2,
+                // One bound serves both directions, so the smaller of the two holds.
+                each(|joint| match (joint.acceleration, joint.deceleration) {
+                    (Some(up), Some(down)) => Some(up.min(down)),
+                    (up, down) => up.or(down),
+                }),
+            )?,
+            jerk: of("jerk_per_s3", &given.jerk_per_s3, each(|joint| joint.jerk))?,
+            source: given.source.clone(),
+        })
+    }
+
+    fn check_count(
+        &self,
+        key: &str,
+        values: &Spanned<Vec<f64>>,
+        dof: usize,
+    ) -> Result<(), RobotError> {
+        if values.get_ref().len() == dof {
+            return Ok(());
+        }
+        let expected = format!("{dof} numbers, one a joint");
+        Err(self.value(values.span(), key, &expected))
+    }
+
+    fn home(&self, home: &Home, model: &Model) -> Result<Vec<f64>, RobotError> {
+        let (key, values) = ("home.joints_rad_or_m", &home.joints_rad_or_m);
+        self.check_count(key, values, model.dof())?;
+        for (value, joint) in values.get_ref().iter().zip(&model.joints) {
+            if !(joint.lower..=joint.upper).contains(value) || !value.is_finite() {
+                let (name, lower, upper) = (&joint.name, joint.lower, joint.upper);
+                let expected = format!("joint \"{name}\" from {lower} to {upper}");
+                return Err(self.value(values.span(), key, &expected));
+            }
+        }
+        Ok(values.get_ref().clone())
+    }
+
+    fn pose(&self, key: &str, pose: &Pose) -> Result<Isometry3<f64>, RobotError> {
+        for (part, values) in [
+            ("position_m", &pose.position_m),
+            ("roll_pitch_yaw_rad", &pose.roll_pitch_yaw_rad),
+        ] {
+            if !values.get_ref().iter().all(|value| value.abs() <= 1e4) {
+                let key = format!("{key}.{part}");
+                return Err(self.value(values.span(), &key, "three numbers of at most 10000"));
+            }
+        }
+        let [x, y, z] = *pose.position_m.get_ref();
+        let [roll, pitch, yaw] = *pose.roll_pitch_yaw_rad.get_ref();
+        Ok(Isometry3::from_parts(
+            Translation3::new(x, y, z),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        ))
+    }
+
+    fn optional_pose(
+        &self,
+        key: &str,
+        pose: Option<&Pose>,
+    ) -> Result<Option<Isometry3<f64>>, RobotError> {
+        pose.map(|pose| self.pose(key, pose)).transpose()
+    }
+
+    fn changer(&self, changer: Option<&Changer>) -> Result<Option<ToolChanger>, RobotError> {
+        let Some(changer) = changer else {
+            return Ok(None);
+        };
+        Ok(Some(ToolChanger {
+            opening: self.time("tool_changer.opening_s", &changer.opening_s)?,
+            closing: self.time("tool_changer.closing_s", &changer.closing_s)?,
+        }))
+    }
+
+    fn end_effectors(&self, effectors: &[Effector]) -> Result<Vec<EndEffector>, RobotError> {
+        let mut read: Vec<EndEffector> = Vec::new();
+        for effector in effectors {
+            let name = effector.name.get_ref();
+            if name.is_empty() || read.iter().any(|other| other.name == *name) {
+                let expected = "a name that no other end effector has";
+                return Err(self.value(effector.name.span(), "end_effector.name", expected));
+            }
+            let gripper = match (&effector.opening_s, &effector.closing_s) {
+                (None, None) => None,
+                (Some(opening), Some(closing)) => Some(Gripper {
+                    opening: self.time("end_effector.opening_s", opening)?,
+                    closing: self.time("end_effector.closing_s", closing)?,
+                }),
+                (Some(one), None) | (None, Some(one)) => {
+                    let expected = "both opening_s and closing_s, or neither";
+                    return Err(self.value(one.span(), "end_effector", expected));
+                }
+            };
+            read.push(EndEffector {
+                name: name.clone(),
+                flange_from_tcp: self
+                    .pose("end_effector.flange_from_tcp", &effector.flange_from_tcp)?,
+                gripper,
+                workstation_from_holder: self.optional_pose(
+                    "end_effector.workstation_from_holder",
+                    effector.workstation_from_holder.as_ref(),
+                )?,
+            });
+        }
+        Ok(read)
+    }
+
+    fn mounted(
+        &self,
+        mounted: Option<&Spanned<String>>,
+        effectors: &[EndEffector],
+    ) -> Result<Option<usize>, RobotError> {
+        let Some(mounted) = mounted else {
+            return Ok(None);
+        };
+        let index = effectors
+            .iter()
+            .position(|effector| effector.name == *mounted.get_ref());
+        index.map(Some).ok_or_else(|| {
+            self.value(
+                mounted.span(),
+                "mounted",
+                "the name of an end effector of this file",
+            )
+        })
+    }
+}
+
+/// Line and column of a byte offset, both counted from 1.
+fn position(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+    (line, column)
+}

@@ -1,0 +1,127 @@
+//! A robot folder from any URDF, with our own defaults for what it does not say.
+
+use super::error::RobotError;
+use super::{Robot, load};
+use kinematics::{Model, urdf};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Makes a robot folder from a URDF: copies it to `folder/robot.urdf` and writes a
+/// `folder/robot.toml` whose defaults are marked as ours. Returns the robot, loaded.
+///
+/// `tip` names the link at the flange; it is needed when several could be it.
+///
+/// # Errors
+/// [`RobotError`] when the URDF cannot be used, when the folder has a
+/// `robot.toml` already, or when it cannot be written.
+pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robot, RobotError> {
+    let file = urdf_file.display().to_string();
+    let text = std::fs::read_to_string(urdf_file).map_err(|error| RobotError::Read {
+        file: file.clone(),
+        message: error.to_string(),
+    })?;
+    let model = urdf::read(&text, tip).map_err(|source| RobotError::Urdf { file, source })?;
+    let write = |path: &Path, text: &str| {
+        std::fs::write(path, text).map_err(|error| RobotError::Write {
+            file: path.display().to_string(),
+            message: error.to_string(),
+        })
+    };
+    let toml = folder.join("robot.toml");
+    if toml.exists() {
+        let message = "it exists already".to_owned();
+        return Err(RobotError::Write {
+            file: toml.display().to_string(),
+            message,
+        });
+    }
+    std::fs::create_dir_all(folder).map_err(|error| RobotError::Write {
+        file: folder.display().to_string(),
+        message: error.to_string(),
+    })?;
+    write(&folder.join("robot.urdf"), &text)?;
+    write(&toml, &defaults(&model))?;
+    let folder = folder.display().to_string();
+    load(
+        if folder.contains('/') {
+            folder
+        } else {
+            format!("./{folder}")
+        }
+        .as_str(),
+    )
+}
+
+/// Text of a `robot.toml` for a model, every default marked as ours.
+fn defaults(model: &Model) -> String {
+    let velocity: Vec<f64> = model
+        .joints
+        .iter()
+        .map(|joint| joint.velocity.unwrap_or(DEFAULT_VELOCITY))
+        .collect();
+    let mut text = String::new();
+    // Writing to a `String` cannot fail.
+    let _ = write!(
+        text,
+        r#"description = {name}
+tip_link = {tip}
+
+# One value a joint, root first; rad for turning joints, m for sliding ones.
+# What the URDF gives goes before what stands here.
+[joints]
+source = "canter default"
+velocity_per_s = {velocity:?}
+acceleration_per_s2 = {acceleration:?}
+jerk_per_s3 = {jerk:?}
+
+[tool_limits]
+source = "canter default"
+speed_m_per_s = 1.0
+acceleration_m_per_s2 = 5.0
+jerk_m_per_s3 = 100.0
+angular_speed_rad_per_s = 3.0
+angular_acceleration_rad_per_s2 = 15.0
+angular_jerk_rad_per_s3 = 300.0
+
+# Where the base stands in the workstation.
+[base]
+position_m = [0.0, 0.0, 0.0]
+roll_pitch_yaw_rad = [0.0, 0.0, 0.0]
+
+# Middle of the joint ranges; put a good ready position here.
+[home]
+joints_rad_or_m = {home:?}
+"#,
+        name = toml::Value::from(model.name.as_str()),
+        tip = toml::Value::from(model.tip_link.as_str()),
+        velocity = velocity,
+        acceleration = velocity.iter().map(|v| tidy(v / 0.6)).collect::<Vec<_>>(),
+        jerk = velocity
+            .iter()
+            .map(|v| tidy(v / 0.6 * 20.0))
+            .collect::<Vec<_>>(),
+        home = model
+            .joints
+            .iter()
+            .map(|joint| middle(joint.lower, joint.upper))
+            .collect::<Vec<_>>(),
+    );
+    text
+}
+
+/// Speed for a joint whose URDF gives none, rad/s or m/s.
+const DEFAULT_VELOCITY: f64 = 0.5;
+
+/// Three figures after the point, and never zero.
+fn tidy(value: f64) -> f64 {
+    ((value * 1e3).round() / 1e3).max(1e-3)
+}
+
+/// Zero where the joint can stand there, else the middle of its range.
+fn middle(lower: f64, upper: f64) -> f64 {
+    if lower <= 0.0 && upper >= 0.0 {
+        0.0
+    } else {
+        0.5 * (lower + upper)
+    }
+}

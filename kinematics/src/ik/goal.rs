@@ -1,0 +1,192 @@
+//! What the tool is to reach, and how far it is from it.
+
+use crate::arith::{Arith, V4};
+use crate::chain::Frame;
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+/// Length that counts as much as one radian, m.
+pub(crate) const LENGTH: f64 = 0.3;
+
+/// What the tool is to reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// A full pose.
+    Pose(Isometry3<f64>),
+    /// A position; the tool may turn as it likes.
+    Position(Point3<f64>),
+    /// A position with the tool's z axis along a direction; the tool may spin about it.
+    Axis(Point3<f64>, Unit<Vector3<f64>>),
+}
+
+/// A goal as the solver's inner loop takes it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target {
+    frame: Frame,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Pose,
+    Position,
+    Axis,
+}
+
+/// Distance from a goal, positions divided by [`LENGTH`], and its two plain sizes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Miss {
+    pub(crate) rows: [f64; 6],
+    /// m.
+    pub(crate) position: f64,
+    /// rad.
+    pub(crate) rotation: f64,
+}
+
+impl Goal {
+    pub(crate) fn target(&self) -> Target {
+        let (pose, kind) = match self {
+            Self::Pose(pose) => (*pose, Kind::Pose),
+            Self::Position(point) => (
+                Isometry3::translation(point.x, point.y, point.z),
+                Kind::Position,
+            ),
+            Self::Axis(point, axis) => {
+                let turn = crate::chain::z_to(axis);
+                (Isometry3::from_parts(point.coords.into(), turn), Kind::Axis)
+            }
+        };
+        Target {
+            frame: Frame::from_isometry(&pose),
+            kind,
+        }
+    }
+}
+
+impl Target {
+    /// How far the tool is from the goal: what is to be added, in base axes.
+    #[inline(always)]
+    pub(crate) fn miss<A: Arith>(&self, a: A, tool: &Frame) -> Miss {
+        let d = self.frame.p.sub(tool.p).0;
+        let w = match self.kind {
+            Kind::Pose => rotation_between(a, tool, &self.frame),
+            Kind::Position => [0.0; 3],
+            Kind::Axis => turn_between(a, tool.z, self.frame.z),
+        };
+        let square = |v: [f64; 3]| a.fma(v[0], v[0], a.fma(v[1], v[1], v[2] * v[2]));
+        let scale = 1.0 / LENGTH;
+        Miss {
+            rows: [d[0] * scale, d[1] * scale, d[2] * scale, w[0], w[1], w[2]],
+            position: square([d[0], d[1], d[2]]).sqrt(),
+            rotation: square(w).sqrt(),
+        }
+    }
+
+    /// Scales the position rows of a Jacobian (one row an array) and takes out of
+    /// the angular rows what the goal leaves free.
+    #[inline(always)]
+    pub(crate) fn shape<A: Arith>(&self, a: A, tool: &Frame, rows: &mut [[f64; 8]; 6]) {
+        for row in rows.iter_mut().take(3) {
+            for value in row {
+                *value *= 1.0 / LENGTH;
+            }
+        }
+        match self.kind {
+            Kind::Pose => {}
+            Kind::Position => rows[3..].fill([0.0; 8]),
+            Kind::Axis => {
+                let z = tool.z.0;
+                for column in 0..8 {
+                    let w = [rows[3][column], rows[4][column], rows[5][column]];
+                    let along = a.fma(w[0], z[0], a.fma(w[1], z[1], w[2] * z[2]));
+                    for i in 0..3 {
+                        rows[3 + i][column] = w[i] - along * z[i];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Rotation vector, in base axes, that turns frame `from` into frame `to`.
+///
+/// # Source
+/// The logarithm of a rotation; J. J. Craig, Introduction to Robotics, 2005, eq. 2.80-2.82.
+#[inline(always)]
+fn rotation_between<A: Arith>(a: A, from: &Frame, to: &Frame) -> [f64; 3] {
+    let pairs = [(from.x, to.x), (from.y, to.y), (from.z, to.z)];
+    let (mut s, mut trace) = ([0.0; 3], 0.0);
+    for (f, t) in pairs {
+        let cross = f.cross(a, t).0;
+        for i in 0..3 {
+            s[i] += 0.5 * cross[i];
+        }
+        trace = a.fma(
+            f.0[0],
+            t.0[0],
+            a.fma(f.0[1], t.0[1], a.fma(f.0[2], t.0[2], trace)),
+        );
+    }
+    let (sin2, cos) = (
+        a.fma(s[0], s[0], a.fma(s[1], s[1], s[2] * s[2])),
+        0.5 * (trace - 1.0),
+    );
+    if cos > 0.0 && sin2 < 1e-6 {
+        // Angle over sine: series of the arc sine.
+        let ratio = a.fma(sin2, a.fma(sin2, 3.0 / 40.0, 1.0 / 6.0), 1.0);
+        return s.map(|value| value * ratio);
+    }
+    let sin = sin2.sqrt();
+    if cos < 0.0 && sin < 1e-4 {
+        return half_turn(from, to, s);
+    }
+    let ratio = sin.atan2(cos) / sin;
+    s.map(|value| value * ratio)
+}
+
+/// Rotation vector where the turn is so near half a turn that its sine says nothing.
+#[cold]
+fn half_turn(from: &Frame, to: &Frame, s: [f64; 3]) -> [f64; 3] {
+    // R + 1 = 2 axis axis^T at half a turn: its longest column gives the axis.
+    let mut longest = Vector3::zeros();
+    for j in 0..3 {
+        let column = Vector3::from_fn(|i, _| {
+            let r = from.x.0[j] * to.x.0[i] + from.y.0[j] * to.y.0[i] + from.z.0[j] * to.z.0[i];
+            if i == j { r + 1.0 } else { r }
+        });
+        if column.norm_squared() > longest.norm_squared() {
+            longest = column;
+        }
+    }
+    let s = Vector3::from(s);
+    let axis = longest.normalize();
+    let axis = if axis.dot(&s) < 0.0 { -axis } else { axis };
+    (axis * (std::f64::consts::PI - s.norm())).into()
+}
+
+/// Rotation vector that turns direction `from` into `to` the shortest way.
+#[inline(always)]
+fn turn_between<A: Arith>(a: A, from: V4, to: V4) -> [f64; 3] {
+    let s = from.cross(a, to).0;
+    let cos = a.fma(
+        from.0[0],
+        to.0[0],
+        a.fma(from.0[1], to.0[1], from.0[2] * to.0[2]),
+    );
+    let sin = a.fma(s[0], s[0], a.fma(s[1], s[1], s[2] * s[2])).sqrt();
+    if sin < 1e-12 {
+        if cos > 0.0 {
+            return [s[0], s[1], s[2]];
+        }
+        // Opposite: any axis across will do.
+        let z = from.0;
+        let across = if z[0].abs() < 0.7 {
+            [0.0, z[2], -z[1]]
+        } else {
+            [-z[2], 0.0, z[0]]
+        };
+        let length = (across[0].powi(2) + across[1].powi(2) + across[2].powi(2)).sqrt();
+        return across.map(|value| value / length * std::f64::consts::PI);
+    }
+    let ratio = sin.atan2(cos) / sin;
+    [s[0] * ratio, s[1] * ratio, s[2] * ratio]
+}

@@ -1,0 +1,54 @@
+//! Whole turns of joints: the same pose, another joint position.
+
+use crate::chain::Chain;
+use nalgebra::SVector;
+use std::f64::consts::TAU;
+
+/// `q` with every turning joint moved by whole turns to be nearest to `seed`
+/// within its limits. A joint that no turn brings inside its limits stays near `seed`.
+#[inline]
+pub(crate) fn nearest<const N: usize>(
+    chain: &Chain<N>,
+    q: &SVector<f64, N>,
+    seed: &SVector<f64, N>,
+) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| {
+        if chain.prismatic()[i] {
+            return q[i];
+        }
+        let near = q[i] + TAU * ((seed[i] - q[i]) / TAU).round();
+        let (low, high) = (chain.lower()[i] - SLACK, chain.upper()[i] + SLACK);
+        let moved = if near > high {
+            near - TAU * ((near - high) / TAU).ceil()
+        } else if near < low {
+            near + TAU * ((low - near) / TAU).ceil()
+        } else {
+            near
+        };
+        if moved < low || moved > high {
+            near
+        } else {
+            moved.clamp(chain.lower()[i], chain.upper()[i])
+        }
+    })
+}
+
+/// Rounding that a limit forgives, rad.
+pub(crate) const SLACK: f64 = 1e-9;
+
+/// Largest difference of two joint positions, whole turns not counted.
+pub(crate) fn distance<const N: usize>(
+    chain: &Chain<N>,
+    a: &SVector<f64, N>,
+    b: &SVector<f64, N>,
+) -> f64 {
+    (0..N).fold(0.0_f64, |most, i| {
+        let d = a[i] - b[i];
+        let d = if chain.prismatic()[i] {
+            d
+        } else {
+            d - TAU * (d / TAU).round()
+        };
+        most.max(d.abs())
+    })
+}

@@ -1,0 +1,79 @@
+//! How well an arm can move where it stands.
+
+use crate::chain::Chain;
+use crate::ik::LENGTH;
+use nalgebra::{SMatrix, SVector};
+
+/// How well an arm can move at one joint position. Lengths count in units of
+/// 0.3 m, so that translations and rotations compare.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dexterity {
+    /// Product of the singular values.
+    pub manipulability: f64,
+    /// Smallest singular value: tool motion for one unit of joint motion in the
+    /// direction that the arm does worst; zero where it is singular.
+    pub smallest: f64,
+    /// Largest over smallest singular value; infinite where the arm is singular.
+    pub condition: f64,
+}
+
+/// Dexterity of an arm at `q` (rad, m).
+///
+/// # Source
+/// T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research
+/// 4(2), 1985, eq. 15.
+#[must_use]
+pub fn dexterity<const N: usize>(chain: &Chain<N>, q: &SVector<f64, N>) -> Dexterity {
+    let (_, mut jacobian) = chain.jacobian(q);
+    jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+    let values = singular_values(&jacobian);
+    // With fewer joints than six the arm moves in fewer directions.
+    let used = &values[6 - N.min(6)..];
+    let (smallest, largest) = (used[0], values[5]);
+    Dexterity {
+        manipulability: used.iter().product(),
+        smallest,
+        condition: if smallest > 0.0 {
+            largest / smallest
+        } else {
+            f64::INFINITY
+        },
+    }
+}
+
+/// The six singular values of a Jacobian in rising order.
+///
+/// Computed by one-sided Jacobi rotations of the rows, which keeps even the small ones exact.
+///
+/// # Source
+/// G. Golub and C. Van Loan, Matrix Computations, 2013, section 8.6.3.
+#[must_use]
+pub fn singular_values<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [f64; 6] {
+    let mut rows: [SVector<f64, N>; 6] = std::array::from_fn(|i| jacobian.row(i).transpose());
+    for _ in 0..30 {
+        let mut turned = false;
+        for i in 0..6 {
+            for k in i + 1..6 {
+                let (a, b) = (rows[i].norm_squared(), rows[k].norm_squared());
+                let c = rows[i].dot(&rows[k]);
+                if c.abs() <= 1e-15 * (a * b).sqrt() || c.abs() < 1e-300 {
+                    continue;
+                }
+                turned = true;
+                let zeta = (b - a) / (2.0 * c);
+                let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+                let cos = 1.0 / tangent.hypot(1.0);
+                let sin = cos * tangent;
+                let (x, y) = (rows[i], rows[k]);
+                rows[i] = x * cos - y * sin;
+                rows[k] = x * sin + y * cos;
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    let mut values = rows.map(|row| row.norm());
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}

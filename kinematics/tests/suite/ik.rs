@@ -1,0 +1,95 @@
+//! Inverse kinematics: what comes out reaches the pose, and what does not come is explained.
+
+use crate::arms::{self, Random, SEVEN, SIX};
+use kinematics::{Goal, Obstacle, Solver};
+use nalgebra::{Isometry3, Vector3};
+
+/// Distance (m) and angle (rad) between two poses.
+pub(crate) fn error(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let matrix =
+        a.rotation.to_rotation_matrix().matrix() - b.rotation.to_rotation_matrix().matrix();
+    // For small angles the Frobenius norm is sqrt(2) times the angle.
+    (
+        (a.translation.vector - b.translation.vector).norm(),
+        matrix.norm() / 2.0_f64.sqrt(),
+    )
+}
+
+fn cold<const N: usize>(name: &str, count: u32) {
+    let solver = Solver::new(arms::chain::<N>(name));
+    let mut random = Random(5);
+    for i in 0..count {
+        let q = random.joints(solver.chain());
+        let pose = solver.chain().forward(&q);
+        let solution = solver
+            .solve(&pose)
+            .unwrap_or_else(|report| panic!("{name} {i}: {report}\n{q}"));
+        let (position, rotation) = error(&solver.chain().forward(&solution.q), &pose);
+        assert!(
+            position < 2e-9 && rotation < 2e-9,
+            "{name} {i}: {position} m, {rotation} rad"
+        );
+        assert!(solver.chain().within_limits(&solution.q, 0.0), "{name} {i}");
+    }
+}
+
+#[test]
+fn every_reachable_pose_is_reached() {
+    SIX.iter().for_each(|name| cold::<6>(name, 1000));
+    SEVEN.iter().for_each(|name| cold::<7>(name, 1000));
+}
+
+#[test]
+fn out_of_reach_says_by_how_much() {
+    let solver = Solver::new(arms::chain::<6>("irb120"));
+    // The shoulder is at 0.29 m; straight out the arm reaches 0.27 + hypot(0.302, 0.07) + 0.072 m.
+    let far = Isometry3::new(
+        Vector3::new(1.0, 0.0, 0.29),
+        Vector3::y() * std::f64::consts::FRAC_PI_2,
+    );
+    let report = solver.solve(&far).unwrap_err();
+    let Obstacle::OutOfReach { distance } = report.obstacle else {
+        panic!("{report}")
+    };
+    let reach = 0.27 + 0.302_f64.hypot(0.07) + 0.072;
+    assert!(
+        (distance - (1.0 - reach)).abs() < 2e-3,
+        "{distance} against {}",
+        1.0 - reach
+    );
+    assert!(
+        report.to_string().starts_with("out of reach by "),
+        "{report}"
+    );
+    let nan = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    assert_eq!(
+        solver.solve(&nan).unwrap_err().obstacle,
+        Obstacle::NotFinite
+    );
+}
+
+/// Position alone and position with an axis are reached as well.
+#[test]
+fn partial_goals_are_reached() {
+    for name in SIX {
+        let solver = Solver::new(arms::chain::<6>(name));
+        let mut random = Random(9);
+        for _ in 0..100 {
+            let pose = solver.chain().forward(&random.joints(solver.chain()));
+            let seed = random.joints(solver.chain());
+            let point = pose.translation.vector.into();
+            let reached = solver.reach(&Goal::Position(point), &seed).unwrap();
+            assert!(
+                (solver.chain().forward(&reached.q).translation.vector - point.coords).norm()
+                    < 1e-8
+            );
+            let axis = nalgebra::Unit::new_normalize(pose.rotation * Vector3::z());
+            let reached = solver.reach(&Goal::Axis(point, axis), &seed).unwrap();
+            let found = solver.chain().forward(&reached.q);
+            assert!(
+                (found.rotation * Vector3::z() - *axis).norm() < 1e-8,
+                "{name}"
+            );
+        }
+    }
+}

@@ -1,0 +1,338 @@
+//! One joint between two states: which durations are possible, and the profile for one of them.
+
+use super::side::{Bounds, End, Extremal, Side};
+use super::strand::{Course, Strand};
+
+/// The normalised problem of one joint: from `start` to `end`, which are `distance` apart.
+///
+/// For a duration `T` the displacements that can be reached are exactly the interval between the
+/// farthest profile backward and the farthest forward ([`Side`]), because dynamics are linear and
+/// limits convex. So `T` is possible if `distance` is in that interval, and then a weighted mean of
+/// the two farthest profiles is a profile that keeps every limit and ends exactly at the target.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Axis {
+    start: End,
+    end: End,
+    bounds: Bounds,
+    distance: f64,
+    /// How exactly `distance` is known.
+    slack: f64,
+    up: Side,
+    down: Side,
+    resting: bool,
+}
+
+/// Durations that join the velocities: `early` (if any) and all from `late` on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Windows {
+    pub(crate) early: Option<(f64, f64)>,
+    pub(crate) late: f64,
+}
+
+impl Axis {
+    pub(crate) fn new(start: End, end: End, bounds: Bounds, distance: f64, noise: f64) -> Self {
+        let still = |e: End| e.velocity == 0.0 && e.acceleration == 0.0;
+        Self {
+            start,
+            end,
+            bounds,
+            distance,
+            slack: noise + 1e-14 * (1.0 + distance.abs()),
+            up: Side::new(start, end, bounds),
+            down: Side::new(start.mirrored(), end.mirrored(), bounds.mirrored()),
+            resting: still(start) && still(end),
+        }
+    }
+
+    /// Whether the joint can arrive after exactly `time`, seen at a glance: `None` if a closer
+    /// look is needed.
+    fn glance(&self, time: f64) -> Option<bool> {
+        if self.resting {
+            let (side, distance) = self.leading();
+            return Some(side.at(time).distance >= distance && time >= 0.0);
+        }
+        let up = self.up.at(time);
+        let down = self.down.at(time);
+        if !up.settled || !down.settled {
+            return None;
+        }
+        Some(up.distance >= self.distance && down.distance >= -self.distance)
+    }
+
+    /// A cheap guess at the shortest duration.
+    pub(crate) fn guess(&self) -> f64 {
+        let way = self.distance.abs();
+        let top = if self.distance < 0.0 {
+            -self.bounds.bottom
+        } else {
+            self.bounds.top
+        };
+        let ramps = if self.bounds.smooth {
+            (32.0 * way).cbrt()
+        } else {
+            0.0
+        };
+        ramps.max(2.0 * way.sqrt()).max(way / top)
+    }
+
+    /// The side that leads towards the target of a move between states at rest.
+    fn leading(&self) -> (&Side, f64) {
+        if self.distance < 0.0 {
+            (&self.down, -self.distance)
+        } else {
+            (&self.up, self.distance)
+        }
+    }
+
+    /// The shortest duration not below `from` after which the joint can be at the target, infinity
+    /// if the numbers leave the range of floating point.
+    pub(crate) fn next_possible(&self, from: f64) -> f64 {
+        let from = from.max(0.0);
+        if self.glance(from) == Some(true) {
+            return from;
+        }
+        let windows = self.windows();
+        let tiny = 1e-14 * (1.0 + from);
+        if let Some((first, last)) = windows.early
+            && from <= last + tiny
+            && let Some(time) = self.first_in(from.max(first), last)
+        {
+            return time;
+        }
+        let late = if from + tiny >= windows.late {
+            from
+        } else {
+            windows.late
+        };
+        self.first_in(late, f64::INFINITY).unwrap_or(f64::INFINITY)
+    }
+
+    /// The first possible duration in a window in which the velocities can be joined.
+    fn first_in(&self, from: f64, last: f64) -> Option<f64> {
+        let mut time = from;
+        for _ in 0..8 {
+            let forward = first_above(&self.up, (self.distance, self.slack), time, last)?;
+            let both = first_above(&self.down, (-self.distance, self.slack), forward, last)?;
+            if both <= time || both <= forward {
+                return Some(both);
+            }
+            time = both;
+        }
+        None
+    }
+
+    fn windows(&self) -> Windows {
+        let (start, end) = (self.start, self.end);
+        if !self.bounds.smooth {
+            let change = end.velocity - start.velocity;
+            let bound = if change > 0.0 {
+                self.bounds.rise
+            } else {
+                self.bounds.fall
+            };
+            return Windows {
+                early: None,
+                late: change.abs() / bound,
+            };
+        }
+        velocity_windows(start, end, self.bounds)
+    }
+
+    /// The profile of duration `time`, which must be possible.
+    pub(crate) fn course(&self, time: f64) -> Course {
+        if self.resting {
+            return self.resting_course(time);
+        }
+        let up = self.up.at(time);
+        let down = self.down.at(time);
+        let (highest, lowest) = (up.distance, -down.distance);
+        let weight = if self.distance >= highest - self.slack {
+            1.0
+        } else if self.distance <= lowest + self.slack {
+            0.0
+        } else {
+            (self.distance - lowest) / (highest - lowest)
+        };
+        let mut course = Course::default();
+        if weight > 0.0 {
+            course.push(self.strand(&self.up, &up, 1.0), weight);
+        }
+        if weight < 1.0 {
+            course.push(self.strand(&self.down, &down, -1.0), 1.0 - weight);
+        }
+        course
+    }
+
+    fn resting_course(&self, time: f64) -> Course {
+        let (side, distance) = self.leading();
+        let mut course = Course::default();
+        if distance == 0.0 {
+            return course;
+        }
+        let extremal = side.at(time);
+        let weight = if distance >= extremal.distance {
+            1.0
+        } else {
+            distance / extremal.distance
+        };
+        let sign = if self.distance < 0.0 { -1.0 } else { 1.0 };
+        course.push(self.strand(side, &extremal, sign), weight);
+        course
+    }
+
+    fn strand(&self, side: &Side, extremal: &Extremal, sign: f64) -> Strand {
+        let times = side.phases(extremal);
+        if self.bounds.smooth {
+            Strand::jerks(times, sign)
+        } else {
+            let bounds = if sign < 0.0 {
+                self.bounds.mirrored()
+            } else {
+                self.bounds
+            };
+            Strand::accelerations(times, sign * bounds.rise, -sign * bounds.fall)
+        }
+    }
+}
+
+/// Durations after which the velocity and acceleration of `end` can be reached from `start`
+/// within acceleration and jerk bounds, whatever the position.
+///
+/// # Source
+/// The change of velocity in time T is largest for a pulse of height c = (T + a0 + af)/2, that is
+/// c² - (a0² + af²)/2 without plateau; likewise the smallest in the mirror.
+pub(crate) fn velocity_windows(start: End, end: End, bounds: Bounds) -> Windows {
+    let (a0, af) = (start.acceleration, end.acceleration);
+    let shortest = (af - a0).abs();
+    let change = end.velocity - start.velocity;
+    let half = 0.5 * (a0 * a0 + af * af);
+    let (up_first, up_next) = pulse_windows(change + half, bounds.rise, a0, af);
+    let (down_first, down_next) = pulse_windows(half - change, bounds.fall, -a0, -af);
+    let (up_next, down_next) = (up_next.max(shortest), down_next.max(shortest));
+    let early = match (up_first, down_first) {
+        (Some(last), _) if down_next <= last => Some((down_next, last)),
+        (_, Some(last)) if up_next <= last => Some((up_next, last)),
+        _ => None,
+    };
+    Windows {
+        early,
+        late: up_next.max(down_next),
+    }
+}
+
+/// The durations for which the largest change of velocity is at least the wanted: up to the first
+/// (if there are such), and from the second on.
+fn pulse_windows(square: f64, bound: f64, a0: f64, af: f64) -> (Option<f64>, f64) {
+    if square <= 0.0 {
+        return (None, 0.0);
+    }
+    let height = square.sqrt();
+    let bound = bound.max(a0).max(af);
+    let next = if height <= bound {
+        height
+    } else {
+        0.5 * (square / bound + bound)
+    };
+    let first = (a0.max(af) <= -height).then_some(-2.0 * height - a0 - af);
+    (first, 2.0 * next - a0 - af)
+}
+
+/// The first time in `from..=last` at which `side` gets at least `target.0` far; `target.1` is how
+/// exactly that is known.
+///
+/// The slope of the distance falls, then rises (until the velocity bound is reached, where it is
+/// constant and positive): there is at most one hump before the last rise.
+fn first_above(side: &Side, target: (f64, f64), from: f64, last: f64) -> Option<f64> {
+    let (goal, slack) = target;
+    let here = side.at(from);
+    if here.distance >= goal - slack - side.noise(&here) {
+        return Some(from);
+    }
+    if !here.crossing
+        && here.slope > 0.0
+        && let Some(top) = hump(side, from, last)
+        && side.at(top).distance >= goal
+    {
+        return Some(root(side, goal, from, top));
+    }
+    if last.is_finite() {
+        return (side.at(last).distance >= goal).then(|| root(side, goal, from, last));
+    }
+    let cruise = side.cruise_time();
+    if !cruise.is_finite() {
+        return unbounded_root(side, goal, from);
+    }
+    let end = cruise.max(from);
+    let missing = goal - side.at(end).distance;
+    if missing >= 0.0 {
+        return Some(end + missing / side.top());
+    }
+    Some(root(side, goal, from, end))
+}
+
+/// The root where velocity has no bound: double the time until it is enclosed.
+fn unbounded_root(side: &Side, goal: f64, from: f64) -> Option<f64> {
+    let mut step = 1.0 + from;
+    for _ in 0..1100 {
+        if side.at(from + step).distance >= goal {
+            return Some(root(side, goal, from, from + step));
+        }
+        step *= 2.0;
+    }
+    None
+}
+
+/// The time of the local maximum of the distance in `from..=last`, if there is one.
+fn hump(side: &Side, from: f64, last: f64) -> Option<f64> {
+    let (mut low, mut high) = (from, side.slowest(from).min(last));
+    if side.at(high).slope >= 0.0 {
+        return None;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if side.at(middle).slope > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(low)
+}
+
+/// The time between `low` (not far enough) and `high` (far enough) at which `goal` is reached.
+fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
+    let (mut low, mut high) = (low, high);
+    let below = goal - side.at(low).distance;
+    let width = side.at(high).distance - goal + below;
+    let share = if width > 0.0 {
+        (below / width).clamp(0.0, 1.0)
+    } else {
+        1.0
+    };
+    let mut time = low + (high - low) * share.cbrt();
+    for _ in 0..100 {
+        let here = side.at(time);
+        let error = here.distance - goal;
+        if error >= 0.0 {
+            high = time;
+        } else {
+            low = time;
+        }
+        let step = error / here.slope;
+        let newton = time - step;
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        if step.abs() <= 2.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
+            return if error >= 0.0 || step.abs() <= 4.0 * f64::EPSILON * time {
+                time
+            } else {
+                high
+            };
+        }
+        time = next;
+    }
+    high
+}

@@ -1,0 +1,164 @@
+//! From states, limits and options to a move.
+
+use super::error::OtgError;
+use super::joint::{Given, Joint};
+use super::limits::Limits;
+use super::motion::{Motion, Track};
+use super::options::{Interface, Options, Synchronisation};
+use super::state::State;
+use super::{check, line};
+
+/// Plans the fastest move; see `Otg::plan`.
+pub(crate) fn plan<const N: usize>(
+    start: &State<N>,
+    target: &State<N>,
+    limits: &Limits<N>,
+    options: &Options<N>,
+) -> Result<Motion<N>, OtgError> {
+    check::input(start, target, limits, options)?;
+    match options.synchronisation {
+        Synchronisation::Phase => return line::plan(start, target, limits, options),
+        Synchronisation::PhaseIfPossible => match line::plan(start, target, limits, options) {
+            Err(OtgError::NotStraight { .. }) => {}
+            other => return other,
+        },
+        Synchronisation::Time | Synchronisation::None => {}
+    }
+    let joints: [Joint; N] = std::array::from_fn(|joint| {
+        if options.enabled[joint] {
+            Joint::new(
+                &Given::of(joint, start, target, limits),
+                options.interface[joint],
+            )
+        } else {
+            Joint::default()
+        }
+    });
+    let motion = if options.synchronisation == Synchronisation::None {
+        apart(&joints, start, target, options)?
+    } else {
+        let duration = common_duration(&joints, options)?;
+        assemble(&joints, start, target, options, &[duration; N])
+    };
+    check::positions(&motion, limits, options)?;
+    Ok(motion)
+}
+
+/// Every joint for itself.
+fn apart<const N: usize>(
+    joints: &[Joint; N],
+    start: &State<N>,
+    target: &State<N>,
+    options: &Options<N>,
+) -> Result<Motion<N>, OtgError> {
+    let mut durations = [0.0; N];
+    for joint in 0..N {
+        let alone = std::slice::from_ref(&joints[joint]);
+        durations[joint] = common_duration(alone, options).map_err(|error| match error {
+            OtgError::OutOfRange { time, .. } => OtgError::OutOfRange { joint, time },
+            other => other,
+        })?;
+    }
+    Ok(assemble(joints, start, target, options, &durations))
+}
+
+/// The shortest duration (s) that is possible for all `joints` and fits `options`.
+///
+/// Starts from a lower bound and lets every joint in turn raise it to its next possible duration,
+/// until all agree. So blocked intervals cost nothing where they do not matter.
+pub(crate) fn common_duration<const N: usize>(
+    joints: &[Joint],
+    options: &Options<N>,
+) -> Result<f64, OtgError> {
+    let mut duration = whole_periods(options.minimum_duration, options.period);
+    let mut joint = slowest(joints);
+    let mut agreed = 0;
+    for _ in 0..(joints.len() * 8 + 16) {
+        let next = joints[joint].next_possible(duration);
+        if !next.is_finite() {
+            return Err(OtgError::OutOfRange {
+                joint,
+                time: duration,
+            });
+        }
+        let rounded = whole_periods(next, options.period);
+        agreed = if next <= duration {
+            agreed + 1
+        } else if rounded <= next {
+            1
+        } else {
+            0
+        };
+        duration = rounded.max(duration);
+        if agreed >= joints.len() {
+            return Ok(duration);
+        }
+        joint = (joint + 1) % joints.len();
+    }
+    Err(OtgError::OutOfRange {
+        joint,
+        time: duration,
+    })
+}
+
+fn slowest(joints: &[Joint]) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (index, joint) in joints.iter().enumerate() {
+        let guess = joint.guess();
+        if guess > best.1 {
+            best = (index, guess);
+        }
+    }
+    best.0
+}
+
+/// `duration` rounded up to whole periods; what is above by rounding only counts as whole.
+fn whole_periods(duration: f64, period: Option<f64>) -> f64 {
+    match period {
+        Some(period) => (duration / period * (1.0 - 4.0 * f64::EPSILON)).ceil() * period,
+        None => duration,
+    }
+}
+
+fn assemble<const N: usize>(
+    joints: &[Joint; N],
+    start: &State<N>,
+    target: &State<N>,
+    options: &Options<N>,
+    durations: &[f64; N],
+) -> Motion<N> {
+    let tracks = std::array::from_fn(|joint| {
+        let mut track = Track {
+            joint: joints[joint],
+            course: joints[joint].course(durations[joint]),
+            duration: durations[joint],
+            start: [
+                start.position[joint],
+                start.velocity[joint],
+                start.acceleration[joint],
+            ],
+            end: [
+                target.position[joint],
+                target.velocity[joint],
+                target.acceleration[joint],
+            ],
+        };
+        finish(&mut track, options.enabled[joint], options.interface[joint]);
+        track
+    });
+    let duration = durations.iter().copied().fold(0.0, f64::max);
+    Motion {
+        tracks,
+        duration,
+        straight: false,
+    }
+}
+
+/// Sets the end of a joint whose position is not asked for.
+fn finish(track: &mut Track, enabled: bool, interface: Interface) {
+    if !enabled {
+        track.end = [track.start[0], 0.0, 0.0];
+    } else if interface == Interface::Velocity {
+        track.end[0] = track.last_position();
+    }
+}
