@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod fixtures;
+mod pddl;
 mod reading;
 mod running;
 mod world;
