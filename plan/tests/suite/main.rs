@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod fixtures;
+mod killed;
+mod ordering;
 mod pddl;
 mod reading;
 mod running;
