@@ -18,6 +18,8 @@ mod logging;
 mod output;
 #[allow(dead_code)]
 mod plot;
+mod robot;
+mod table;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;

@@ -6,13 +6,13 @@ mod report;
 mod turns;
 
 pub use goal::Goal;
-pub(crate) use goal::LENGTH;
+pub(crate) use goal::{LENGTH, Miss};
 pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
 
 use crate::chain::Chain;
 use crate::measure;
 use goal::Target;
-use nalgebra::{Isometry3, SVector};
+use nalgebra::{Isometry3, SMatrix, SVector};
 use numeric::{Descent, Landing, Stop};
 
 /// Restarts before a goal counts as not reached.
@@ -136,6 +136,13 @@ impl<const N: usize> Solver<N> {
             }
         }
         found
+    }
+
+    /// Distance of the tool from a goal at `q`, and the Jacobian there.
+    pub(crate) fn miss_at(&self, goal: &Goal, q: &SVector<f64, N>) -> (Miss, SMatrix<f64, 6, N>) {
+        let chain = &self.chain;
+        let (tool, jacobian) = chain.build().run(crate::chain::Jacobian { chain, q });
+        (goal.target().miss(crate::arith::Plain, &tool), jacobian)
     }
 
     fn descend(&self, target: &Target, seed: &SVector<f64, N>, stop: Stop) -> Landing<N> {
