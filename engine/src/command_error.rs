@@ -69,3 +69,10 @@ impl CommandError {
         self
     }
 }
+
+/// A value that the language itself refuses is a range error.
+impl From<crcl::ValueError> for CommandError {
+    fn from(error: crcl::ValueError) -> Self {
+        Self::range(error.to_string()).with_help(error.help())
+    }
+}

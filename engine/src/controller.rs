@@ -1,13 +1,14 @@
 //! One arm on its way through a program: modes, planner and the pose reached so far.
 
+use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use trajectory::JointLimits;
 
 use crate::command_error::{CommandError, ErrorClass};
-use crate::modal::{LengthUnit, Modal};
+use crate::modal::Modal;
 use crate::planner::{PlannedMove, Planner};
-use crate::robot::{Robot, RobotError};
+use crate::robot::{Robot, RobotError, vector};
 use crate::task::Task;
 
 /// A command that has left the queue: what it means and, for a move, the
@@ -42,7 +43,7 @@ impl<const N: usize> Controller<N> {
     /// [`RobotError`] when the robot has not `N` joints or its description is at fault.
     pub fn new(robot: &Robot, rate_hz: f64, length: LengthUnit) -> Result<Self, RobotError> {
         let workstation_from_flange = robot.chain::<N>()?;
-        let limits = robot.joint_limits::<N>()?;
+        let limits = robot.joint_limits::<N>();
         let tooling = robot.tooling();
         let planner = Planner::new(
             &workstation_from_flange,
@@ -50,8 +51,8 @@ impl<const N: usize> Controller<N> {
             limits.clone(),
             robot.joint_names(),
         );
-        let modal = Modal::new(robot.tool_limits(), robot.base(), tooling, length);
-        let joints = robot.home::<N>()?;
+        let modal = Modal::new(robot.motion_limits(), robot.workstation_from_base, tooling, length);
+        let joints = vector(&robot.home);
         let joint_names = robot.joint_names();
         Ok(Self { workstation_from_flange, limits, joint_names, modal, planner, joints, rate_hz })
     }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crcl::Program;
+use crcl::{LengthUnit, Program};
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
@@ -10,13 +10,12 @@ use trajectory::Trajectory;
 
 use crate::command_error::CommandError;
 use crate::controller::{Controller, Step};
-use crate::modal::LengthUnit;
 use crate::planner::MoveCertificate;
-use crate::robot::{Robot, RobotError};
+use crate::robot::{Robot, RobotError, vector};
 use crate::with_dof;
 
 /// How a program is planned.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PlanOptions {
     /// Servo rate, Hz: every command starts on a period of it.
     pub rate_hz: f64,
@@ -24,6 +23,8 @@ pub struct PlanOptions {
     pub default_length: LengthUnit,
     /// Whether planning goes on after a command that is refused.
     pub on_refusal: FailurePolicy,
+    /// Joint positions at the start (rad, m); the robot's home unless given.
+    pub start: Option<Vec<f64>>,
 }
 
 impl Default for PlanOptions {
@@ -32,6 +33,7 @@ impl Default for PlanOptions {
             rate_hz: 1000.0,
             default_length: LengthUnit::default(),
             on_refusal: FailurePolicy::default(),
+            start: None,
         }
     }
 }
@@ -186,9 +188,12 @@ fn plan_with<const N: usize>(
 ) -> Result<Plan, RobotError> {
     let begin = Instant::now();
     let mut controller = Controller::<N>::new(robot, options.rate_hz, options.default_length)?;
+    if let Some(start) = &options.start {
+        controller.set_joints(vector(start));
+    }
     let mut plan = Plan {
         schema: 1,
-        robot: robot.name().to_owned(),
+        robot: robot.name.clone(),
         dof: N,
         duration_s: 0.0,
         planning_s: 0.0,
@@ -292,5 +297,52 @@ impl<const N: usize> Motion for ArmMotion<N> {
             dddq: list(&joints.jerk),
             workstation_from_tool: self.chain.forward(&joints.position),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROGRAM: &str = r#"
+InitCanon()
+SetRelativeSpeed(50)
+SetRelativeAcceleration(50)
+SetIntermediatePointTolerance(2)
+MoveTo({{400, -100, 300}, {0, 0, -1}, {1, 0, 0}})
+MoveStraightTo({{400, 100, 300}, {0, 0, -1}, {1, 0, 0}})
+OpenGripper()
+Dwell(0.1)
+MoveSmoothlyTo({{{400, 100, 200}, {0, 0, -1}, {1, 0, 0}}, {{400, -100, 200}, {0, 0, -1}, {1, 0, 0}},
+  {{400, -100, 300}, {0, 0, -1}, {1, 0, 0}}}, 3)
+EndCanon(0)
+"#;
+
+    fn planned(robot: &str) -> Plan {
+        let robot = crate::robot::load(robot).unwrap();
+        let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
+        plan_program(&robot, &program, &PlanOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn a_program_is_planned_and_certified() {
+        for robot in ["ur5e", "panda", "irb120"] {
+            let plan = planned(robot);
+            assert!(plan.refusals.is_empty(), "{robot}: {:?}", plan.refusals);
+            assert_eq!(plan.commands.len(), 10);
+            for command in plan.commands.iter().filter_map(|c| c.certificate.as_ref()) {
+                assert!(command.peaks.largest() <= 1.0 + 1e-9, "{robot}: {command:?}");
+            }
+            println!("{robot} {} s planned in {} s", plan.duration_s, plan.planning_s);
+            for command in &plan.commands {
+                println!("{} {} {} {:?}", command.name, command.duration_s, command.planning_s, command.certificate);
+            }
+        }
+    }
+
+    #[test]
+    fn two_dry_runs_are_equal() {
+        let (a, b) = (planned("ur5e"), planned("ur5e"));
+        assert!(a.samples(0.01).eq(b.samples(0.01)));
     }
 }

@@ -3,20 +3,8 @@
 use nalgebra::Isometry3;
 
 use crate::command_error::{CommandError, ErrorClass};
+use crate::robot::{EndEffector, ToolChanger};
 use crate::task::ToolAction;
-
-/// An end effector that the arm can carry.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EndEffector {
-    /// Name, unique in a robot.
-    pub name: String,
-    /// From the arm's end to the tool centre point.
-    pub flange_from_tcp: Isometry3<f64>,
-    /// Nominal time to open, s.
-    pub opening_time: f64,
-    /// Nominal time to close, s.
-    pub closing_time: f64,
-}
 
 /// A place of the tool changing station.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +30,8 @@ pub struct Tooling {
     pub gripper_open: Option<bool>,
     /// Whether the tool changer is open.
     pub changer_open: bool,
-    /// Nominal time of the tool changer, s.
-    pub changer_time: f64,
+    /// Nominal times of the tool changer; none on an arm without.
+    pub changer: Option<ToolChanger>,
 }
 
 /// How near the arm's end must be to a holder's pose, m and rad.
@@ -54,20 +42,25 @@ impl Tooling {
     /// the mounted end effector, or the arm's end itself.
     #[must_use]
     pub fn flange_from_tool(&self) -> Isometry3<f64> {
-        self.mounted
-            .and_then(|index| self.end_effectors.get(index))
-            .map_or_else(Isometry3::identity, |tool| tool.flange_from_tcp)
+        self.mounted_tool().map_or_else(Isometry3::identity, |tool| tool.flange_from_tcp)
     }
 
     /// Nominal time of an action in the present state, s.
     #[must_use]
     pub fn nominal_time(&self, action: ToolAction) -> f64 {
-        let mounted = self.mounted.and_then(|index| self.end_effectors.get(index));
+        let gripper = self.mounted_tool().and_then(|tool| tool.gripper);
         match action {
-            ToolAction::OpenGripper => mounted.map_or(0.0, |tool| tool.opening_time),
-            ToolAction::CloseGripper => mounted.map_or(0.0, |tool| tool.closing_time),
-            ToolAction::OpenToolChanger | ToolAction::CloseToolChanger => self.changer_time,
+            ToolAction::OpenGripper => gripper.map_or(0.0, |gripper| gripper.opening),
+            ToolAction::CloseGripper => gripper.map_or(0.0, |gripper| gripper.closing),
+            ToolAction::OpenToolChanger => self.changer.map_or(0.0, |changer| changer.opening),
+            ToolAction::CloseToolChanger => self.changer.map_or(0.0, |changer| changer.closing),
         }
+    }
+
+    /// The end effector on the arm.
+    #[must_use]
+    pub fn mounted_tool(&self) -> Option<&EndEffector> {
+        self.mounted.and_then(|index| self.end_effectors.get(index))
     }
 
     /// Checks an action with the arm's end at `workstation_from_flange` and takes it over.
@@ -88,12 +81,16 @@ impl Tooling {
     }
 
     fn set_gripper(&mut self, open: bool) -> Result<(), CommandError> {
-        if self.mounted.is_none() {
+        let Some(tool) = self.mounted_tool() else {
             return Err(CommandError::new(
                 ErrorClass::GripperUse,
                 "no end effector is on the arm, so there is no gripper to use",
             )
             .with_help("take one from the tool changing station first"));
+        };
+        if tool.gripper.is_none() {
+            let message = format!("end effector {:?} is not a gripper", tool.name);
+            return Err(CommandError::new(ErrorClass::GripperUse, message));
         }
         self.gripper_open = Some(open);
         Ok(())
@@ -190,8 +187,8 @@ mod tests {
         let gripper = EndEffector {
             name: "gripper".into(),
             flange_from_tcp: Isometry3::translation(0.0, 0.0, 0.1),
-            opening_time: 0.2,
-            closing_time: 0.2,
+            gripper: Some(crate::robot::Gripper { opening: 0.2, closing: 0.2 }),
+            workstation_from_holder: None,
         };
         let holder = Holder {
             name: "left".into(),
@@ -204,7 +201,7 @@ mod tests {
             mounted: Some(0),
             gripper_open: Some(true),
             changer_open: false,
-            changer_time: 0.2,
+            changer: Some(ToolChanger { opening: 0.5, closing: 0.5 }),
         }
     }
 

@@ -30,7 +30,11 @@ impl<const N: usize> Trajectory<N> {
     #[must_use]
     pub fn peaks(&self) -> JointPeaks<N> {
         let zero = SVector::zeros();
-        let mut peaks = JointPeaks { velocity: zero, acceleration: zero, jerk: zero };
+        let mut peaks = JointPeaks {
+            velocity: zero,
+            acceleration: zero,
+            jerk: zero,
+        };
         for piece in self.pieces() {
             for joint in 0..N {
                 let position = Polynomial::of(piece, joint);
@@ -85,7 +89,10 @@ impl Polynomial {
             scale *= piece.duration;
             scaled
         });
-        Self { coefficients, degree: 5 }
+        Self {
+            coefficients,
+            degree: 5,
+        }
     }
 
     fn derivative(&self) -> Self {
@@ -93,7 +100,10 @@ impl Polynomial {
         for power in 1..=self.degree {
             coefficients[power - 1] = self.coefficients[power] * power as f64;
         }
-        Self { coefficients, degree: self.degree.saturating_sub(1) }
+        Self {
+            coefficients,
+            degree: self.degree.saturating_sub(1),
+        }
     }
 
     fn at(&self, x: f64) -> f64 {
@@ -139,7 +149,11 @@ impl Polynomial {
         }
         for _ in 0..54 {
             let middle = 0.5 * (low + high);
-            if (self.at(middle) > 0.0) == rises { high = middle } else { low = middle }
+            if (self.at(middle) > 0.0) == rises {
+                high = middle
+            } else {
+                low = middle
+            }
         }
         Some(0.5 * (low + high))
     }

@@ -19,6 +19,7 @@ pub mod smooth;
 mod spline_path;
 pub mod timing;
 mod trajectory;
+pub mod verify;
 
 pub use error::TimingError;
 pub use extrema::JointPeaks;

@@ -91,7 +91,7 @@ proptest! {
         };
         let (slow, fast) = (time(&path, &limits), time(&path, &faster));
         let ratio = slow.trajectory.duration() / (fast.trajectory.duration() * k);
-        prop_assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+        prop_assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
     }
 }
 

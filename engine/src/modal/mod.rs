@@ -4,18 +4,16 @@
 
 mod pose;
 mod settings;
-mod units;
 
 use nalgebra::Isometry3;
 
 pub use pose::isometry;
 pub use settings::Settings;
-pub use units::{AngleUnit, LengthUnit};
 
 use crate::command_error::CommandError;
 use crate::task::{Move, Shape, Task, ToolAction};
 use crate::tooling::Tooling;
-use crcl::Command;
+use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit};
 use trajectory::ToolLimits;
 
 /// What the controller accepts.
@@ -29,24 +27,13 @@ pub enum CanonState {
     Ended,
 }
 
-/// Frame in which the poses of moves are given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Frame {
-    /// The workstation; the language's own.
-    Workstation,
-    /// The base of the robot.
-    RobotBase,
-    /// The controlled point where it is when the command starts.
-    ToolTip,
-}
-
 /// The modes of one program on one arm.
 #[derive(Clone, Debug)]
 pub struct Modal {
     state: CanonState,
     length: LengthUnit,
     angle: AngleUnit,
-    frame: Frame,
+    frame: CoordinateFrame,
     settings: Settings,
     default_length: LengthUnit,
     maxima: ToolLimits,
@@ -69,7 +56,7 @@ impl Modal {
             state: CanonState::Unready,
             length: default_length,
             angle: AngleUnit::default(),
-            frame: Frame::Workstation,
+            frame: CoordinateFrame::Workstation,
             settings: Settings::start(&maxima),
             default_length,
             maxima,
@@ -118,17 +105,21 @@ impl Modal {
         workstation_from_flange: &Isometry3<f64>,
     ) -> Result<Task, CommandError> {
         self.check_sequence(command)?;
+        command.check()?;
         match command {
             Command::InitCanon => {
                 self.state = CanonState::Ready;
                 self.length = self.default_length;
                 self.angle = AngleUnit::default();
-                self.frame = Frame::Workstation;
+                self.frame = CoordinateFrame::Workstation;
                 Ok(Task::Begin)
             }
-            Command::EndCanon { reason } => self.end(*reason),
+            Command::EndCanon { reason } => {
+                self.state = CanonState::Ended;
+                Ok(Task::End { reason: *reason })
+            }
             Command::Message { text } => Ok(Task::Message { text: text.clone() }),
-            Command::Dwell { seconds } => dwell(*seconds),
+            Command::Dwell { seconds } => Ok(Task::Dwell { seconds: *seconds }),
             Command::StopMotion { emergency } => Ok(Task::Stop { emergency: *emergency != 0 }),
             Command::OpenGripper => self.tool(ToolAction::OpenGripper, workstation_from_flange),
             Command::CloseGripper => self.tool(ToolAction::CloseGripper, workstation_from_flange),
@@ -173,16 +164,6 @@ impl Modal {
         Ok(())
     }
 
-    fn end(&mut self, reason: i64) -> Result<Task, CommandError> {
-        if reason < 0 {
-            return Err(CommandError::range(format!(
-                "reason of EndCanon must be 0 (success) or positive, got {reason}"
-            )));
-        }
-        self.state = CanonState::Ended;
-        Ok(Task::End { reason })
-    }
-
     fn tool(
         &mut self,
         action: ToolAction,
@@ -198,14 +179,11 @@ impl Modal {
         poses: &[crcl::Pose],
         workstation_from_flange: &Isometry3<f64>,
     ) -> Result<Task, CommandError> {
-        if poses.is_empty() {
-            return Err(CommandError::range("a move needs at least one pose, got none"));
-        }
         let limits = self.settings.tool_limits(&self.maxima)?;
         let workstation_from_frame = match self.frame {
-            Frame::Workstation => Isometry3::identity(),
-            Frame::RobotBase => self.workstation_from_base,
-            Frame::ToolTip => workstation_from_flange * self.tooling.flange_from_tool(),
+            CoordinateFrame::Workstation => Isometry3::identity(),
+            CoordinateFrame::RobotBase => self.workstation_from_base,
+            CoordinateFrame::ToolTip => workstation_from_flange * self.tooling.flange_from_tool(),
         };
         let poses = poses
             .iter()
@@ -222,35 +200,15 @@ impl Modal {
 
     fn set(&mut self, command: &Command) -> Result<Task, CommandError> {
         match command {
-            Command::SetLengthUnits { unit } => self.length = LengthUnit::named(unit)?,
-            Command::SetAngleUnits { unit } => self.angle = AngleUnit::named(unit)?,
-            Command::SetCoordinateFrame { frame } => self.frame = frame_named(frame)?,
+            Command::SetLengthUnits { unit } => self.length = *unit,
+            Command::SetAngleUnits { unit } => self.angle = *unit,
+            Command::SetCoordinateFrame { frame } => self.frame = *frame,
             other => {
-                let (length, angle) = (self.length.meters(), self.angle.radians());
+                let (length, angle) = (self.length.metres(), self.angle.radians());
                 self.settings.set(other, length, angle, &self.maxima)?;
             }
         }
         Ok(Task::Setting)
-    }
-}
-
-fn dwell(seconds: f64) -> Result<Task, CommandError> {
-    if !seconds.is_finite() || seconds < 0.0 {
-        return Err(CommandError::range(format!(
-            "time of Dwell must be 0 s or more, got {seconds} s"
-        )));
-    }
-    Ok(Task::Dwell { seconds })
-}
-
-fn frame_named(name: &str) -> Result<Frame, CommandError> {
-    match name {
-        "Workstation" => Ok(Frame::Workstation),
-        "RobotBase" => Ok(Frame::RobotBase),
-        "ToolTip" => Ok(Frame::ToolTip),
-        _ => Err(CommandError::range(format!(
-            "coordinate frame must be one of \"Workstation\", \"RobotBase\", \"ToolTip\", got {name:?}"
-        ))),
     }
 }
 
@@ -306,7 +264,7 @@ mod tests {
             &mut modal,
             &[
                 Command::InitCanon,
-                Command::SetLengthUnits { unit: "inch".into() },
+                Command::SetLengthUnits { unit: LengthUnit::Inch },
                 Command::SetAbsoluteSpeed { value: 10.0 },
                 Command::EndCanon { reason: 0 },
                 Command::InitCanon,
@@ -344,11 +302,13 @@ mod tests {
     }
 
     fn unit_change() -> impl Strategy<Value = Command> {
+        let length = [LengthUnit::Inch, LengthUnit::Millimeter, LengthUnit::Meter];
+        let angle = [AngleUnit::Degree, AngleUnit::Radian];
         prop_oneof![
-            proptest::sample::select(vec!["inch", "mm", "meter", "millimeter"])
-                .prop_map(|unit| Command::SetLengthUnits { unit: unit.into() }),
-            proptest::sample::select(vec!["degree", "radian"])
-                .prop_map(|unit| Command::SetAngleUnits { unit: unit.into() }),
+            proptest::sample::select(length.to_vec())
+                .prop_map(|unit| Command::SetLengthUnits { unit }),
+            proptest::sample::select(angle.to_vec())
+                .prop_map(|unit| Command::SetAngleUnits { unit }),
         ]
     }
 
@@ -381,7 +341,6 @@ mod tests {
                 Command::SetRelativeAcceleration { percent: value },
                 Command::SetEndPointTolerance { tolerance: value },
                 Command::Dwell { seconds: value },
-                Command::SetLengthUnits { unit: "furlong".into() },
             ] {
                 prop_assert!(run(&mut modal, &[command]).is_err());
             }

@@ -74,19 +74,19 @@ impl Settings {
                     absolute("acceleration", asked, maxima.acceleration, "m/s2")?;
             }
             Command::SetRelativeSpeed { percent } => {
-                self.speed = relative("speed", *percent)? * maxima.speed;
+                self.speed = (percent / 100.0) * maxima.speed;
             }
             Command::SetRelativeAcceleration { percent } => {
-                self.acceleration = relative("acceleration", *percent)? * maxima.acceleration;
+                self.acceleration = (percent / 100.0) * maxima.acceleration;
             }
             Command::SetIntermediatePointTolerance { tolerance } => {
-                self.intermediate_point = tolerance_value(*tolerance)? * length;
+                self.intermediate_point = tolerance * length;
             }
             Command::SetEndPointTolerance { tolerance } => {
-                self.end_point = tolerance_value(*tolerance)? * length;
+                self.end_point = tolerance * length;
             }
             Command::SetEndAngleTolerance { tolerance } => {
-                self.end_angle = tolerance_value(*tolerance)? * angle;
+                self.end_angle = tolerance * angle;
             }
             other => {
                 let message = format!("{} is not a setting", other.name());
@@ -106,9 +106,6 @@ fn positive(what: &str, value: f64, help: &str) -> Result<(), CommandError> {
 }
 
 fn absolute(what: &str, value: f64, maximum: f64, unit: &str) -> Result<f64, CommandError> {
-    if !value.is_finite() || value < 0.0 {
-        return Err(CommandError::range(format!("{what} must be 0 or more, got {value} {unit}")));
-    }
     // One unit in the last place is a unit conversion, not a wish for more.
     if value > maximum * (1.0 + 4.0 * f64::EPSILON) {
         return Err(CommandError::range(format!(
@@ -117,18 +114,4 @@ fn absolute(what: &str, value: f64, maximum: f64, unit: &str) -> Result<f64, Com
         .with_help("give a smaller value, or SetRelative... with 100"));
     }
     Ok(value.min(maximum))
-}
-
-fn relative(what: &str, percent: f64) -> Result<f64, CommandError> {
-    if (0.0..=100.0).contains(&percent) {
-        return Ok(percent / 100.0);
-    }
-    Err(CommandError::range(format!("relative {what} must be 0 to 100 percent, got {percent}")))
-}
-
-fn tolerance_value(tolerance: f64) -> Result<f64, CommandError> {
-    if tolerance.is_finite() && tolerance >= 0.0 {
-        return Ok(tolerance);
-    }
-    Err(CommandError::range(format!("tolerance must be 0 or more, got {tolerance}")))
 }

@@ -1,13 +1,15 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
 use kinematics::Chain;
-use kinematics::follow::{self, FollowError, FollowPoint, TwistPoint};
+use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
 use nalgebra::SVector;
+use realtime::{Piece, Sample};
 use trajectory::{
-    Boundary, Line, Path, TimingOptions, ToolCurve, ToolPoint, Trajectory, smooth, time_path,
+    Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
+    smooth, time_path,
 };
 
-use super::{JointPath, MotionError, Planner, certificate, stretched};
+use super::{MotionError, Planner, certificate};
 use crate::task::Move;
 
 /// Longest way of the tool between two solved points, m.
@@ -34,9 +36,10 @@ impl<const N: usize> Planner<N> {
             return Ok(Trajectory::new(Vec::new()));
         }
         let line = Line::new(from, goal);
-        let path = self.followed(&line, start, &|_| 1)?;
+        let points = self.followed(&line, start, &|_| 1)?;
         let options =
             TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
+        let path = joint_path(&line, &points)?;
         time_path(&path, &self.limits, &motion.limits, &options)
             .map(|timed| timed.trajectory)
             .map_err(|error| MotionError::Timing(error.to_string()))
@@ -52,22 +55,23 @@ impl<const N: usize> Planner<N> {
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         let plan = smooth::plan(&poses, &options)
             .map_err(|error| MotionError::Smooth(error.to_string()))?;
-        let towards = |u: f64| 1 + plan.passes.iter().take_while(|pass| pass.time <= u).count();
-        let path = self.followed(&plan, start, &towards)?;
-        let direct = Trajectory::new(path.pieces().to_vec());
+        let towards = |u: f64| 1 + plan.passes().iter().take_while(|pass| pass.time <= u).count();
+        let points = self.followed(&plan, start, &towards)?;
+        let direct = Trajectory::new(pieces(&points));
         let samples = certificate::tool_samples(self.chain(), &direct);
         let stretch =
             certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
         if stretch <= 1.0 + 1e-4 {
             return Ok(direct);
         }
-        let slow = stretched(&direct, stretch);
+        let slow = direct.stretched(stretch);
         let options = TimingOptions {
             start: Boundary::Free,
             end: Boundary::Free,
             rate_cap: Some(1.0),
             ..Default::default()
         };
+        let path = joint_path(&plan, &points)?;
         match time_path(&path, &self.limits, &motion.limits, &options) {
             Ok(timed) if timed.trajectory.duration() < slow.duration() => Ok(timed.trajectory),
             _ => Ok(slow),
@@ -75,24 +79,22 @@ impl<const N: usize> Planner<N> {
     }
 
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine
-    /// enough that the joint path between its points stays on the curve.
-    fn followed<'a>(
+    /// enough that a quintic between its points stays on the curve.
+    fn followed(
         &self,
-        curve: &'a dyn ToolCurve,
+        curve: &dyn ToolCurve,
         start: &SVector<f64, N>,
         towards: &dyn Fn(f64) -> usize,
-    ) -> Result<JointPath<'a, N>, MotionError> {
-        let mut grid = first_grid(curve);
-        let mut path = JointPath::new(curve, &self.solved(curve, &grid, start, towards)?);
+    ) -> Result<Vec<FollowPoint<N>>, MotionError> {
+        let mut points = self.solved(curve, &first_grid(curve), start, towards)?;
         for _ in 0..REFINEMENTS {
-            let finer = refined(self.chain(), &path, curve, &grid);
-            if finer.len() == grid.len() || finer.len() > MOST_POINTS {
-                return Ok(path);
+            let finer = refined(self.chain(), &points, curve);
+            if finer.len() == points.len() || finer.len() > MOST_POINTS {
+                break;
             }
-            grid = finer;
-            path = JointPath::new(curve, &self.solved(curve, &grid, start, towards)?);
+            points = self.solved(curve, &finer, start, towards)?;
         }
-        Ok(path)
+        Ok(points)
     }
 
     fn solved(
@@ -117,13 +119,44 @@ impl<const N: usize> Planner<N> {
         end: f64,
         towards: &dyn Fn(f64) -> usize,
     ) -> MotionError {
-        let _ = self.joint_name(0);
-        MotionError::Blocked {
-            pose: towards(error.u),
-            percent: 100.0 * error.u / end,
-            cause: error.to_string(),
-        }
+        let joint = error.joint.map_or_else(String::new, |joint| self.joint_name(joint));
+        let cause = match (error.cause, error.joint) {
+            (FollowCause::Limit, Some(index)) => format!(
+                "joint {joint} would pass its limit by {}",
+                self.amount(index, error.amount)
+            ),
+            (FollowCause::Singular, _) => format!(
+                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                error.amount
+            ),
+            (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
+            (_, _) => error.to_string(),
+        };
+        MotionError::Blocked { pose: towards(error.u), percent: 100.0 * error.u / end, cause }
     }
+}
+
+fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {
+    let [position, velocity, acceleration, jerk] = point.q;
+    Sample { position, velocity, acceleration, jerk }
+}
+
+/// Quintics between followed points, in the parameter of the curve.
+fn pieces<const N: usize>(points: &[FollowPoint<N>]) -> Vec<Piece<N>> {
+    points.windows(2).map(|pair| piece(&pair[0], &pair[1])).collect()
+}
+
+fn piece<const N: usize>(from: &FollowPoint<N>, to: &FollowPoint<N>) -> Piece<N> {
+    Piece::hermite(to.u - from.u, &sample(from), &sample(to))
+}
+
+fn joint_path<'a, const N: usize>(
+    curve: &'a dyn ToolCurve,
+    points: &[FollowPoint<N>],
+) -> Result<HermitePath<N, &'a dyn ToolCurve>, MotionError> {
+    let points = points.iter().map(|point| (point.u, JointPoint { q: point.q })).collect();
+    HermitePath::new(points, curve)
+        .ok_or_else(|| MotionError::Timing("the way has fewer than two points".into()))
 }
 
 /// Knots of the curve, with points between them so that no step is long.
@@ -162,28 +195,20 @@ fn steps_between(curve: &dyn ToolCurve, from: f64, to: f64) -> usize {
 /// The grid with a point more in each interval where the fit leaves the curve.
 fn refined<const N: usize>(
     chain: &Chain<N>,
-    path: &JointPath<'_, N>,
+    points: &[FollowPoint<N>],
     curve: &dyn ToolCurve,
-    grid: &[f64],
 ) -> Vec<f64> {
-    let mut finer = Vec::with_capacity(grid.len() * 2);
-    for pair in grid.windows(2) {
-        finer.push(pair[0]);
-        let middle = 0.5 * (pair[0] + pair[1]);
-        let gap = chain.forward(&path.joints(middle).position).inv_mul(&curve.at(middle).pose);
+    let mut finer = Vec::with_capacity(points.len() * 2);
+    for pair in points.windows(2) {
+        finer.push(pair[0].u);
+        let half = 0.5 * (pair[1].u - pair[0].u);
+        let joints = piece(&pair[0], &pair[1]).sample(half).position;
+        let middle = pair[0].u + half;
+        let gap = chain.forward(&joints).inv_mul(&curve.at(middle).pose);
         if gap.translation.vector.norm() > FIT || gap.rotation.angle() > FIT {
             finer.push(middle);
         }
     }
-    finer.extend(grid.last());
+    finer.extend(points.last().map(|point| point.u));
     finer
-}
-
-/// Pose and derivatives of the controlled point from those of the joints.
-pub(super) fn tool_point<const N: usize>(
-    chain: &Chain<N>,
-    q: &[SVector<f64, N>; 4],
-) -> ToolPoint {
-    let _ = (chain, q);
-    todo!()
 }

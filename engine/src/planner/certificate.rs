@@ -40,6 +40,19 @@ pub struct Peaks {
 }
 
 impl Peaks {
+    /// How much slower a motion must be for every ratio to be at most 1:
+    /// speeds fall with the factor, accelerations with its square, jerks with its cube.
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        let most = |ratios: &[f64]| ratios.iter().copied().fold(0.0, f64::max);
+        let speed =
+            most(&self.joint_velocity).max(self.tool_speed).max(self.tool_angular_speed);
+        let acceleration = most(&self.joint_acceleration)
+            .max(self.tool_acceleration)
+            .max(self.tool_angular_acceleration);
+        speed.max(acceleration.sqrt()).max(most(&self.joint_jerk).cbrt())
+    }
+
     /// The largest ratio of all.
     #[must_use]
     pub fn largest(&self) -> f64 {

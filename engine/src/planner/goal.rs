@@ -1,11 +1,13 @@
 //! MoveTo: the configuration that is reached soonest, moved to in joint space.
 
-use kinematics::Report;
+use kinematics::{Chain, Obstacle, Report};
 use nalgebra::{Isometry3, SVector};
 use trajectory::otg::{self, Otg};
-use trajectory::{Boundary, JointLine, TimingOptions, Trajectory, time_path};
+use trajectory::{
+    Boundary, JointLine, JointPoint, TimingOptions, ToolPoint, Trajectory, time_path,
+};
 
-use super::{MotionError, Planner, certificate, stretched};
+use super::{MotionError, Planner, certificate};
 use crate::task::Move;
 
 /// How many configurations are planned in full, the most promising first.
@@ -71,7 +73,7 @@ impl<const N: usize> Planner<N> {
         }
         // The tool is too fast: either everything slower, or a line in joint
         // space that is slow only where the tool is fast.
-        let slow = stretched(&free, stretch);
+        let slow = free.stretched(stretch);
         match self.timed_line(motion, start, goal) {
             Ok(line) if line.duration() < slow.duration() => Ok(line),
             _ => Ok(slow),
@@ -90,7 +92,7 @@ impl<const N: usize> Planner<N> {
             &otg::Options::default(),
         );
         match plan {
-            Ok(found) => Ok(found.trajectory()),
+            Ok(found) => Ok(Trajectory::new(found.pieces())),
             Err(error) => Err(MotionError::Timing(error.to_string())),
         }
     }
@@ -102,8 +104,8 @@ impl<const N: usize> Planner<N> {
         goal: &SVector<f64, N>,
     ) -> Result<Trajectory<N>, MotionError> {
         let chain = self.chain();
-        let tool = |q: &[SVector<f64, N>; 4]| super::cartesian::tool_point(chain, q);
-        let line = JointLine::new(*start, *goal, &tool);
+        let tool = |joint: &trajectory::JointPoint<N>| tool_point(chain, joint);
+        let line = JointLine::new(*start, *goal, tool);
         let options =
             TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
         time_path(&line, &self.limits, &motion.limits, &options)
@@ -111,8 +113,43 @@ impl<const N: usize> Planner<N> {
             .map_err(|error| MotionError::Timing(error.to_string()))
     }
 
-    pub(super) fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
-        let _ = report;
-        MotionError::Unsolved { pose, millimetres: 0.0, degrees: 0.0 }
+    /// The report of the solver in the words of a command.
+    fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
+        match report.obstacle {
+            Obstacle::OutOfReach { distance } => {
+                MotionError::OutOfReach { pose, millimetres: distance * 1e3 }
+            }
+            Obstacle::AtLimit { joint, beyond } => MotionError::BeyondLimit {
+                pose,
+                joint: self.joint_name(joint),
+                beyond: self.amount(joint, beyond),
+            },
+            Obstacle::Orientation { angle } => {
+                MotionError::Orientation { pose, degrees: angle.to_degrees() }
+            }
+            _ => MotionError::Unsolved {
+                pose,
+                millimetres: report.position_error * 1e3,
+                degrees: report.rotation_error.to_degrees(),
+            },
+        }
     }
+}
+
+/// Pose and derivatives of the controlled point from those of the joints.
+fn tool_point<const N: usize>(chain: &Chain<N>, joint: &JointPoint<N>) -> ToolPoint {
+    let [q, dq, ddq, dddq] = &joint.q;
+    let (pose, jacobian) = chain.jacobian(q);
+    let change = chain.jacobian_derivative(q, dq);
+    // Second derivative of the Jacobian by central difference, over 1e-4 rad of the fastest joint.
+    let h = 1e-4 / dq.amax().max(1e-6);
+    let at = |h: f64| chain.jacobian_derivative(&(q + dq * h), &(dq + ddq * h));
+    let second = (at(h) - at(-h)) / (2.0 * h);
+    let twists = [
+        jacobian * dq,
+        jacobian * ddq + change * dq,
+        jacobian * dddq + change * ddq * 2.0 + second * dq,
+    ];
+    let part = |row: usize| twists.map(|twist| twist.fixed_rows::<3>(row).into_owned());
+    ToolPoint { pose, linear: part(0), angular: part(3) }
 }

@@ -6,16 +6,13 @@
 mod cartesian;
 mod certificate;
 mod goal;
-mod joint_path;
 mod motion_error;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
-use realtime::Piece;
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
 pub use certificate::{MoveCertificate, PassReport, Peaks};
-pub use joint_path::JointPath;
 pub use motion_error::MotionError;
 
 use crate::task::{Move, Shape};
@@ -53,7 +50,7 @@ impl<const N: usize> Planner<N> {
         limits: JointLimits<N>,
         joint_names: Vec<String>,
     ) -> Self {
-        let solver = Solver::new(chain.clone().with_tool(flange_from_tool));
+        let solver = Solver::new(chain.clone().with_tool(&flange_from_tool));
         Self { solver, limits, joint_names, flange_from_tool }
     }
 
@@ -122,7 +119,7 @@ impl<const N: usize> Planner<N> {
     fn within_limits(&self, trajectory: Trajectory<N>, limits: &ToolLimits) -> Trajectory<N> {
         let samples = certificate::tool_samples(self.chain(), &trajectory);
         let stretch = certificate::peaks(&trajectory, &samples, &self.limits, limits).stretch();
-        if stretch <= 1.0 { trajectory } else { stretched(&trajectory, stretch) }
+        if stretch <= 1.0 { trajectory } else { trajectory.stretched(stretch) }
     }
 
     fn margin(&self, trajectory: &Trajectory<N>) -> f64 {
@@ -133,26 +130,16 @@ impl<const N: usize> Planner<N> {
     }
 
     fn joint_name(&self, joint: usize) -> String {
-        self.joint_names.get(joint).cloned().unwrap_or_else(|| format!("joint {}", joint + 1))
+        self.joint_names.get(joint).cloned().unwrap_or_else(|| format!("{}", joint + 1))
     }
-}
 
-/// The same way, `factor` times slower.
-fn stretched<const N: usize>(trajectory: &Trajectory<N>, factor: f64) -> Trajectory<N> {
-    let pieces = trajectory
-        .pieces()
-        .iter()
-        .map(|piece| {
-            let mut scale = 1.0;
-            let mut coefficients = piece.coefficients;
-            for coefficient in &mut coefficients {
-                *coefficient *= scale;
-                scale /= factor;
-            }
-            Piece { duration: piece.duration * factor, coefficients }
-        })
-        .collect();
-    Trajectory::new(pieces)
+    /// A joint quantity with the unit that people read.
+    fn amount(&self, joint: usize, value: f64) -> String {
+        match self.chain().prismatic().get(joint) {
+            Some(true) => format!("{:.1} mm", value * 1e3),
+            _ => format!("{:.2} degrees", value.to_degrees()),
+        }
+    }
 }
 
 /// Largest deviation from a straight line, m.

@@ -15,13 +15,21 @@ pub enum MotionError {
         millimetres: f64,
     },
     /// The pose is reached only beyond a joint limit.
-    #[error("pose {pose} needs joint {joint} {degrees:.2} degrees beyond its limit")]
+    #[error("pose {pose} needs joint {joint} {beyond} beyond its limit")]
     BeyondLimit {
         /// Which pose of the command.
         pose: usize,
         /// Name of the joint.
         joint: String,
-        /// How far beyond, degrees (mm for a sliding joint).
+        /// How far beyond, with its unit.
+        beyond: String,
+    },
+    /// The position is in reach, the orientation is not.
+    #[error("pose {pose} is in reach, but its orientation is {degrees:.1} degrees out of reach")]
+    Orientation {
+        /// Which pose of the command.
+        pose: usize,
+        /// Angle from the nearest orientation, degrees.
         degrees: f64,
     },
     /// No solution was found, and neither reach nor one joint explains it.
@@ -63,7 +71,7 @@ impl MotionError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::OutOfReach { .. } => "move the pose nearer to the arm; check units and frame",
-            Self::BeyondLimit { .. } => "turn the tool, or move the pose",
+            Self::BeyondLimit { .. } | Self::Orientation { .. } => "turn the tool, or move the pose",
             Self::Unsolved { .. } => "check the pose with `canter ik`",
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"

@@ -209,6 +209,8 @@ impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
                 self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.25 * h, 0.0));
                 self.push_jerks(&mut problem, &middle);
                 self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.75 * h, 0.0));
+            } else {
+                self.push_jerks(&mut problem, &middle);
             }
             let after = self.local(
                 grid,

@@ -371,11 +371,11 @@ impl<'a> Interior<'a> {
     }
 
     /// Improves the law until the relative gap of its duration is below `gap`, at most `most`
-    /// Newton steps.
-    pub(super) fn solve(&mut self, gap: f64, most: usize) {
+    /// Newton steps. `first` is the relative gap that the start is taken to have.
+    pub(super) fn solve(&mut self, gap: f64, first: f64, most: usize) {
         let mut time = self.problem.time(&self.x);
         let count = self.rows() as f64;
-        let mut mu = 0.3 * time / count;
+        let mut mu = first * time / count;
         self.start_multipliers(mu);
         let mut sigma = 0.3;
         for _ in 0..most {

@@ -17,16 +17,14 @@ mod pieces;
 mod problem;
 mod reach;
 mod survey;
+mod tighten;
 mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 
-use audit::Audit;
 use grid::{Bounded, Grid};
-use interior::Interior;
-use pieces::Maker;
 use survey::Survey;
 
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
@@ -64,11 +62,8 @@ pub fn time_path<const N: usize>(
         options,
     };
     let grid = Grid::new(&survey, path.knots(), path.end(), options);
-    let problem = bounded.problem(&grid);
-    let mut interior = Interior::new(&problem, vec![1.0; problem.cells() + 2]);
-    interior.solve(options.gap, MOST_STEPS);
-    let pieces = Maker::new(bounded, &grid).make(&problem, &interior.x);
-    let audit = Audit::new(bounded, &pieces);
+    let draft = tighten::best(bounded, &grid)?;
+    let tighten::Draft { pieces, audit, .. } = draft;
     let stretch = audit.stretch() * (1.0 + 1e-12);
     let trajectory = Trajectory::new(pieces.joint).stretched(stretch);
     let law = Trajectory::new(pieces.law).stretched(stretch);
@@ -80,8 +75,8 @@ pub fn time_path<const N: usize>(
         fit_error: pieces.fit_error,
         tool_margin: audit.tool_margin,
         stretch,
-        cells: problem.cells(),
-        iterations: interior.iterations,
+        cells: grid.nodes.len() - 1,
+        iterations: draft.iterations,
     };
     Ok(Timed {
         trajectory,
@@ -89,6 +84,3 @@ pub fn time_path<const N: usize>(
         certificate,
     })
 }
-
-/// Newton steps after which the best law so far is taken.
-const MOST_STEPS: usize = 60;

@@ -10,7 +10,7 @@ use super::lanes::Lane;
 ///
 /// Every row is divided by its limit. Locations are numbered `2 k` for node `k` and `2 k + 1` for
 /// the middle of cell `k`. Jerk rows stand at places that are evenly spread over each cell, both
-/// ends included: two in most cells, more where the path turns fast against the law.
+/// ends included: three in most cells, more where the path turns fast against the law.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
     /// Widths of the cells.

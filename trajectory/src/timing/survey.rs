@@ -7,7 +7,9 @@ use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
 /// Cells that a survey spreads over the path, besides those at the knots.
-const CELLS: usize = 96;
+const CELLS: usize = 256;
+/// A squared rate that nothing bounds.
+const FREE: f64 = 1e100;
 /// Least number of cells from one knot to the next.
 const PER_KNOT: f64 = 4.0;
 /// Share of the path parameter by which one-sided values stand aside from a knot.
@@ -56,7 +58,7 @@ impl Survey {
         tool: &ToolLimits,
         options: &TimingOptions,
     ) -> Result<Self, TimingError> {
-        let at = places(path, options)?;
+        let at = places(path)?;
         let mut points = Vec::with_capacity(at.len());
         for &u in &at {
             points.push(finite(path.at(u), u)?);
@@ -77,7 +79,7 @@ impl Survey {
             f64::MAX
         };
         let a = grid.solve(first, last);
-        if first.is_finite() && first > a[0] * (1.0 + 1e-9) {
+        if matches!(options.start, Boundary::Moving { .. }) && first > a[0] * (1.0 + 1e-9) {
             let limit = "velocity and acceleration".to_owned();
             return Err(TimingError::StartTooFast {
                 ratio: (first / a[0]).sqrt(),
@@ -85,10 +87,10 @@ impl Survey {
             });
         }
         let total = reach::duration(&at, &a);
-        if !(total.is_finite() && total > 0.0 && a.iter().all(|a| *a < 1e200)) {
+        if !(total.is_finite() && total > 0.0 && a.iter().all(|a| *a < FREE)) {
             return Err(TimingError::Unbounded);
         }
-        let bound = bound(&grid, &at, total, (first, last));
+        let bound = bound(&grid, total, (first, last));
         let ramp = ramp(joint, tool, &at, &a, &points);
         let times = clock(&at, &a);
         let rate = a.into_iter().map(f64::sqrt).collect();
@@ -106,7 +108,7 @@ impl Survey {
 fn first_value(options: &TimingOptions) -> f64 {
     match options.start {
         Boundary::Rest => 0.0,
-        Boundary::Free => f64::MAX,
+        Boundary::Free => FREE,
         Boundary::Moving { rate, .. } => rate * rate,
     }
 }
@@ -123,18 +125,14 @@ fn clock(at: &[f64], a: &[f64]) -> Vec<f64> {
 }
 
 /// The duration less twice the change that a grid of half the points makes: an error bar.
-fn bound(grid: &ReachGrid, at: &[f64], total: f64, (first, last): (f64, f64)) -> f64 {
+fn bound(grid: &ReachGrid, total: f64, (first, last): (f64, f64)) -> f64 {
     let half = grid.halved();
     let coarse = reach::duration(half.at(), &half.solve(first, last));
-    let _ = at;
     (total - 2.0 * (coarse - total).abs()).max(0.0)
 }
 
 /// Knots, places between them, and more of them near ends at rest.
-fn places<const N: usize>(
-    path: &impl Path<N>,
-    options: &TimingOptions,
-) -> Result<Vec<f64>, TimingError> {
+fn places<const N: usize>(path: &impl Path<N>) -> Result<Vec<f64>, TimingError> {
     let end = path.end();
     if !(end > 0.0 && end.is_finite()) {
         return Err(TimingError::EmptyPath { end });
@@ -148,8 +146,7 @@ fn places<const N: usize>(
     if let Some(last) = knots.last_mut() {
         *last = end;
     }
-    let wanted = options.cells.unwrap_or(CELLS).clamp(16, 400);
-    let step = end / wanted as f64;
+    let step = end / CELLS as f64;
     let mut at = Vec::new();
     for pair in knots.windows(2) {
         let parts = ((pair[1] - pair[0]) / step).ceil().max(PER_KNOT);
@@ -231,8 +228,16 @@ impl<const N: usize> Rows<'_, N> {
     /// The grid at the places `at`.
     fn grid(&self, at: &[f64], points: &[PathPoint<N>]) -> ReachGrid {
         let mut grid = ReachGrid::new(N + 6);
-        for (&u, point) in at.iter().zip(points) {
-            grid.push(u, self.cap(point), self.rows(point));
+        let caps: Vec<f64> = points.iter().map(|point| self.cap(point)).collect();
+        let most = caps
+            .iter()
+            .copied()
+            .filter(|cap| *cap < FREE)
+            .fold(0.0, f64::max);
+        // Where the path stands still over its parameter nothing bounds the rate by itself.
+        let most = if most > 0.0 { most } else { FREE };
+        for ((&u, point), cap) in at.iter().zip(points).zip(caps) {
+            grid.push(u, cap.min(most), self.rows(point));
         }
         grid
     }
