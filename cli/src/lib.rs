@@ -15,14 +15,18 @@ mod client;
 mod commands;
 mod exit;
 mod failure;
+mod host;
 mod logging;
 mod output;
 mod picture;
 
 mod plot;
 mod program;
+mod progress;
+mod recording;
 mod robot;
 mod samples;
+mod simulation;
 mod table;
 
 use std::panic::catch_unwind;

@@ -137,6 +137,11 @@ impl ProgramFile {
         &self.reading.program
     }
 
+    /// Unit of length until the program sets one.
+    pub(crate) fn default_length(&self) -> LengthUnit {
+        self.default_length
+    }
+
     /// The name it is reported under.
     pub(crate) fn name(&self) -> &str {
         self.source.name()
@@ -187,6 +192,7 @@ impl ProgramFile {
             rate_hz,
             default_length: self.default_length,
             on_refusal,
+            start: None,
         };
         plan_program(robot, &self.reading.program, &options)
             .map_err(|error| Failure::new(Exit::Unreadable, error))

@@ -1,7 +1,18 @@
 use std::io::{self, Write};
 
-use engine::dry_run::PlanSample;
 use nalgebra::Isometry3;
+
+/// State at one time, as it is written.
+pub(crate) struct SampleRow<'a> {
+    /// Time, s.
+    pub(crate) t_s: f64,
+    /// Number of the command, from 0.
+    pub(crate) command: usize,
+    /// Positions, velocities, accelerations.
+    pub(crate) joints: [&'a [f64]; 3],
+    /// The controlled point in the workstation.
+    pub(crate) pose: &'a Isometry3<f64>,
+}
 
 /// Writes motion samples as CSV: `t_s,command,q1..qN,dq1..dqN,ddq1..ddqN,x_m,y_m,z_m,qw,qx,qy,qz`
 /// in s, rad (m for sliding joints) and the controlled point in the workstation.
@@ -42,14 +53,14 @@ impl<W: Write> SampleWriter<W> {
     ///
     /// # Errors
     /// The sink cannot be written.
-    pub(crate) fn write(&mut self, sample: &PlanSample, extra: &[f64]) -> io::Result<()> {
+    pub(crate) fn write(&mut self, row: &SampleRow, extra: &[f64]) -> io::Result<()> {
         debug_assert_eq!(extra.len(), self.extra);
-        write!(self.out, "{},{}", sample.t_s, sample.command)?;
-        for value in sample.q.iter().chain(&sample.dq).chain(&sample.ddq) {
+        write!(self.out, "{},{}", row.t_s, row.command)?;
+        for value in row.joints.into_iter().flatten() {
             write!(self.out, ",{value}")?;
         }
-        let place = sample.workstation_from_tool.translation;
-        let turn = self.turn(&sample.workstation_from_tool);
+        let place = row.pose.translation;
+        let turn = self.turn(row.pose);
         for value in [place.x, place.y, place.z].iter().chain(&turn).chain(extra) {
             write!(self.out, ",{value}")?;
         }

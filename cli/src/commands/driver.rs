@@ -81,10 +81,10 @@ impl Sim {
         if self.until_end_of_input {
             let stop = Arc::clone(&stop);
             thread::spawn(move || {
-                let mut rest = Vec::new();
-                // Whatever ends the input, an end or an error, the starter is gone.
-                let _ = io::stdin().read_to_end(&mut rest);
-                thread::sleep(FAREWELL);
+                // A byte asks for an end at once. Without one, the starter is gone.
+                if io::stdin().read_exact(&mut [0]).is_err() {
+                    thread::sleep(FAREWELL);
+                }
                 stop.store(true, Ordering::Relaxed);
             });
         }

@@ -88,7 +88,7 @@ fn solve<const N: usize>(
                 sheet.total_ns += time;
                 found
                     .iter()
-                    .try_for_each(|solution| sheet.solution(row, solution, time))?;
+                    .try_for_each(|solution| sheet.solution(row, solution, errors(&solver, pose, solution), time))?;
                 sheet.count("reached");
                 continue;
             }
@@ -101,7 +101,7 @@ fn solve<const N: usize>(
         sheet.total_ns += time;
         match found {
             Ok(solution) => {
-                sheet.solution(row, &solution, time)?;
+                sheet.solution(row, &solution, errors(&solver, pose, &solution), time)?;
                 sheet.count("reached");
             }
             Err(report) => sheet.report(row, &report, time)?,
@@ -109,6 +109,17 @@ fn solve<const N: usize>(
     }
     sheet.finish(poses.len())?;
     Ok(Exit::Done)
+}
+
+/// Distance (m) and angle (rad) of a solution's flange from the pose that was asked for.
+fn errors<const N: usize>(
+    solver: &Solver<N>,
+    pose: &Isometry3<f64>,
+    solution: &Solution<N>,
+) -> [f64; 2] {
+    let reached = solver.chain().forward(&solution.q);
+    let apart = reached.translation.vector - pose.translation.vector;
+    [apart.norm(), reached.rotation.angle_to(&pose.rotation)]
 }
 
 /// The answer on its way to standard output.
@@ -141,17 +152,14 @@ impl Sheet {
         &mut self,
         row: usize,
         solution: &Solution<N>,
+        errors: [f64; 2],
         time: u128,
     ) -> io::Result<()> {
         let branch = solution
             .branch
             .map_or(String::new(), |branch| branch.to_string());
         write!(self.out, "{row},reached,{branch},")?;
-        self.tail(
-            &solution.q,
-            [solution.position_error, solution.rotation_error],
-            time,
-        )
+        self.tail(&solution.q, errors, time)
     }
 
     fn report<const N: usize>(

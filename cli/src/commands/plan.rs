@@ -8,12 +8,13 @@ use engine::dry_run::{FailurePolicy, Plan as Planned, PlannedCommand};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::host::rate;
 use crate::output;
 use crate::picture;
 use crate::plot;
 use crate::program::ProgramArgument;
 use crate::robot::RobotOption;
-use crate::samples::SampleWriter;
+use crate::samples::{SampleRow, SampleWriter};
 
 /// Plan a program without moving anything: the dry run
 ///
@@ -86,7 +87,13 @@ impl Plan {
         let file = BufWriter::new(File::create(path)?);
         let mut writer = SampleWriter::new(file, plan.dof, &[])?;
         for sample in plan.samples(self.period) {
-            writer.write(&sample, &[])?;
+            let row = SampleRow {
+                t_s: sample.t_s,
+                command: sample.command,
+                joints: [&sample.q, &sample.dq, &sample.ddq],
+                pose: &sample.workstation_from_tool,
+            };
+            writer.write(&row, &[])?;
         }
         Ok(writer.finish()?)
     }
@@ -159,13 +166,5 @@ fn period(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (1e-6..=1e3).contains(&value) => Ok(value),
         _ => Err("expected seconds from 0.000001 to 1000".to_owned()),
-    }
-}
-
-/// A servo rate in Hz.
-pub(crate) fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (100.0..=4000.0).contains(&value) => Ok(value),
-        _ => Err("expected Hz from 100 to 4000".to_owned()),
     }
 }
