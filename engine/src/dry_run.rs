@@ -11,11 +11,11 @@ use trajectory::Trajectory;
 use crate::command_error::CommandError;
 use crate::controller::{Controller, Step};
 use crate::planner::MoveCertificate;
-use crate::robot::{Robot, RobotError};
+use crate::robot::{Robot, RobotError, vector};
 use crate::with_dof;
 
 /// How a program is planned.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PlanOptions {
     /// Servo rate, Hz: every command starts on a period of it.
     pub rate_hz: f64,
@@ -23,6 +23,8 @@ pub struct PlanOptions {
     pub default_length: LengthUnit,
     /// Whether planning goes on after a command that is refused.
     pub on_refusal: FailurePolicy,
+    /// Joint positions at the start (rad, m); the robot's home unless given.
+    pub start: Option<Vec<f64>>,
 }
 
 impl Default for PlanOptions {
@@ -31,6 +33,7 @@ impl Default for PlanOptions {
             rate_hz: 1000.0,
             default_length: LengthUnit::default(),
             on_refusal: FailurePolicy::default(),
+            start: None,
         }
     }
 }
@@ -185,6 +188,9 @@ fn plan_with<const N: usize>(
 ) -> Result<Plan, RobotError> {
     let begin = Instant::now();
     let mut controller = Controller::<N>::new(robot, options.rate_hz, options.default_length)?;
+    if let Some(start) = &options.start {
+        controller.set_joints(vector(start));
+    }
     let mut plan = Plan {
         schema: 1,
         robot: robot.name.clone(),
