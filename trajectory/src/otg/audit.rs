@@ -32,15 +32,17 @@ pub struct Audit {
 impl Audit {
     /// The largest of all numbers.
     pub fn worst(&self) -> f64 {
-        [
+        let mut worst = self.start;
+        for value in [
             self.end,
             self.joins,
             self.velocity,
             self.acceleration,
             self.jerk,
-        ]
-        .into_iter()
-        .fold(self.start, f64::max)
+        ] {
+            raise(&mut worst, value);
+        }
+        worst
     }
 
     /// Checks `motion` against what was asked for. Limits are not checked after a joint's

@@ -76,7 +76,12 @@ fn draw<const N: usize>(problems: &mut Problems, kind: Kind) -> Problem<N> {
 
 /// Plans and audits a problem; the duration, or what is wrong.
 fn sound<const N: usize>(problem: &Problem<N>) -> Result<f64, String> {
-    let Problem { start, target, limits, options } = problem;
+    let Problem {
+        start,
+        target,
+        limits,
+        options,
+    } = problem;
     let motion = Otg::plan(start, target, limits, options).map_err(|error| error.to_string())?;
     let audit = Audit::of(&motion, start, target, limits);
     let worst = audit.worst();
@@ -89,5 +94,9 @@ fn sound<const N: usize>(problem: &Problem<N>) -> Result<f64, String> {
 /// Fails with the first few of `failures`.
 fn report(failures: &[String], count: usize) {
     let shown = &failures[..failures.len().min(10)];
-    assert!(failures.is_empty(), "{} of {count}: {shown:#?}", failures.len());
+    assert!(
+        failures.is_empty(),
+        "{} of {count}: {shown:#?}",
+        failures.len()
+    );
 }

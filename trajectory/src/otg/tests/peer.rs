@@ -59,7 +59,9 @@ fn agree<const N: usize>(seed: u64, ends: Ends, kind: Kind, count: usize) -> usi
         };
         match peer_duration(&problem) {
             Some(theirs) if ours > theirs * (1.0 + 1e-9) + 1e-12 => {
-                failures.push(format!("{kind:?} {index}: {ours} instead of {theirs} {problem:?}"));
+                failures.push(format!(
+                    "{kind:?} {index}: {ours} instead of {theirs} {problem:?}"
+                ));
             }
             Some(_) => {}
             None => refused += 1,
@@ -78,6 +80,9 @@ fn agrees_with_peer_in_all_modes() {
             + agree::<3>(seed, Ends::Moving, kind, 4_000)
             + agree::<3>(seed, Ends::Stopping, kind, 2_000)
             + agree::<7>(seed, Ends::Resting, kind, 1_500);
-        assert!(refused < 250, "{kind:?}: nothing to compare with in {refused} cases");
+        assert!(
+            refused < 250,
+            "{kind:?}: nothing to compare with in {refused} cases"
+        );
     }
 }
