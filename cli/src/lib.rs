@@ -16,6 +16,10 @@ mod exit;
 mod failure;
 mod logging;
 mod output;
+#[allow(dead_code)]
+mod plot;
+mod robot;
+mod table;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;

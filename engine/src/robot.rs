@@ -18,6 +18,8 @@ use kinematics::{Chain, Model, UrdfError};
 use nalgebra::{Isometry3, SVector};
 use std::path::Path;
 
+use crate::tooling::{Holder, Tooling};
+
 /// Limits of the joints, root first: rad for turning joints, m for sliding ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
@@ -220,4 +222,61 @@ impl Robot {
 #[must_use]
 pub fn vector<const N: usize>(values: &[f64]) -> SVector<f64, N> {
     SVector::from_fn(|i, _| values.get(i).copied().unwrap_or(0.0))
+}
+
+/// What the planner takes from a robot.
+impl Robot {
+    /// Limits of the joints; their count must be `N`, which [`Robot::chain`] checks.
+    #[must_use]
+    pub fn joint_limits<const N: usize>(&self) -> trajectory::JointLimits<N> {
+        let joints = &self.joints;
+        trajectory::JointLimits {
+            lower: vector(&joints.lower),
+            upper: vector(&joints.upper),
+            velocity: vector(&joints.velocity),
+            acceleration: vector(&joints.acceleration),
+            jerk: vector(&joints.jerk),
+        }
+    }
+
+    /// The largest speeds, accelerations and jerks of the controlled point.
+    #[must_use]
+    pub fn motion_limits(&self) -> trajectory::ToolLimits {
+        let tool = &self.tool;
+        trajectory::ToolLimits {
+            speed: tool.speed,
+            acceleration: tool.acceleration,
+            jerk: tool.jerk,
+            angular_speed: tool.angular_speed,
+            angular_acceleration: tool.angular_acceleration,
+            angular_jerk: tool.angular_jerk,
+        }
+    }
+
+    /// Names of the joints, root first.
+    #[must_use]
+    pub fn joint_names(&self) -> Vec<String> {
+        self.model.joints.iter().map(|joint| joint.name.clone()).collect()
+    }
+
+    /// End effectors and holders as they are at the start: the gripper of
+    /// the mounted end effector is open, all others are in their holders.
+    #[must_use]
+    pub fn tooling(&self) -> Tooling {
+        let holders = self.end_effectors.iter().enumerate().filter_map(|(index, tool)| {
+            Some(Holder {
+                name: tool.name.clone(),
+                workstation_from_flange: tool.workstation_from_holder?,
+                holds: (self.mounted != Some(index)).then_some(index),
+            })
+        });
+        Tooling {
+            holders: if self.tool_changer.is_some() { holders.collect() } else { Vec::new() },
+            end_effectors: self.end_effectors.clone(),
+            mounted: self.mounted,
+            gripper_open: self.mounted.map(|_| true),
+            changer_open: false,
+            changer: self.tool_changer,
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The clock of the messages.
+//! The clock of the messages, and sleeping by it.
 
 /// The time of `CLOCK_MONOTONIC` (ns): the clock of every time in a message. It never jumps.
 pub fn now_ns() -> u64 {
@@ -15,4 +15,31 @@ pub fn now_ns() -> u64 {
         libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut time);
     }
     time.tv_sec.cast_unsigned() * 1_000_000_000 + time.tv_nsec.cast_unsigned()
+}
+
+/// Sleeps until `deadline_ns` of `CLOCK_MONOTONIC`; returns at once if it has passed. A signal
+/// does not end the sleep.
+pub fn sleep_until_ns(deadline_ns: u64) {
+    let deadline = libc::timespec {
+        tv_sec: (deadline_ns / 1_000_000_000).cast_signed(),
+        tv_nsec: (deadline_ns % 1_000_000_000).cast_signed(),
+    };
+    loop {
+        // SAFETY: the pointer is to a live timespec, and the remaining time is not asked for.
+        #[expect(
+            unsafe_code,
+            reason = "the standard library cannot sleep until an instant"
+        )]
+        let result = unsafe {
+            libc::clock_nanosleep(
+                libc::CLOCK_MONOTONIC,
+                libc::TIMER_ABSTIME,
+                &raw const deadline,
+                core::ptr::null_mut(),
+            )
+        };
+        if result != libc::EINTR {
+            return;
+        }
+    }
 }

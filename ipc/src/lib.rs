@@ -20,23 +20,27 @@ mod engine_link;
 mod error;
 mod hello;
 mod node;
+mod probe;
 mod setpoint;
 mod state;
 mod tool;
+mod urgency;
 
 pub use arm::{Arm, model_hash};
 pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
 };
-pub use clock::now_ns;
+pub use clock::{now_ns, sleep_until_ns};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
 pub use node::{Leftovers, cleanup, survey};
+pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
 pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
+pub use urgency::{Granted, Urgency, urge};
 
 /// How many joints fit into a message.
 pub const MAX_JOINTS: usize = 16;

@@ -17,6 +17,9 @@ use crate::{Arm, IpcError, PROTOCOL};
 /// The kind of service: shared memory between processes, ports that stay in their thread.
 pub(crate) type Shared = ipc::Service;
 
+/// Requests and answers that are texts.
+pub(crate) type TextExchange = request_response::PortFactory<Shared, [u8], (), [u8], ()>;
+
 /// How many messages wait for a slow reader before the oldest is overwritten.
 const BUFFER: usize = 16;
 
@@ -174,7 +177,7 @@ pub(crate) fn text_exchange(
     node: &Node<Shared>,
     arm: &Arm,
     kind: &str,
-) -> Result<request_response::PortFactory<Shared, [u8], (), [u8], ()>, IpcError> {
+) -> Result<TextExchange, IpcError> {
     let (service, name) = service_name(arm, kind)?;
     node.service_builder(&name)
         .request_response::<[u8], [u8]>()

@@ -72,7 +72,7 @@ pub struct Setpoint {
     /// Digital outputs, one bit each.
     pub digital_outputs: u64,
     /// For later; 0.
-    pub reserved: [u64; 5],
+    pub reserved: [u64; 10],
 }
 
 impl Default for Setpoint {
@@ -100,7 +100,7 @@ impl Default for Setpoint {
             effort: [0.0; MAX_JOINTS],
             tools: [ToolCommand::default(); MAX_TOOLS],
             digital_outputs: 0,
-            reserved: [0; 5],
+            reserved: [0; 10],
         }
     }
 }

@@ -141,7 +141,7 @@ pub struct State {
     /// The hardware's own clock (ns); 0 where there is none.
     pub hardware_ns: u64,
     /// For later; 0.
-    pub reserved: [u64; 6],
+    pub reserved: [u64; 11],
 }
 
 impl Default for State {
@@ -167,7 +167,7 @@ impl Default for State {
             tools: [ToolFeedback::default(); MAX_TOOLS],
             digital_inputs: 0,
             hardware_ns: 0,
-            reserved: [0; 6],
+            reserved: [0; 11],
         }
     }
 }

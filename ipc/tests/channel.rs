@@ -1,4 +1,5 @@
 //! Both ends of every channel, in one process.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;

@@ -39,11 +39,9 @@ proptest! {
             fault: head[3],
             ..State::default()
         };
-        for joint in 0..6 {
-            state.position[joint] = values[joint];
-            state.velocity[joint] = values[6 + joint];
-            state.effort[joint] = values[12 + joint];
-        }
+        state.position[..6].copy_from_slice(&values[..6]);
+        state.velocity[..6].copy_from_slice(&values[6..12]);
+        state.effort[..6].copy_from_slice(&values[12..]);
         state.tools[0].status = tool % 8;
         if state.check(joints).is_ok() {
             prop_assert_eq!(state.protocol, ipc::PROTOCOL);

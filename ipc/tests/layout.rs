@@ -6,7 +6,7 @@ use ipc::{Hello, HelloAck, Setpoint, State, ToolCommand, ToolFeedback};
 
 #[test]
 fn setpoint() {
-    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (736, 8));
+    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (768, 8));
     let offsets = [
         (offset_of!(Setpoint, protocol), 0),
         (offset_of!(Setpoint, joints), 4),
@@ -37,7 +37,7 @@ fn setpoint() {
 
 #[test]
 fn state() {
-    assert_eq!((size_of::<State>(), align_of::<State>()), (608, 8));
+    assert_eq!((size_of::<State>(), align_of::<State>()), (640, 8));
     let offsets = [
         (offset_of!(State, session), 8),
         (offset_of!(State, sequence), 16),

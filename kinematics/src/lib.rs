@@ -10,14 +10,17 @@
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
 #![doc = ""]
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
+//! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
 //! | [`measure`] | manipulability, singular values, condition number |
 
 mod arith;
 pub mod chain;
+pub mod follow;
 pub mod ik;
 pub mod measure;
 pub mod urdf;
 
 pub use chain::Chain;
+pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
 pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
 pub use urdf::{Model, UrdfError};

@@ -2,6 +2,10 @@
 
 pub mod error;
 pub mod finding;
+pub mod interp;
+pub mod kitting;
+pub mod pddl;
+pub mod run;
 pub mod world;
 
 pub use error::PlanError;

@@ -29,6 +29,11 @@ impl<const N: usize> Sample<N> {
     }
 }
 
+/// The value of one joint; not a number where there is no such joint.
+pub(crate) fn of<const N: usize>(values: &SVector<f64, N>, joint: usize) -> f64 {
+    values.get(joint).copied().unwrap_or(f64::NAN)
+}
+
 /// One polynomial piece of a joint motion: `q(t) = sum_k coefficients[k] t^k` for
 /// `0 <= t <= duration` (s). Quintic: coefficient `k` is in rad/s^k.
 ///

@@ -3,4 +3,7 @@
 //! A test here sees Canter from outside: whole programs, real processes, the repository's own
 //! rules. The laws of one crate are tested in that crate.
 
+pub mod arm;
+pub mod motion;
 pub mod repository;
+pub mod servo_arm;

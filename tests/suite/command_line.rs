@@ -1,6 +1,6 @@
 //! The command line as a user meets it: what it answers, where, and with which exit code.
 
-use crate::canter::canter;
+use crate::canter::{canter, canter_reading};
 
 #[test]
 fn help_is_an_answer() {
@@ -66,4 +66,106 @@ fn a_reader_that_goes_away_is_no_failure() {
         (child.wait().unwrap().code(), stderr.as_str()),
         (Some(0), "")
     );
+}
+
+#[test]
+fn shipped_robots_are_listed_and_shown() {
+    let listed = canter(["robots", "list"]);
+    assert_eq!((listed.code, listed.stderr.as_str()), (0, ""));
+    let needed = [
+        "ur5e",
+        "ur10e",
+        "panda",
+        "fr3",
+        "iiwa7",
+        "iiwa14",
+        "irb120",
+        "tx2_60",
+        "lrmate200id",
+    ];
+    for robot in needed {
+        assert!(listed.stdout.contains(robot), "{robot}");
+        let shown = canter(["robots", "show", robot, "--json"]);
+        let shown: serde_json::Value = serde_json::from_str(&shown.stdout).unwrap();
+        assert_eq!(shown["name"], robot);
+        let joints = shown["dof"].as_u64().unwrap() as usize;
+        for list in ["name", "lower", "upper", "velocity", "acceleration", "jerk"] {
+            assert_eq!(
+                shown["joints"][list].as_array().unwrap().len(),
+                joints,
+                "{robot} {list}"
+            );
+        }
+        assert!(
+            canter(["robots", "show", robot])
+                .stdout
+                .contains("controlled point at home")
+        );
+    }
+}
+
+#[test]
+fn a_urdf_becomes_a_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("mine");
+    let urdf = "robots/ur5e/robot.urdf";
+    let ran = canter([
+        "robots",
+        "import",
+        urdf,
+        "--to",
+        to.to_str().unwrap(),
+        "--tip",
+        "flange",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.contains("6 joints"), "{}", ran.stdout);
+    let shown = canter(["robots", "show", to.to_str().unwrap()]);
+    assert_eq!(shown.code, 0, "{}", shown.stderr);
+    let again = canter([
+        "robots",
+        "import",
+        urdf,
+        "--to",
+        to.to_str().unwrap(),
+        "--tip",
+        "flange",
+    ]);
+    assert_eq!(
+        again.code, 3,
+        "a robot.toml that may have been edited was overwritten"
+    );
+}
+
+/// `canter fk` against `k` on the same file.
+#[test]
+fn forward_kinematics_of_a_file() {
+    for robot in ["ur5e", "panda", "iiwa7", "irb120"] {
+        let arm = system_tests::arm::Arm::read(robot);
+        let rows: Vec<Vec<f64>> = (0..20)
+            .map(|row| {
+                let part = |joint: usize| 0.5 + 0.45 * ((row * 7 + joint * 3) as f64).sin();
+                let at =
+                    |(joint, [low, high, _]): (usize, &[f64; 3])| low + part(joint) * (high - low);
+                arm.joints.iter().enumerate().map(at).collect()
+            })
+            .collect();
+        let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let csv = rows.iter().map(line).collect::<Vec<_>>().join("\n");
+        let ran = canter_reading(["fk", "--robot", robot, "--joints", "-"], csv.as_bytes());
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        let mut lines = ran.stdout.lines();
+        assert_eq!(lines.next(), Some("x_m,y_m,z_m,qw,qx,qy,qz"));
+        for (row, line) in rows.iter().zip(lines) {
+            let got: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            let pose = arm.flange(row);
+            let (p, r) = (pose.translation, pose.rotation);
+            let apart = [p.x - got[0], p.y - got[1], p.z - got[2]].map(f64::abs);
+            let along = (r.w * got[3] + r.i * got[4] + r.j * got[5] + r.k * got[6]).abs();
+            assert!(
+                apart.iter().all(|gap| *gap < 1e-12) && (along - 1.0).abs() < 1e-12,
+                "{robot}"
+            );
+        }
+    }
 }

@@ -8,21 +8,27 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod extrema;
 mod hermite_path;
 mod joint_line;
 mod limits;
 mod line;
 mod path;
+
 pub mod smooth;
+mod spline_path;
 pub mod timing;
 mod trajectory;
+pub mod verify;
 
 pub use error::TimingError;
+pub use extrema::JointPeaks;
 pub use hermite_path::HermitePath;
 pub use joint_line::JointLine;
 pub use limits::{JointLimits, ToolLimits};
 pub use line::Line;
 pub use path::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
+pub use spline_path::SplinePath;
 pub use timing::{Boundary, TimeCertificate, Timed, TimingOptions, time_path};
 pub use trajectory::Trajectory;
 pub mod otg;

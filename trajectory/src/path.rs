@@ -51,6 +51,20 @@ pub trait ToolCurve: Send + Sync {
     fn at(&self, u: f64) -> ToolPoint;
 }
 
+impl<T: ToolCurve + ?Sized> ToolCurve for &T {
+    fn end(&self) -> f64 {
+        (**self).end()
+    }
+
+    fn knots(&self) -> Vec<f64> {
+        (**self).knots()
+    }
+
+    fn at(&self, u: f64) -> ToolPoint {
+        (**self).at(u)
+    }
+}
+
 /// A joint path over `0..=end()` together with the motion of the controlled point along it.
 pub trait Path<const N: usize> {
     /// Last parameter value.

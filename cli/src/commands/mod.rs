@@ -3,7 +3,9 @@
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
 mod completions;
+mod fk;
 mod man;
+mod robots;
 
 use clap::Subcommand;
 
@@ -13,6 +15,8 @@ use crate::failure::Failure;
 /// What `canter` can do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Fk(fk::Fk),
+    Robots(robots::Robots),
     Completions(completions::Completions),
     Man(man::Man),
 }
@@ -21,6 +25,8 @@ impl Command {
     /// Runs the command that was given.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
+            Self::Fk(command) => command.run(),
+            Self::Robots(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Man(command) => command.run(),
         }

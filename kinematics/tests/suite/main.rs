@@ -2,5 +2,6 @@
 
 mod arms;
 mod chain;
+mod follow;
 mod ik;
 mod urdf;

@@ -1,10 +1,31 @@
 //! The fastest time law along a given path.
+//!
+//! A survey of the path gives the fastest law without jerk limits (reachability analysis). Made
+//! smooth, it becomes the parameter in which the law proper is sought: a C1, piecewise quadratic
+//! squared rate, found by an interior point method under all limits at once. The law then becomes
+//! quintic pieces in time, and every limit is bounded on the pieces themselves, for all times.
 
+mod audit;
+mod band;
+mod bound;
 mod certificate;
+mod grid;
+mod interior;
+mod lanes;
 mod options;
+mod pieces;
+mod problem;
+mod reach;
+mod survey;
+mod tighten;
+mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub use options::{Boundary, TimingOptions};
+pub use reach::{ReachGrid, duration as reach_duration};
+
+use grid::{Bounded, Grid};
+use survey::Survey;
 
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
 
@@ -33,6 +54,33 @@ pub fn time_path<const N: usize>(
     joint.check()?;
     tool.check()?;
     options.check()?;
-    let end = path.end();
-    Err(TimingError::EmptyPath { end })
+    let survey = Survey::new(path, joint, tool, options)?;
+    let bounded = Bounded {
+        path,
+        joint,
+        tool,
+        options,
+    };
+    let grid = Grid::new(&survey, path.knots(), path.end(), options);
+    let draft = tighten::best(bounded, &grid)?;
+    let tighten::Draft { pieces, audit, .. } = draft;
+    let stretch = audit.stretch() * (1.0 + 1e-12);
+    let trajectory = Trajectory::new(pieces.joint).stretched(stretch);
+    let law = Trajectory::new(pieces.law).stretched(stretch);
+    let certificate = TimeCertificate {
+        peaks: audit.peaks(stretch),
+        active: audit.active(stretch),
+        duration: trajectory.duration(),
+        lower_bound: survey.bound,
+        fit_error: pieces.fit_error,
+        tool_margin: audit.tool_margin,
+        stretch,
+        cells: grid.nodes.len() - 1,
+        iterations: draft.iterations,
+    };
+    Ok(Timed {
+        trajectory,
+        law,
+        certificate,
+    })
 }

@@ -1,7 +1,7 @@
 //! Planning again on the way.
 
 use super::super::{Ends, Otg, Problem, Problems, Running};
-use super::{Kind, draw, report};
+use super::{Kind, draw};
 
 /// What planning again every period did.
 #[derive(Debug, Default)]

@@ -1,0 +1,407 @@
+//! The driver's side of the protocol, without a clock and without a channel.
+
+use std::collections::VecDeque;
+
+use ipc::{
+    Clock, DriverState, FaultCode, GRIPPER, Hello, HelloAck, Setpoint, SetpointFlags, State,
+    TOOL_CHANGER, Verdict, bytes_of, text_of,
+};
+use realtime::Bounds;
+
+use crate::noise::Noise;
+use crate::reference::Reference;
+use crate::servo::Servo;
+use crate::tool::Tool;
+use crate::{Options, SimError};
+
+/// How far the first setpoint of a session may be from the measured position (rad).
+const FIRST: f64 = 1e-3;
+
+/// Room for a setpoint beside what speed and time allow (rad).
+const ROOM: f64 = 2e-3;
+
+/// What an engine and the driver agreed on.
+#[derive(Clone, Debug)]
+struct Session {
+    number: u64,
+    owner: String,
+    process: u32,
+    period_ns: u64,
+    watchdog_ns: u64,
+    clock: Clock,
+}
+
+/// A simulated robot with the driver's side of the protocol. Times go in as numbers, so that the
+/// same setpoints at the same times give the same states.
+#[derive(Clone, Debug)]
+pub struct Driver {
+    options: Options,
+    state: DriverState,
+    fault: FaultCode,
+    fault_joint: u32,
+    session: Option<Session>,
+    sessions: u64,
+    servos: Vec<Servo>,
+    references: Vec<Reference>,
+    tools: [Tool; 2],
+    waiting: VecDeque<Setpoint>,
+    last: Setpoint,
+    fresh: bool,
+    received_ns: u64,
+    sequence: u64,
+    missed: u64,
+    missed_ever: u64,
+    noise: Noise,
+}
+
+impl Driver {
+    /// A robot at rest.
+    ///
+    /// # Errors
+    /// When the options do not fit together.
+    pub fn new(options: Options) -> Result<Self, SimError> {
+        options.check()?;
+        Ok(Self {
+            state: DriverState::Disconnected,
+            fault: FaultCode::None,
+            fault_joint: u32::MAX,
+            session: None,
+            sessions: 0,
+            servos: options.position.iter().map(|at| Servo::rest(*at)).collect(),
+            references: options
+                .position
+                .iter()
+                .map(|at| Reference::rest(*at))
+                .collect(),
+            tools: [Tool::new(options.gripper), Tool::new(options.tool_changer)],
+            waiting: VecDeque::new(),
+            last: Setpoint::default(),
+            fresh: false,
+            received_ns: 0,
+            sequence: 0,
+            missed: 0,
+            missed_ever: 0,
+            noise: Noise::new(options.seed),
+            options,
+        })
+    }
+
+    /// Where the driver is in its life.
+    pub fn state(&self) -> DriverState {
+        self.state
+    }
+
+    /// The latched fault.
+    pub fn fault(&self) -> FaultCode {
+        self.fault
+    }
+
+    /// How many sessions were opened.
+    pub fn sessions(&self) -> u64 {
+        self.sessions
+    }
+
+    /// Periods without a new setpoint, in all sessions.
+    pub fn missed_in_all(&self) -> u64 {
+        self.missed_ever
+    }
+
+    /// The clock of the session under way.
+    pub fn clock(&self) -> Option<Clock> {
+        self.session.as_ref().map(|session| session.clock)
+    }
+
+    /// The period of the session under way (ns).
+    pub fn period_ns(&self) -> Option<u64> {
+        self.session.as_ref().map(|session| session.period_ns)
+    }
+
+    /// The watchdog of the session under way (ns).
+    pub fn watchdog_ns(&self) -> Option<u64> {
+        self.session.as_ref().map(|session| session.watchdog_ns)
+    }
+
+    /// How many joints there are.
+    pub fn joints(&self) -> usize {
+        self.servos.len()
+    }
+
+    /// Where a joint is, without noise (rad); not a number where there is no such joint.
+    pub fn position(&self, joint: usize) -> f64 {
+        self.servos
+            .get(joint)
+            .map_or(f64::NAN, |servo| servo.position)
+    }
+
+    /// The last setpoint that was accepted.
+    pub fn last_setpoint(&self) -> &Setpoint {
+        &self.last
+    }
+
+    /// Answers a request for a session at `now_ns`.
+    pub fn greet(&mut self, hello: &Hello, now_ns: u64) -> HelloAck {
+        let joints = self.servos.len();
+        if let Some((verdict, reason)) = self.objection(hello) {
+            let mut ack = HelloAck::refusal(joints, verdict, &reason);
+            ack.name = bytes_of(&self.options.name);
+            return ack;
+        }
+        self.sessions += 1;
+        // Unlike any session of a driver process before, so that old setpoints do not fit.
+        let number = (now_ns | 1).wrapping_add(self.sessions << 1).max(1);
+        self.session = Some(Session {
+            number,
+            owner: text_of(&hello.name),
+            process: hello.process,
+            period_ns: hello.period_ns,
+            watchdog_ns: hello.watchdog_ns,
+            clock: Clock::from_number(hello.clock).unwrap_or(Clock::Wall),
+        });
+        self.state = DriverState::Synced;
+        self.fault = FaultCode::None;
+        self.fault_joint = u32::MAX;
+        self.waiting.clear();
+        self.fresh = false;
+        self.last = Setpoint::default();
+        self.missed = 0;
+        self.received_ns = now_ns;
+        for (servo, reference) in self.servos.iter_mut().zip(&mut self.references) {
+            *reference = Reference::rest(servo.position);
+        }
+        self.tools.iter_mut().for_each(Tool::forget_orders);
+        self.welcome(number, hello.watchdog_ns)
+    }
+
+    fn welcome(&self, session: u64, watchdog_ns: u64) -> HelloAck {
+        let mut ack = HelloAck::refusal(self.servos.len(), Verdict::Welcome, "");
+        ack.session = session;
+        ack.watchdog_ns = watchdog_ns;
+        ack.name = bytes_of(&self.options.name);
+        for (joint, servo) in self.servos.iter().enumerate() {
+            ack.position[joint] = servo.position;
+            ack.lower[joint] = self.options.lower[joint];
+            ack.upper[joint] = self.options.upper[joint];
+            ack.velocity[joint] = self.options.velocity[joint];
+        }
+        ack
+    }
+
+    /// Why there can be no session now.
+    fn objection(&self, hello: &Hello) -> Option<(Verdict, String)> {
+        if let Err(cause) = hello.check(self.servos.len()) {
+            let verdict = match cause {
+                ipc::MessageError::Protocol { .. } => Verdict::WrongProtocol,
+                ipc::MessageError::Schema { .. } => Verdict::WrongSchema,
+                ipc::MessageError::Joints { .. } => Verdict::WrongJoints,
+                ipc::MessageError::Choice { .. } => Verdict::WrongClock,
+                _ => Verdict::WrongPeriod,
+            };
+            return Some((verdict, cause.to_string()));
+        }
+        if self.options.model != 0 && hello.model != 0 && self.options.model != hello.model {
+            return Some((
+                Verdict::WrongModel,
+                format!(
+                    "robot model {:#x} here, {:#x} there",
+                    self.options.model, hello.model
+                ),
+            ));
+        }
+        let resting = self.references.iter().all(Reference::rests);
+        match (&self.session, self.state) {
+            (Some(session), DriverState::Armed | DriverState::Active)
+                if session.process != hello.process =>
+            {
+                let (owner, process) = (&session.owner, session.process);
+                Some((
+                    Verdict::Busy,
+                    format!("driven by {owner} (process {process})"),
+                ))
+            }
+            _ if !resting => Some((Verdict::NotReady, "the arm still moves".to_owned())),
+            _ => None,
+        }
+    }
+
+    /// Takes a setpoint at `now_ns`. What does not belong to the session is ignored; what makes
+    /// no sense stops the arm.
+    pub fn receive(&mut self, setpoint: &Setpoint, now_ns: u64) {
+        let Some(session) = &self.session else { return };
+        let following = matches!(
+            self.state,
+            DriverState::Synced | DriverState::Armed | DriverState::Active
+        );
+        if setpoint.session != session.number
+            || setpoint.sequence <= self.last.sequence
+            || !following
+        {
+            return;
+        }
+        if setpoint.check(self.servos.len()).is_err() {
+            self.stop(FaultCode::BadSetpoint, u32::MAX);
+            return;
+        }
+        let elapsed = now_ns
+            .saturating_sub(self.received_ns)
+            .max(session.period_ns);
+        if let Some(joint) = self.unreachable_joint(setpoint, elapsed as f64 * 1e-9) {
+            self.stop(FaultCode::OutOfRange, joint as u32);
+            return;
+        }
+        self.last = *setpoint;
+        self.received_ns = now_ns;
+        if setpoint.flags & SetpointFlags::STOP_REQUEST != 0 {
+            self.stop(FaultCode::StopRequest, u32::MAX);
+            return;
+        }
+        if setpoint.flags & SetpointFlags::GOODBYE != 0 {
+            self.state = DriverState::Disconnected;
+            self.session = None;
+            self.waiting.clear();
+            return;
+        }
+        self.state = match self.state {
+            DriverState::Synced => DriverState::Armed,
+            _ => DriverState::Active,
+        };
+        self.fresh = true;
+        self.waiting.push_back(*setpoint);
+    }
+
+    /// The first joint whose setpoint is out of range, too fast, or further away than the joint
+    /// can have come in `elapsed` (s).
+    fn unreachable_joint(&self, setpoint: &Setpoint, elapsed: f64) -> Option<usize> {
+        let first = self.state == DriverState::Synced;
+        (0..self.servos.len()).find(|&joint| {
+            let (at, speed) = (setpoint.position[joint], setpoint.velocity[joint]);
+            let most = self.options.velocity[joint] * 1.001;
+            // A late setpoint follows on the last one, not on what was made up meanwhile.
+            let before = if first {
+                self.servos[joint].position
+            } else {
+                self.last.position[joint]
+            };
+            let room = if first { FIRST } else { ROOM + most * elapsed };
+            at < self.options.lower[joint] - ROOM
+                || at > self.options.upper[joint] + ROOM
+                || speed.abs() > most
+                || (at - before).abs() > room
+        })
+    }
+
+    fn stop(&mut self, fault: FaultCode, joint: u32) {
+        self.fault = fault;
+        self.fault_joint = joint;
+        self.state = DriverState::Stopping;
+        self.waiting.clear();
+    }
+
+    /// One period of `period_ns` that ends at `now_ns`: moves the joints, chooses what to follow,
+    /// returns the state to send.
+    pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
+        let period = period_ns as f64 * 1e-9;
+        for servo in &mut self.servos {
+            servo.move_on(period);
+        }
+        self.watch(now_ns);
+        self.refer(period);
+        let control = [
+            self.options.frequency.min(0.4 / period),
+            self.options.damping,
+        ];
+        let state = self.report(now_ns);
+        for (servo, reference) in self.servos.iter_mut().zip(&self.references) {
+            servo.control(reference, control);
+        }
+        for (tool, order) in self.tools.iter_mut().zip([GRIPPER, TOOL_CHANGER]) {
+            tool.take(&self.last.tools[order]);
+            tool.move_on(period);
+        }
+        state
+    }
+
+    /// The watchdog, and the end of a stop.
+    fn watch(&mut self, now_ns: u64) {
+        let Some(session) = &self.session else { return };
+        let silence = now_ns.saturating_sub(self.received_ns);
+        match self.state {
+            DriverState::Armed | DriverState::Active => {
+                if !self.fresh {
+                    self.missed += 1;
+                    self.missed_ever += 1;
+                }
+                if silence > session.watchdog_ns {
+                    self.stop(FaultCode::Watchdog, u32::MAX);
+                }
+            }
+            DriverState::Synced if silence > session.watchdog_ns.max(1_000_000_000) => {
+                self.stop(FaultCode::Watchdog, u32::MAX);
+            }
+            DriverState::Stopping if self.references.iter().all(Reference::rests) => {
+                self.state = DriverState::Fault;
+            }
+            _ => {}
+        }
+    }
+
+    /// What the servos follow in this period.
+    fn refer(&mut self, period: f64) {
+        let setpoint = if self.fresh && self.waiting.len() > self.options.delay {
+            self.waiting.pop_front()
+        } else {
+            None
+        };
+        let held = self.fresh && setpoint.is_none();
+        self.fresh = false;
+        for (joint, reference) in self.references.iter_mut().enumerate() {
+            let rate = self.options.acceleration[joint];
+            let change = self.options.jerk[joint];
+            match (self.state, &setpoint) {
+                (DriverState::Armed | DriverState::Active, Some(setpoint)) => {
+                    *reference = Reference {
+                        position: setpoint.position[joint],
+                        velocity: setpoint.velocity[joint],
+                        acceleration: setpoint.acceleration[joint],
+                    };
+                }
+                (DriverState::Armed | DriverState::Active, None) if !held => {
+                    reference.go_on(change, period);
+                }
+                (DriverState::Stopping | DriverState::Disconnected, _) => {
+                    reference.brake(Bounds { rate, change }, period);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn report(&mut self, now_ns: u64) -> State {
+        self.sequence += 1;
+        let mut state = State {
+            joints: self.servos.len() as u32,
+            session: self.session.as_ref().map_or(0, |session| session.number),
+            sequence: self.sequence,
+            measured_ns: now_ns,
+            published_ns: now_ns,
+            setpoint_sequence: self.last.sequence,
+            setpoint_published_ns: self.last.published_ns,
+            setpoint_received_ns: self.received_ns,
+            driver_state: self.state as u32,
+            fault: self.fault as u32,
+            fault_joint: self.fault_joint,
+            missed: self.missed,
+            ..State::default()
+        };
+        for (joint, servo) in self.servos.iter().enumerate() {
+            let noise = if self.options.noise > 0.0 {
+                self.options.noise * self.noise.next()
+            } else {
+                0.0
+            };
+            state.position[joint] = servo.position + noise;
+            state.velocity[joint] = servo.velocity;
+        }
+        state.tools = [self.tools[0].feedback(), self.tools[1].feedback()];
+        state
+    }
+}

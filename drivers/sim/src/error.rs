@@ -1,0 +1,48 @@
+//! What can go wrong with the simulated driver.
+
+use thiserror::Error;
+
+/// Why the simulated driver cannot run.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The number of joints does not fit into a message.
+    #[error("{joints} joints do not fit, a message holds 1 to {most}")]
+    Joints {
+        /// The number asked for.
+        joints: usize,
+        /// The most that fit.
+        most: usize,
+    },
+    /// An option for the joints has another length than there are joints.
+    #[error("{option} has {found} values for {joints} joints")]
+    Count {
+        /// The option.
+        option: &'static str,
+        /// Number of values.
+        found: usize,
+        /// Number of joints.
+        joints: usize,
+    },
+    /// An option is not a number that makes sense.
+    #[error("{option} must be {wanted}, got {value}")]
+    Value {
+        /// The option.
+        option: &'static str,
+        /// What it should be.
+        wanted: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// The log of setpoints cannot be written.
+    #[error("cannot write {}: {cause}", path.display())]
+    Log {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the operating system said.
+        cause: String,
+    },
+    /// Shared memory.
+    #[error(transparent)]
+    Ipc(#[from] ipc::IpcError),
+}

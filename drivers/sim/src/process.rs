@@ -1,0 +1,178 @@
+//! The driver between shared memory and a clock.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use ipc::{Clock, DriverLink, now_ns, sleep_until_ns, urge};
+
+use crate::log::Log;
+use crate::{Driver, Options, SimError};
+
+/// The period without a session (ns).
+const IDLE_NS: u64 = 2_000_000;
+
+/// How long lock-step waits for the engine before the arm counts as left alone (ns).
+const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
+
+/// What a run of the driver came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Periods.
+    pub periods: u64,
+    /// Periods of sessions without a new setpoint.
+    pub missed: u64,
+    /// Sessions.
+    pub sessions: u64,
+    /// What the operating system refused, in one sentence.
+    pub warning: Option<String>,
+}
+
+/// Runs the simulated driver until `stop` becomes true.
+///
+/// # Errors
+/// When the options do not fit together, or the arm already has a driver, or shared memory cannot
+/// be used.
+pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, SimError> {
+    let urgency = options.urgency;
+    let link = DriverLink::open(&options.arm)?;
+    let mut log = Log::open(options.log.as_deref())?;
+    let mut driver = Driver::new(options)?;
+    let mut report = Report::default();
+    // While an engine paces the driver it may spin, which a real-time thread must not.
+    let mut granted = None;
+    while !stop.load(Ordering::Relaxed) {
+        match driver.clock() {
+            Some(Clock::LockStep) => {
+                report.periods += lock_step(&link, &mut driver, (&mut log, stop))
+            }
+            _ => {
+                if driver.clock().is_some() && granted.is_none() {
+                    let given = urge(urgency);
+                    report.warning = given.warning();
+                    granted = Some(given);
+                }
+                report.periods += 1;
+                wall_period(&link, &mut driver, &mut log);
+            }
+        }
+    }
+    report.missed = driver.missed_in_all();
+    report.sessions = driver.sessions();
+    Ok(report)
+}
+
+/// Answers a request for a session if one waits.
+fn answer_greeting(link: &DriverLink, driver: &mut Driver) {
+    if let Some(greeting) = link.greeting() {
+        let ack = driver.greet(&greeting.hello, now_ns());
+        greeting.answer(ack);
+    }
+}
+
+/// One period by the clock: 0.4 periods after the engine's.
+fn wall_period(link: &DriverLink, driver: &mut Driver, log: &mut Log) {
+    let period = driver.period_ns().unwrap_or(IDLE_NS);
+    let phase = match driver.last_setpoint().tick_ns {
+        0 => 0,
+        tick => tick + period * 2 / 5,
+    };
+    let now = now_ns();
+    let next = now + period - (now.wrapping_sub(phase)) % period;
+    sleep_until_ns(next);
+    answer_greeting(link, driver);
+    if driver.clock() == Some(Clock::LockStep) {
+        return;
+    }
+    let now = now_ns();
+    while let Some(setpoint) = link.next_setpoint() {
+        driver.receive(&setpoint, now);
+        log.write(&setpoint, driver, now);
+    }
+    let state = driver.step(now, period);
+    link.send(state);
+}
+
+/// Periods as fast as the engine asks for them; time is what the setpoints say. Returns after a
+/// few thousand, or when the engine is silent.
+fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &AtomicBool)) -> u64 {
+    let Some(period) = driver.period_ns() else {
+        return 0;
+    };
+    // A time of its own that is the same in every run.
+    let mut virtual_ns = driver
+        .last_setpoint()
+        .tick
+        .saturating_add(1)
+        .saturating_mul(period);
+    if driver.last_setpoint().sequence == 0 {
+        link.send(driver.step(0, period));
+    }
+    for periods in 1..=4096 {
+        let Some(setpoint) = wait_for_setpoint(link, driver, stop) else {
+            return periods;
+        };
+        virtual_ns = virtual_ns.max(setpoint.tick.saturating_mul(period));
+        driver.receive(&setpoint, virtual_ns);
+        log.write(&setpoint, driver, virtual_ns);
+        link.send(driver.step(virtual_ns, period));
+        if driver.clock() != Some(Clock::LockStep) {
+            return periods;
+        }
+    }
+    4096
+}
+
+/// Waits for the next setpoint, first awake, then asleep. Without one the driver stops the arm in
+/// virtual time and latches.
+fn wait_for_setpoint(
+    link: &DriverLink,
+    driver: &mut Driver,
+    stop: &AtomicBool,
+) -> Option<ipc::Setpoint> {
+    let start = Instant::now();
+    let mut turns = 0_u32;
+    loop {
+        if let Some(setpoint) = link.next_setpoint() {
+            return Some(setpoint);
+        }
+        turns = turns.saturating_add(1);
+        if turns < 2000 {
+            core::hint::spin_loop();
+        } else if turns < 4000 {
+            thread::yield_now();
+        } else {
+            thread::sleep(Duration::from_micros(50));
+            let sessions = driver.sessions();
+            answer_greeting(link, driver);
+            if driver.sessions() != sessions || stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            if start.elapsed() > Duration::from_nanos(LOCK_STEP_PATIENCE_NS) {
+                give_up(link, driver);
+                return None;
+            }
+        }
+    }
+}
+
+/// The engine of a lock-step session is gone: the arm stops in virtual time.
+fn give_up(link: &DriverLink, driver: &mut Driver) {
+    let (Some(period), Some(watchdog)) = (driver.period_ns(), driver.watchdog_ns()) else {
+        return;
+    };
+    let mut now = driver
+        .last_setpoint()
+        .tick
+        .saturating_mul(period)
+        .saturating_add(watchdog);
+    for _ in 0..100_000 {
+        if driver.state() == ipc::DriverState::Fault {
+            break;
+        }
+        now = now.saturating_add(period.max(watchdog));
+        link.send(driver.step(now, period));
+    }
+    thread::sleep(Duration::from_millis(2));
+    link.send(driver.step(now, period));
+}

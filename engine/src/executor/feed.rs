@@ -1,0 +1,90 @@
+//! The way of planned work to the real-time thread.
+
+use std::sync::Arc;
+
+use ipc::ToolAction;
+use realtime::Segment;
+use rtrb::Producer;
+use thiserror::Error;
+
+use super::remote::Shared;
+
+/// An order to a gripper or tool changer. It is carried out at rest, after all that was pushed
+/// before, and what is pushed after it waits for the tool's answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolOrder {
+    /// Index of the command.
+    pub command: u32,
+    /// [`ipc::GRIPPER`] or [`ipc::TOOL_CHANGER`].
+    pub tool: usize,
+    /// What to do.
+    pub action: ToolAction,
+    /// How long the tool may take (s).
+    pub timeout: f64,
+}
+
+/// What goes through the ring.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Work<const N: usize> {
+    Motion(Segment<N>),
+    Tool(ToolOrder),
+}
+
+/// Work and the age it belongs to: an abort begins a new age and drops what is older.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Item<const N: usize> {
+    pub(super) age: u32,
+    pub(super) work: Work<N>,
+}
+
+/// The ring to the real-time thread has no room now; try again a little later.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("the ring to the real-time thread is full")]
+pub struct Full;
+
+/// The planner's end. What is pushed is executed in order.
+#[derive(Debug)]
+pub struct Feeder<const N: usize> {
+    pub(super) ring: Producer<Item<N>>,
+    pub(super) shared: Arc<Shared<N>>,
+    pub(super) age: u32,
+}
+
+impl<const N: usize> Feeder<N> {
+    /// Hands over a planned segment.
+    ///
+    /// # Errors
+    /// [`Full`] when there is no room now.
+    pub fn push(&mut self, segment: Segment<N>) -> Result<(), Full> {
+        self.hand_over(Work::Motion(segment))
+    }
+
+    /// Hands over a tool order.
+    ///
+    /// # Errors
+    /// [`Full`] when there is no room now.
+    pub fn tool(&mut self, order: ToolOrder) -> Result<(), Full> {
+        self.hand_over(Work::Tool(order))
+    }
+
+    /// Begins a new program after an abort or a fault: what was pushed before this call is
+    /// dropped if it was not executed yet, what is pushed after it counts. Call it once the
+    /// [`super::Event::Aborted`] or [`super::Event::Recovered`] has come.
+    pub fn renew(&mut self) {
+        self.age = self.shared.age();
+    }
+
+    /// How many more items fit now.
+    pub fn room(&self) -> usize {
+        self.ring.slots()
+    }
+
+    fn hand_over(&mut self, work: Work<N>) -> Result<(), Full> {
+        self.ring
+            .push(Item {
+                age: self.age,
+                work,
+            })
+            .map_err(|_| Full)
+    }
+}

@@ -1,0 +1,124 @@
+//! Starting and ending the real-time thread, and what it reports.
+
+use core::sync::atomic::Ordering;
+use std::sync::mpsc;
+use std::thread::{Builder, JoinHandle};
+
+use rtrb::Consumer;
+
+use super::config::{ExecutorConfig, ExecutorError};
+use super::event::{Event, Recorded};
+use super::feed::Feeder;
+use super::remote::Remote;
+use super::runner::Runner;
+use super::thread;
+
+/// Stack of the real-time thread (bytes).
+const STACK: usize = 4 << 20;
+
+/// The reader's end: what happened, and what was published and measured.
+#[derive(Debug)]
+pub struct Monitor<const N: usize> {
+    pub(super) events: Consumer<Event>,
+    pub(super) samples: Consumer<Recorded<N>>,
+}
+
+impl<const N: usize> Monitor<N> {
+    /// The oldest event that was not read yet.
+    pub fn event(&mut self) -> Option<Event> {
+        self.events.pop().ok()
+    }
+
+    /// The oldest sample that was not read yet; none without [`ExecutorConfig::record`]. In
+    /// lock-step the thread waits for the reader, by the clock it drops what has no room.
+    pub fn sample(&mut self) -> Option<Recorded<N>> {
+        self.samples.pop().ok()
+    }
+}
+
+/// A running real-time thread. Dropping it stops the arm on the path, says goodbye to the driver
+/// and ends the thread.
+#[derive(Debug)]
+pub struct Executor<const N: usize> {
+    remote: Remote<N>,
+    thread: Option<JoinHandle<()>>,
+    /// What the operating system refused, in one sentence.
+    pub warning: Option<String>,
+    /// The driver's name.
+    pub driver: String,
+}
+
+impl<const N: usize> Executor<N> {
+    /// Finds the driver, opens a session, starts the thread. The arm rests where it is.
+    ///
+    /// # Errors
+    /// [`ExecutorError`]: a rate or limit that makes no sense, no driver, a driver that refuses,
+    /// another engine on the same arm.
+    pub fn start(
+        config: ExecutorConfig<N>,
+    ) -> Result<(Self, Feeder<N>, Monitor<N>), ExecutorError> {
+        config.check()?;
+        let (runner, feeder, remote, monitor) = Runner::new(config.clone());
+        let (tell, started) = mpsc::sync_channel(1);
+        let thread = Builder::new()
+            .name("servo".to_owned())
+            .stack_size(STACK)
+            .spawn(move || thread::main(&config, runner, &tell))
+            .map_err(|cause| ExecutorError::Thread {
+                cause: cause.to_string(),
+            })?;
+        let start = started.recv().unwrap_or_else(|_| {
+            Err(ExecutorError::Thread {
+                cause: "it ended before it began".to_owned(),
+            })
+        });
+        match start {
+            Ok(begun) => {
+                let (warning, driver) = (begun.warning, begun.driver);
+                let executor = Self {
+                    remote,
+                    thread: Some(thread),
+                    warning,
+                    driver,
+                };
+                Ok((executor, feeder, monitor))
+            }
+            Err(error) => {
+                // The thread has ended or is about to; what it would say has been said.
+                let _ = thread.join();
+                Err(error)
+            }
+        }
+    }
+
+    /// Control, and where the arm is.
+    pub fn remote(&self) -> Remote<N> {
+        self.remote.clone()
+    }
+
+    /// Whether the thread still runs.
+    pub fn is_running(&self) -> bool {
+        self.thread
+            .as_ref()
+            .is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Stops the arm on the path, says goodbye to the driver and ends the thread.
+    pub fn shutdown(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        self.remote.shared.shutdown.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // A thread that panicked has already said so; there is nothing left to end.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl<const N: usize> Drop for Executor<N> {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

@@ -1,0 +1,260 @@
+//! The real-time thread: a clock, the link to the driver, and the runner between them.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+use std::sync::mpsc::SyncSender;
+use std::thread;
+use std::time::Instant;
+
+use ipc::{
+    Clock, EngineLink, Granted, Hello, Setpoint, SetpointFlags, State, now_ns, sleep_until_ns,
+    text_of, urge,
+};
+
+use super::config::{ExecutorConfig, ExecutorError};
+use super::event::Fault;
+use super::remote::{Control, Shared};
+use super::runner::{Runner, Tick};
+
+/// How long a driver of a lock-step session may think about a period.
+const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How long the thread tries to come to rest before it leaves anyway.
+const LEAVE: Duration = Duration::from_secs(5);
+
+/// What the thread tells when it has begun.
+#[derive(Debug)]
+pub(super) struct Begun {
+    pub(super) warning: Option<String>,
+    pub(super) driver: String,
+}
+
+/// The link, and when the last period was.
+struct Loop<'a, const N: usize> {
+    config: &'a ExecutorConfig<N>,
+    link: EngineLink,
+    runner: Runner<N>,
+    shared: std::sync::Arc<Shared<N>>,
+    tick: u64,
+    /// When period 0 began (ns).
+    origin: u64,
+    leaving: Option<Instant>,
+}
+
+/// The thread. Says first whether it begins.
+pub(super) fn main<const N: usize>(
+    config: &ExecutorConfig<N>,
+    runner: Runner<N>,
+    tell: &SyncSender<Result<Begun, ExecutorError>>,
+) {
+    let shared = runner.shared();
+    let begun = EngineLink::open(&config.arm)
+        .map_err(ExecutorError::from)
+        .and_then(|link| {
+            let mut all = Loop {
+                config,
+                link,
+                runner,
+                shared,
+                tick: 0,
+                origin: 0,
+                leaving: None,
+            };
+            all.greet(config.connect).map(|driver| (all, driver))
+        });
+    let (mut all, driver) = match begun {
+        Ok(begun) => begun,
+        Err(error) => {
+            // Whoever asked has gone; the thread goes too.
+            let _ = tell.send(Err(error));
+            return;
+        }
+    };
+    // A thread that waits awake, as in lock-step, must not be a real-time thread.
+    let granted = match config.clock {
+        Clock::Wall => urge(config.urgency),
+        Clock::LockStep => Granted::default(),
+    };
+    // Whoever asked may have gone; then the drop of its handle ends the thread.
+    let _ = tell.send(Ok(Begun {
+        warning: granted.warning(),
+        driver,
+    }));
+    match config.clock {
+        Clock::Wall => all.by_the_clock(),
+        Clock::LockStep => all.in_step(),
+    }
+    all.runner.end();
+}
+
+impl<const N: usize> Loop<'_, N> {
+    /// Opens a session; returns the driver's name.
+    fn greet(&mut self, timeout: Duration) -> Result<String, ExecutorError> {
+        let config = self.config;
+        let watchdog = config.watchdog.as_nanos() as u64;
+        let hello = Hello {
+            model: config.model,
+            ..Hello::new(N, config.period_ns(), watchdog, config.clock)
+        };
+        let ack = self.link.greet(&hello, timeout)?;
+        self.runner.open(&ack);
+        Ok(text_of(&ack.name))
+    }
+
+    /// Opens a new session if the operator asked for one.
+    fn recover(&mut self) {
+        if !self.runner.wants_session() {
+            return;
+        }
+        self.shared.recover.store(false, Ordering::Release);
+        if self
+            .greet(self.config.connect.min(Duration::from_secs(1)))
+            .is_ok()
+        {
+            self.runner.recovered();
+        } else {
+            self.runner.fail(Fault::NoSession);
+        }
+        // The handshake took its time; the periods begin anew instead of being late.
+        self.origin = now_ns().saturating_sub(self.tick * self.config.period_ns());
+    }
+
+    /// Whether the thread shall end now: asked to, and the arm rests.
+    fn leaves(&mut self) -> bool {
+        if !self.shared.shutdown.load(Ordering::Acquire) {
+            return false;
+        }
+        let since = *self.leaving.get_or_insert_with(Instant::now);
+        self.shared.control(Control::Pause);
+        self.runner.may_leave() || since.elapsed() > LEAVE
+    }
+
+    /// Tells the driver that the session ends, if the arm rests.
+    fn say_goodbye(&self, last: Setpoint) {
+        if last.flags & SetpointFlags::HOLD != 0 && last.session == self.runner.session() {
+            let flags = last.flags | SetpointFlags::GOODBYE;
+            self.link.send(Setpoint {
+                flags,
+                sequence: last.sequence + 1,
+                ..last
+            });
+        }
+    }
+
+    fn send(&self, setpoint: Setpoint) {
+        if !self.link.send(setpoint) {
+            self.shared.unsent.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Periods by the clock: absolute deadlines; late periods are left out, never made up for.
+    fn by_the_clock(&mut self) {
+        let period = self.config.period_ns();
+        self.origin = now_ns() + period;
+        loop {
+            let begin = self.origin + self.tick * period;
+            sleep_until_ns(begin);
+            let now_ns = now_ns();
+            let late = now_ns.saturating_sub(begin);
+            self.shared.latency.count(late);
+            let skipped = late / period;
+            self.tick += skipped;
+            let tick = Tick {
+                number: self.tick,
+                begin_ns: begin + skipped * period,
+                now_ns,
+                skipped,
+            };
+            let setpoint = self.runner.tick(self.link.last_state(), tick);
+            self.send(setpoint);
+            self.shared.work.count(ipc::now_ns().saturating_sub(now_ns));
+            self.tick += 1;
+            if self.leaves() {
+                return self.say_goodbye(setpoint);
+            }
+            self.recover();
+        }
+    }
+
+    /// Periods in step with the driver: each state releases the next setpoint.
+    fn in_step(&mut self) {
+        let period = self.config.period_ns();
+        let mut last = Setpoint::default();
+        loop {
+            match self.wait_for_state() {
+                Some(state) => {
+                    let begin_ns = self.tick * period;
+                    let tick = Tick {
+                        number: self.tick,
+                        begin_ns,
+                        now_ns: begin_ns,
+                        skipped: 0,
+                    };
+                    last = self.runner.tick(Some(state), tick);
+                    self.send(last);
+                    self.tick += 1;
+                }
+                None if self.shared.shutdown.load(Ordering::Acquire) => return,
+                None => {
+                    let silent_ms = LOCK_STEP_PATIENCE.as_millis() as u64;
+                    self.runner.latch(Fault::DriverLost { silent_ms });
+                    self.stop_alone(period);
+                }
+            }
+            if self.leaves() {
+                return self.say_goodbye(last);
+            }
+            self.recover();
+            while self.runner.samples_wait() && !self.shared.shutdown.load(Ordering::Acquire) {
+                thread::yield_now();
+            }
+        }
+    }
+
+    /// The driver of a lock-step session is gone: the motion comes to rest in virtual time.
+    fn stop_alone(&mut self, period: u64) {
+        for _ in 0..100_000 {
+            if self.runner.may_leave() {
+                return;
+            }
+            let begin_ns = self.tick * period;
+            let tick = Tick {
+                number: self.tick,
+                begin_ns,
+                now_ns: begin_ns,
+                skipped: 0,
+            };
+            let setpoint = self.runner.tick(None, tick);
+            self.send(setpoint);
+            self.tick += 1;
+        }
+    }
+
+    /// The next state of the session, first awake, then asleep; `None` when none came for long,
+    /// when the thread shall end, or when a new session is wanted.
+    fn wait_for_state(&self) -> Option<State> {
+        let start = Instant::now();
+        let mut turns = 0_u32;
+        loop {
+            if let Some(state) = self.link.next_state() {
+                if state.session == self.runner.session() {
+                    return Some(state);
+                }
+                continue;
+            }
+            turns = turns.saturating_add(1);
+            if turns < 2000 {
+                core::hint::spin_loop();
+            } else if turns < 4000 {
+                thread::yield_now();
+            } else {
+                thread::sleep(Duration::from_micros(50));
+                let ends = self.shared.shutdown.load(Ordering::Acquire)
+                    && start.elapsed() > Duration::from_millis(200);
+                if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {
+                    return None;
+                }
+            }
+        }
+    }
+}

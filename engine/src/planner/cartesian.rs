@@ -1,0 +1,214 @@
+//! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
+
+use kinematics::Chain;
+use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
+use nalgebra::SVector;
+use realtime::{Piece, Sample};
+use trajectory::{
+    Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
+    smooth, time_path,
+};
+
+use super::{MotionError, Planner, certificate};
+use crate::task::Move;
+
+/// Longest way of the tool between two solved points, m.
+const STEP_M: f64 = 4e-3;
+/// Largest turn of the tool between two solved points, rad.
+const STEP_RAD: f64 = 0.02;
+/// Largest deviation of the fitted joint path between solved points, m and rad.
+const FIT: f64 = 5e-7;
+/// How often the grid is refined before the path is given up.
+const REFINEMENTS: usize = 8;
+/// Most points of a path.
+const MOST_POINTS: usize = 400_000;
+
+impl<const N: usize> Planner<N> {
+    pub(super) fn plan_straight(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let goal = motion.poses.first().copied().unwrap_or_default();
+        let from = self.chain().forward(start);
+        let gap = from.inv_mul(&goal);
+        if gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9 {
+            return Ok(Trajectory::new(Vec::new()));
+        }
+        let line = Line::new(from, goal);
+        let points = self.followed(&line, start, &|_| 1)?;
+        let options =
+            TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
+        let path = joint_path(&line, &points)?;
+        time_path(&path, &self.limits, &motion.limits, &options)
+            .map(|timed| timed.trajectory)
+            .map_err(|error| MotionError::Timing(error.to_string()))
+    }
+
+    pub(super) fn plan_smooth(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let mut poses = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        let plan = smooth::plan(&poses, &options)
+            .map_err(|error| MotionError::Smooth(error.to_string()))?;
+        let towards = |u: f64| 1 + plan.passes().iter().take_while(|pass| pass.time <= u).count();
+        let points = self.followed(&plan, start, &towards)?;
+        let direct = Trajectory::new(pieces(&points));
+        let samples = certificate::tool_samples(self.chain(), &direct);
+        let stretch =
+            certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
+        if stretch <= 1.0 + 1e-4 {
+            return Ok(direct);
+        }
+        let slow = direct.stretched(stretch);
+        let options = TimingOptions {
+            start: Boundary::Free,
+            end: Boundary::Free,
+            rate_cap: Some(1.0),
+            ..Default::default()
+        };
+        let path = joint_path(&plan, &points)?;
+        match time_path(&path, &self.limits, &motion.limits, &options) {
+            Ok(timed) if timed.trajectory.duration() < slow.duration() => Ok(timed.trajectory),
+            _ => Ok(slow),
+        }
+    }
+
+    /// Solves inverse kinematics along a curve, on one branch, on a grid fine
+    /// enough that a quintic between its points stays on the curve.
+    fn followed(
+        &self,
+        curve: &dyn ToolCurve,
+        start: &SVector<f64, N>,
+        towards: &dyn Fn(f64) -> usize,
+    ) -> Result<Vec<FollowPoint<N>>, MotionError> {
+        let mut points = self.solved(curve, &first_grid(curve), start, towards)?;
+        for _ in 0..REFINEMENTS {
+            let finer = refined(self.chain(), &points, curve);
+            if finer.len() == points.len() || finer.len() > MOST_POINTS {
+                break;
+            }
+            points = self.solved(curve, &finer, start, towards)?;
+        }
+        Ok(points)
+    }
+
+    fn solved(
+        &self,
+        curve: &dyn ToolCurve,
+        grid: &[f64],
+        start: &SVector<f64, N>,
+        towards: &dyn Fn(f64) -> usize,
+    ) -> Result<Vec<FollowPoint<N>>, MotionError> {
+        let tool = |u: f64| {
+            let ToolPoint { pose, linear, angular } = curve.at(u);
+            TwistPoint { pose, linear, angular }
+        };
+        let options = follow::FollowOptions::default();
+        follow::follow(&self.solver, &tool, grid, start, &options)
+            .map_err(|error| self.blocked(&error, curve.end(), towards))
+    }
+
+    fn blocked(
+        &self,
+        error: &FollowError,
+        end: f64,
+        towards: &dyn Fn(f64) -> usize,
+    ) -> MotionError {
+        let joint = error.joint.map_or_else(String::new, |joint| self.joint_name(joint));
+        let cause = match (error.cause, error.joint) {
+            (FollowCause::Limit, Some(index)) => format!(
+                "joint {joint} would pass its limit by {}",
+                self.amount(index, error.amount)
+            ),
+            (FollowCause::Singular, _) => format!(
+                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                error.amount
+            ),
+            (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
+            (_, _) => error.to_string(),
+        };
+        MotionError::Blocked { pose: towards(error.u), percent: 100.0 * error.u / end, cause }
+    }
+}
+
+fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {
+    let [position, velocity, acceleration, jerk] = point.q;
+    Sample { position, velocity, acceleration, jerk }
+}
+
+/// Quintics between followed points, in the parameter of the curve.
+fn pieces<const N: usize>(points: &[FollowPoint<N>]) -> Vec<Piece<N>> {
+    points.windows(2).map(|pair| piece(&pair[0], &pair[1])).collect()
+}
+
+fn piece<const N: usize>(from: &FollowPoint<N>, to: &FollowPoint<N>) -> Piece<N> {
+    Piece::hermite(to.u - from.u, &sample(from), &sample(to))
+}
+
+fn joint_path<'a, const N: usize>(
+    curve: &'a dyn ToolCurve,
+    points: &[FollowPoint<N>],
+) -> Result<HermitePath<N, &'a dyn ToolCurve>, MotionError> {
+    let points = points.iter().map(|point| (point.u, JointPoint { q: point.q })).collect();
+    HermitePath::new(points, curve)
+        .ok_or_else(|| MotionError::Timing("the way has fewer than two points".into()))
+}
+
+/// Knots of the curve, with points between them so that no step is long.
+fn first_grid(curve: &dyn ToolCurve) -> Vec<f64> {
+    let mut knots = curve.knots();
+    knots.push(0.0);
+    knots.push(curve.end());
+    knots.retain(|u| (0.0..=curve.end()).contains(u));
+    knots.sort_by(f64::total_cmp);
+    knots.dedup_by(|b, a| *b - *a <= 1e-9 * curve.end());
+    let mut grid = vec![0.0];
+    for pair in knots.windows(2) {
+        let steps = steps_between(curve, pair[0], pair[1]);
+        for step in 1..=steps {
+            grid.push(pair[0] + (pair[1] - pair[0]) * step as f64 / steps as f64);
+        }
+    }
+    grid
+}
+
+fn steps_between(curve: &dyn ToolCurve, from: f64, to: f64) -> usize {
+    const PROBES: usize = 4;
+    let poses: Vec<_> = (0..=PROBES)
+        .map(|i| curve.at(from + (to - from) * i as f64 / PROBES as f64).pose)
+        .collect();
+    let (mut way, mut turn) = (0.0, 0.0);
+    for pair in poses.windows(2) {
+        let gap = pair[0].inv_mul(&pair[1]);
+        way += gap.translation.vector.norm();
+        turn += gap.rotation.angle();
+    }
+    let steps = (way / STEP_M).max(turn / STEP_RAD).ceil();
+    (steps as usize).clamp(1, 100_000)
+}
+
+/// The grid with a point more in each interval where the fit leaves the curve.
+fn refined<const N: usize>(
+    chain: &Chain<N>,
+    points: &[FollowPoint<N>],
+    curve: &dyn ToolCurve,
+) -> Vec<f64> {
+    let mut finer = Vec::with_capacity(points.len() * 2);
+    for pair in points.windows(2) {
+        finer.push(pair[0].u);
+        let half = 0.5 * (pair[1].u - pair[0].u);
+        let joints = piece(&pair[0], &pair[1]).sample(half).position;
+        let middle = pair[0].u + half;
+        let gap = chain.forward(&joints).inv_mul(&curve.at(middle).pose);
+        if gap.translation.vector.norm() > FIT || gap.rotation.angle() > FIT {
+            finer.push(middle);
+        }
+    }
+    finer.extend(points.last().map(|point| point.u));
+    finer
+}

@@ -1,0 +1,155 @@
+//! MoveTo: the configuration that is reached soonest, moved to in joint space.
+
+use kinematics::{Chain, Obstacle, Report};
+use nalgebra::{Isometry3, SVector};
+use trajectory::otg::{self, Otg};
+use trajectory::{
+    Boundary, JointLine, JointPoint, TimingOptions, ToolPoint, Trajectory, time_path,
+};
+
+use super::{MotionError, Planner, certificate};
+use crate::task::Move;
+
+/// How many configurations are planned in full, the most promising first.
+const TRIED: usize = 4;
+
+impl<const N: usize> Planner<N> {
+    pub(super) fn plan_joint(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let pose = motion.poses.first().copied().unwrap_or_default();
+        let mut goals = self.configurations(&pose, start)?;
+        goals.sort_by(|a, b| self.effort(start, a).total_cmp(&self.effort(start, b)));
+        goals.truncate(TRIED);
+        let mut best: Option<Trajectory<N>> = None;
+        let mut refusal = None;
+        for goal in &goals {
+            match self.joint_move(motion, start, goal) {
+                Ok(found) if best.as_ref().is_none_or(|b| found.duration() < b.duration()) => {
+                    best = Some(found);
+                }
+                Ok(_) => {}
+                Err(error) => refusal = Some(error),
+            }
+        }
+        best.ok_or_else(|| refusal.unwrap_or_else(|| MotionError::Timing("no goal".into())))
+    }
+
+    /// All known configurations that reach a pose within the joint limits.
+    fn configurations(
+        &self,
+        pose: &Isometry3<f64>,
+        start: &SVector<f64, N>,
+    ) -> Result<Vec<SVector<f64, N>>, MotionError> {
+        let mut goals: Vec<SVector<f64, N>> =
+            self.solver.solve_all(pose).iter().map(|branch| branch.q).collect();
+        match self.solver.nearest(pose, start) {
+            Ok(solution) => goals.push(solution.q),
+            Err(report) if goals.is_empty() => return Err(self.refusal(1, &report)),
+            Err(_) => {}
+        }
+        Ok(goals)
+    }
+
+    /// Time for the slowest joint at constant velocity, s: cheap, and a good order.
+    fn effort(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
+        (goal - start).abs().component_div(&self.limits.velocity).max()
+    }
+
+    fn joint_move(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        goal: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let free = self.rest_to_rest(start, goal)?;
+        let samples = certificate::tool_samples(self.chain(), &free);
+        let peaks = certificate::peaks(&free, &samples, &self.limits, &motion.limits);
+        let stretch = peaks.stretch();
+        if stretch <= 1.0 {
+            return Ok(free);
+        }
+        // The tool is too fast: either everything slower, or a line in joint
+        // space that is slow only where the tool is fast.
+        let slow = free.stretched(stretch);
+        match self.timed_line(motion, start, goal) {
+            Ok(line) if line.duration() < slow.duration() => Ok(line),
+            _ => Ok(slow),
+        }
+    }
+
+    fn rest_to_rest(
+        &self,
+        start: &SVector<f64, N>,
+        goal: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let plan = Otg::plan(
+            &otg::State::rest(*start),
+            &otg::State::rest(*goal),
+            &otg::Limits::from(&self.limits),
+            &otg::Options::default(),
+        );
+        match plan {
+            Ok(found) => Ok(Trajectory::new(found.pieces())),
+            Err(error) => Err(MotionError::Timing(error.to_string())),
+        }
+    }
+
+    fn timed_line(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        goal: &SVector<f64, N>,
+    ) -> Result<Trajectory<N>, MotionError> {
+        let chain = self.chain();
+        let tool = |joint: &trajectory::JointPoint<N>| tool_point(chain, joint);
+        let line = JointLine::new(*start, *goal, tool);
+        let options =
+            TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
+        time_path(&line, &self.limits, &motion.limits, &options)
+            .map(|timed| timed.trajectory)
+            .map_err(|error| MotionError::Timing(error.to_string()))
+    }
+
+    /// The report of the solver in the words of a command.
+    fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
+        match report.obstacle {
+            Obstacle::OutOfReach { distance } => {
+                MotionError::OutOfReach { pose, millimetres: distance * 1e3 }
+            }
+            Obstacle::AtLimit { joint, beyond } => MotionError::BeyondLimit {
+                pose,
+                joint: self.joint_name(joint),
+                beyond: self.amount(joint, beyond),
+            },
+            Obstacle::Orientation { angle } => {
+                MotionError::Orientation { pose, degrees: angle.to_degrees() }
+            }
+            _ => MotionError::Unsolved {
+                pose,
+                millimetres: report.position_error * 1e3,
+                degrees: report.rotation_error.to_degrees(),
+            },
+        }
+    }
+}
+
+/// Pose and derivatives of the controlled point from those of the joints.
+fn tool_point<const N: usize>(chain: &Chain<N>, joint: &JointPoint<N>) -> ToolPoint {
+    let [q, dq, ddq, dddq] = &joint.q;
+    let (pose, jacobian) = chain.jacobian(q);
+    let change = chain.jacobian_derivative(q, dq);
+    // Second derivative of the Jacobian by central difference, over 1e-4 rad of the fastest joint.
+    let h = 1e-4 / dq.amax().max(1e-6);
+    let at = |h: f64| chain.jacobian_derivative(&(q + dq * h), &(dq + ddq * h));
+    let second = (at(h) - at(-h)) / (2.0 * h);
+    let twists = [
+        jacobian * dq,
+        jacobian * ddq + change * dq,
+        jacobian * dddq + change * ddq * 2.0 + second * dq,
+    ];
+    let part = |row: usize| twists.map(|twist| twist.fixed_rows::<3>(row).into_owned());
+    ToolPoint { pose, linear: part(0), angular: part(3) }
+}

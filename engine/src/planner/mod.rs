@@ -1,0 +1,173 @@
+//! From a self-contained move and a start at rest to a certified trajectory.
+//!
+//! The planner is a pure function: the same move, arm and start give the same
+//! bytes. The dry run, the real run and the benchmarks call it alike.
+
+mod cartesian;
+mod certificate;
+mod goal;
+mod motion_error;
+
+use kinematics::{Chain, Solver};
+use nalgebra::{Isometry3, SVector};
+use trajectory::{JointLimits, ToolLimits, Trajectory};
+
+pub use certificate::{MoveCertificate, PassReport, Peaks};
+pub use motion_error::MotionError;
+
+use crate::task::{Move, Shape};
+
+/// Joint ratios may exceed 1 by rounding only.
+const ROUNDING: f64 = 1e-9;
+
+/// A move that may be executed: its trajectory, its certificate and how the
+/// smooth path came about.
+#[derive(Clone, Debug)]
+pub struct PlannedMove<const N: usize> {
+    /// Joints against time, rest to rest.
+    pub trajectory: Trajectory<N>,
+    /// What was proved of it.
+    pub certificate: MoveCertificate,
+    /// Joints at the end, at rest.
+    pub end: SVector<f64, N>,
+}
+
+/// Plans moves of one arm with one tool.
+#[derive(Clone, Debug)]
+pub struct Planner<const N: usize> {
+    solver: Solver<N>,
+    limits: JointLimits<N>,
+    joint_names: Vec<String>,
+    flange_from_tool: Isometry3<f64>,
+}
+
+impl<const N: usize> Planner<N> {
+    /// A planner for `chain` (workstation to the arm's end) with a tool.
+    #[must_use]
+    pub fn new(
+        chain: &Chain<N>,
+        flange_from_tool: Isometry3<f64>,
+        limits: JointLimits<N>,
+        joint_names: Vec<String>,
+    ) -> Self {
+        let solver = Solver::new(chain.clone().with_tool(&flange_from_tool));
+        Self { solver, limits, joint_names, flange_from_tool }
+    }
+
+    /// The tool that this planner was made for.
+    #[must_use]
+    pub fn flange_from_tool(&self) -> &Isometry3<f64> {
+        &self.flange_from_tool
+    }
+
+    /// From the workstation to the controlled point.
+    #[must_use]
+    pub fn chain(&self) -> &Chain<N> {
+        self.solver.chain()
+    }
+
+    /// Limits of the joints.
+    #[must_use]
+    pub fn limits(&self) -> &JointLimits<N> {
+        &self.limits
+    }
+
+    /// Plans a move from `start`, at rest; checks all of it before it returns.
+    ///
+    /// # Errors
+    /// [`MotionError`] when any part of the move cannot be made; then nothing
+    /// of it may be executed.
+    pub fn plan(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        let trajectory = match motion.shape {
+            Shape::Joint => self.plan_joint(motion, start)?,
+            Shape::Straight => self.plan_straight(motion, start)?,
+            Shape::Smooth => self.plan_smooth(motion, start)?,
+        };
+        self.certify(motion, trajectory)
+    }
+
+    /// Slows the motion down, uniformly and by as little as needed, until every
+    /// limit holds, and proves what the command asked for.
+    fn certify(
+        &self,
+        motion: &Move,
+        trajectory: Trajectory<N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        let trajectory = self.within_limits(trajectory, &motion.limits);
+        let samples = certificate::tool_samples(self.chain(), &trajectory);
+        let peaks = certificate::peaks(&trajectory, &samples, &self.limits, &motion.limits);
+        let way = certificate::way(motion, self.chain(), &trajectory, &samples);
+        let joint_margin = self.margin(&trajectory);
+        let certificate = MoveCertificate {
+            poses: way.poses,
+            in_order: way.in_order,
+            peaks,
+            straightness_m: way.straightness_m,
+            end_deviation_m: way.end_deviation_m,
+            end_angle_rad: way.end_angle_rad,
+            joint_margin,
+        };
+        check(&certificate, motion)?;
+        let end = trajectory.sample(trajectory.duration()).position;
+        Ok(PlannedMove { trajectory, certificate, end })
+    }
+
+    fn within_limits(&self, trajectory: Trajectory<N>, limits: &ToolLimits) -> Trajectory<N> {
+        let samples = certificate::tool_samples(self.chain(), &trajectory);
+        let stretch = certificate::peaks(&trajectory, &samples, &self.limits, limits).stretch();
+        if stretch <= 1.0 { trajectory } else { trajectory.stretched(stretch) }
+    }
+
+    fn margin(&self, trajectory: &Trajectory<N>) -> f64 {
+        let (lowest, highest) = trajectory.position_range();
+        let below = (lowest - self.limits.lower).min();
+        let above = (self.limits.upper - highest).min();
+        below.min(above)
+    }
+
+    fn joint_name(&self, joint: usize) -> String {
+        self.joint_names.get(joint).cloned().unwrap_or_else(|| format!("{}", joint + 1))
+    }
+
+    /// A joint quantity with the unit that people read.
+    fn amount(&self, joint: usize, value: f64) -> String {
+        match self.chain().prismatic().get(joint) {
+            Some(true) => format!("{:.1} mm", value * 1e3),
+            _ => format!("{:.2} degrees", value.to_degrees()),
+        }
+    }
+}
+
+/// Largest deviation from a straight line, m.
+const STRAIGHT: f64 = 1e-5;
+/// Largest distance and angle from the last pose, m and rad.
+const ARRIVED: (f64, f64) = (1e-6, 1e-6);
+
+fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), MotionError> {
+    let fault = |what: String| Err(MotionError::Uncertified(what));
+    let largest = certificate.peaks.largest();
+    if !(largest <= 1.0 + ROUNDING) {
+        return fault(format!("a limit is exceeded {largest:.6} times"));
+    }
+    if !certificate.in_order {
+        return fault(format!(
+            "an intermediate pose is not passed in order within {:.4} mm",
+            motion.tolerance * 1e3
+        ));
+    }
+    if certificate.straightness_m.is_some_and(|off| off > STRAIGHT) {
+        return fault("the straight line is not straight within 0.01 mm".into());
+    }
+    if certificate.end_deviation_m > ARRIVED.0 || certificate.end_angle_rad > ARRIVED.1 {
+        return fault(format!("it ends {:.6} mm off", certificate.end_deviation_m * 1e3));
+    }
+    if certificate.joint_margin < -ROUNDING {
+        let beyond = -certificate.joint_margin;
+        return fault(format!("a joint goes {beyond:.3e} beyond its position limit"));
+    }
+    Ok(())
+}

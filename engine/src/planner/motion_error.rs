@@ -1,0 +1,85 @@
+//! Why a motion cannot be made.
+
+use thiserror::Error;
+
+/// A move that the arm cannot make. Poses are counted from 1, joints by name.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum MotionError {
+    /// No configuration of the arm reaches the pose.
+    #[error("pose {pose} is out of reach by {millimetres:.1} mm")]
+    OutOfReach {
+        /// Which pose of the command.
+        pose: usize,
+        /// Distance from the nearest reachable place, mm.
+        millimetres: f64,
+    },
+    /// The pose is reached only beyond a joint limit.
+    #[error("pose {pose} needs joint {joint} {beyond} beyond its limit")]
+    BeyondLimit {
+        /// Which pose of the command.
+        pose: usize,
+        /// Name of the joint.
+        joint: String,
+        /// How far beyond, with its unit.
+        beyond: String,
+    },
+    /// The position is in reach, the orientation is not.
+    #[error("pose {pose} is in reach, but its orientation is {degrees:.1} degrees out of reach")]
+    Orientation {
+        /// Which pose of the command.
+        pose: usize,
+        /// Angle from the nearest orientation, degrees.
+        degrees: f64,
+    },
+    /// No solution was found, and neither reach nor one joint explains it.
+    #[error(
+        "pose {pose} cannot be reached: the nearest found is {millimetres:.3} mm and {degrees:.3} degrees off"
+    )]
+    Unsolved {
+        /// Which pose of the command.
+        pose: usize,
+        /// Position error of the nearest configuration found, mm.
+        millimetres: f64,
+        /// Orientation error of the nearest configuration found, degrees.
+        degrees: f64,
+    },
+    /// The way to the pose leaves what the arm can do.
+    #[error("the way cannot be followed at {percent:.1} % of its length, towards pose {pose}: {cause}")]
+    Blocked {
+        /// Pose that the arm was on its way to.
+        pose: usize,
+        /// Where on the way, percent of the path parameter.
+        percent: f64,
+        /// Joint, cause and amount in words.
+        cause: String,
+    },
+    /// The smooth path could not be made.
+    #[error("no smooth path: {0}")]
+    Smooth(String),
+    /// No time law could be made.
+    #[error("the motion cannot be timed: {0}")]
+    Timing(String),
+    /// The planned motion failed its own certificate; it is not executed.
+    #[error("the planned motion failed its certificate: {0}")]
+    Uncertified(String),
+}
+
+impl MotionError {
+    /// What would fix it.
+    #[must_use]
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::OutOfReach { .. } => "move the pose nearer to the arm; check units and frame",
+            Self::BeyondLimit { .. } | Self::Orientation { .. } => "turn the tool, or move the pose",
+            Self::Unsolved { .. } => "check the pose with `canter ik`",
+            Self::Blocked { .. } => {
+                "reach the start in another configuration with MoveTo, or go round the place"
+            }
+            Self::Smooth(_) => "check the poses and the intermediate point tolerance",
+            Self::Timing(_) | Self::Uncertified(_) => {
+                "please report this with the program: it is a fault of the planner"
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The bounded queue between who gives commands and the planner.
+
+use std::collections::VecDeque;
+
+use crcl::Located;
+use thiserror::Error;
+
+/// A command with its number in the life of the queue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Queued {
+    /// Number of the command, counted from 1 over the life of the queue.
+    pub id: u32,
+    /// The command and where it stood.
+    pub located: Located,
+}
+
+/// Why a command was not taken.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("the command queue is full: it holds {capacity} commands")]
+pub struct Full {
+    /// How many commands the queue holds.
+    pub capacity: usize,
+}
+
+/// First in, first out; never grows beyond its capacity.
+///
+/// ```
+/// use engine::queue::Queue;
+/// let mut queue = Queue::new(1);
+/// let command = |command| crcl::Located { command, span: 0..0, line: 1, column: 1 };
+/// assert_eq!(queue.push(command(crcl::Command::InitCanon)), Ok(1));
+/// assert!(queue.push(command(crcl::Command::OpenGripper)).is_err());
+/// assert_eq!(queue.pop().map(|queued| queued.id), Some(1));
+/// ```
+#[derive(Debug)]
+pub struct Queue {
+    commands: VecDeque<Queued>,
+    capacity: usize,
+    next_id: u32,
+}
+
+impl Queue {
+    /// An empty queue for at most `capacity` commands.
+    #[must_use]
+    pub fn new(capacity: usize) -> Self {
+        Self { commands: VecDeque::with_capacity(capacity), capacity, next_id: 1 }
+    }
+
+    /// Appends a command and returns its number.
+    ///
+    /// # Errors
+    /// [`Full`], and the queue is as before.
+    pub fn push(&mut self, located: Located) -> Result<u32, Full> {
+        if self.commands.len() >= self.capacity {
+            return Err(Full { capacity: self.capacity });
+        }
+        let id = self.next_id;
+        self.next_id += 1;
+        self.commands.push_back(Queued { id, located });
+        Ok(id)
+    }
+
+    /// Takes the oldest command.
+    pub fn pop(&mut self) -> Option<Queued> {
+        self.commands.pop_front()
+    }
+
+    /// Drops all commands and returns how many there were.
+    pub fn flush(&mut self) -> usize {
+        let count = self.commands.len();
+        self.commands.clear();
+        count
+    }
+
+    /// How many commands wait.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.commands.len()
+    }
+
+    /// Whether no command waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.commands.is_empty()
+    }
+}

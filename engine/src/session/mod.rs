@@ -1,0 +1,239 @@
+//! The real run: commands through queue, planner and executor to a driver.
+//!
+//! A session owns a worker thread, which plans ahead of the executor and
+//! reports each command in order. The executor's real-time thread is its own.
+
+mod note;
+mod status;
+mod worker;
+
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crcl::{LengthUnit, Located};
+use ipc::{Arm, Clock};
+use nalgebra::Isometry3;
+use thiserror::Error;
+
+pub use note::{Blame, Note};
+pub use status::{Cycles, Status};
+
+use crate::dry_run::FailurePolicy;
+use crate::executor::{Control, ExecutorError};
+use crate::queue::Full;
+use crate::robot::{Robot, RobotError};
+use crate::with_dof;
+
+/// How a session runs.
+#[derive(Clone, Debug)]
+pub struct SessionConfig {
+    /// The arm, as its driver is named.
+    pub arm: Arm,
+    /// Setpoints a second, 100 to 4000.
+    pub rate_hz: f64,
+    /// By the clock, or in step with the driver.
+    pub clock: Clock,
+    /// Whether every setpoint and measured position is kept for [`Session::samples`].
+    pub record: bool,
+    /// What happens when a command cannot be executed.
+    pub on_refusal: FailurePolicy,
+    /// Unit of length before SetLengthUnits and after InitCanon.
+    pub default_length: LengthUnit,
+    /// How many commands may wait.
+    pub capacity: usize,
+    /// How long to look for a driver.
+    pub connect: Duration,
+}
+
+impl SessionConfig {
+    /// The usual choice for an arm: 1000 Hz by the clock, abort on refusal,
+    /// millimetres, 4096 commands.
+    #[must_use]
+    pub fn new(arm: Arm) -> Self {
+        Self {
+            arm,
+            rate_hz: 1000.0,
+            clock: Clock::Wall,
+            record: false,
+            on_refusal: FailurePolicy::default(),
+            default_length: LengthUnit::default(),
+            capacity: 4096,
+            connect: Duration::from_secs(5),
+        }
+    }
+}
+
+/// Why a session cannot start.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The robot's description.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// The executor, its driver or shared memory.
+    #[error(transparent)]
+    Executor(#[from] ExecutorError),
+    /// The operating system gave no thread.
+    #[error("cannot start the planner thread: {cause}")]
+    Thread {
+        /// What the operating system said.
+        cause: String,
+    },
+    /// The session has ended.
+    #[error("the session has ended")]
+    Closed,
+}
+
+/// One servo period of a recorded run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSample {
+    /// The servo period since the start of the session.
+    pub tick: u64,
+    /// Number of the command, from 1; 0 before the first.
+    pub command: u32,
+    /// Planned time since the command's start, s.
+    pub path_time: f64,
+    /// Joint positions published, rad or m.
+    pub q: Vec<f64>,
+    /// Joint velocities published.
+    pub dq: Vec<f64>,
+    /// Joint accelerations published.
+    pub ddq: Vec<f64>,
+    /// Joint positions measured.
+    pub measured: Vec<f64>,
+    /// Published pose of the controlled point in the workstation.
+    pub workstation_from_tool: Isometry3<f64>,
+    /// Measured pose of the controlled point in the workstation.
+    pub measured_pose: Isometry3<f64>,
+}
+
+/// What is asked of the worker.
+enum Order {
+    Submit(Vec<Located>, Sender<Result<Vec<u32>, Full>>),
+    Control(Control),
+    Recover,
+    Close,
+}
+
+/// What both sides see.
+#[derive(Debug, Default)]
+struct Shared {
+    status: Mutex<Status>,
+    samples: Mutex<Vec<RunSample>>,
+}
+
+/// A running session on one arm. Dropping it stops the arm on the path.
+#[derive(Debug)]
+pub struct Session {
+    orders: Sender<Order>,
+    notes: Receiver<Note>,
+    shared: Arc<Shared>,
+    worker: Option<JoinHandle<()>>,
+    /// What the operating system refused to the real-time thread, in one sentence.
+    pub warning: Option<String>,
+    /// The driver's name.
+    pub driver: String,
+    /// Joint positions at the start, rad or m.
+    pub start: Vec<f64>,
+}
+
+/// What the worker says once the executor runs.
+struct Begun {
+    warning: Option<String>,
+    driver: String,
+    start: Vec<f64>,
+}
+
+impl Session {
+    /// Finds the driver, agrees on a session and starts to take commands.
+    ///
+    /// # Errors
+    /// [`SessionError`]: the robot's description, no driver, a driver that
+    /// refuses, another engine on the same arm.
+    pub fn start(robot: &Robot, config: &SessionConfig) -> Result<Self, SessionError> {
+        let (orders, receiver) = mpsc::channel();
+        let (tell, notes) = mpsc::channel();
+        let (begin, begun) = mpsc::sync_channel(1);
+        let shared = Arc::new(Shared::default());
+        let (robot, config, seen) = (robot.clone(), config.clone(), Arc::clone(&shared));
+        let worker = std::thread::Builder::new()
+            .name("planner".to_owned())
+            .stack_size(16 << 20)
+            .spawn(move || {
+                let ends = worker::Ends { orders: receiver, notes: tell, shared: seen };
+                with_dof!(robot.dof(), N => worker::run::<N>(&robot, &config, ends, &begin));
+            })
+            .map_err(|cause| SessionError::Thread { cause: cause.to_string() })?;
+        let begun = begun.recv().unwrap_or(Err(SessionError::Closed))?;
+        let Begun { warning, driver, start } = begun;
+        Ok(Self { orders, notes, shared, worker: Some(worker), warning, driver, start })
+    }
+
+    /// Appends commands to the queue: all of them or none.
+    ///
+    /// # Errors
+    /// [`Full`], and the queue is as before.
+    pub fn submit(&self, commands: Vec<Located>) -> Result<Vec<u32>, Full> {
+        let (answer, answered) = mpsc::channel();
+        // A worker that has ended takes nothing more: its queue has no room.
+        let closed = Err(Full { capacity: 0 });
+        if self.orders.send(Order::Submit(commands, answer)).is_err() {
+            return closed;
+        }
+        answered.recv().unwrap_or(closed)
+    }
+
+    /// Asks for a pause, a stop, another speed; it does not wait in the queue.
+    pub fn control(&self, control: Control) {
+        // A session that has ended has nothing left to control.
+        let _ = self.orders.send(Order::Control(control));
+    }
+
+    /// Asks for a new agreement with the driver, which clears a latched fault.
+    pub fn recover(&self) {
+        let _ = self.orders.send(Order::Recover);
+    }
+
+    /// The next thing that happened; none within the time. [`Note::Closed`] is the last.
+    #[must_use]
+    pub fn note(&self, timeout: Duration) -> Option<Note> {
+        match self.notes.recv_timeout(timeout) {
+            Ok(note) => Some(note),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => Some(Note::Closed),
+        }
+    }
+
+    /// Where the session is.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        self.shared.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// What was recorded since the last call.
+    #[must_use]
+    pub fn samples(&self) -> Vec<RunSample> {
+        std::mem::take(&mut *self.shared.samples.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Stops the arm on the path, says goodbye to the driver and ends both threads.
+    pub fn close(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        let _ = self.orders.send(Order::Close);
+        if let Some(worker) = self.worker.take() {
+            // A worker that panicked has already said so.
+            let _ = worker.join();
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

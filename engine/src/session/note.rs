@@ -1,0 +1,91 @@
+//! What a session tells about the commands it was given.
+
+use serde::Serialize;
+
+use crate::command_error::CommandError;
+
+/// Who is to blame for a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Blame {
+    /// A limit of a joint, or the guard of the cycle.
+    Guard,
+    /// The driver, a tool, or the way to them.
+    Driver,
+}
+
+/// One thing that happened, in the order of the commands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Note {
+    /// A command that takes time has begun.
+    Started {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// Line of the program, from 1; 0 when there is none.
+        line: usize,
+        /// Name of the command.
+        name: &'static str,
+        /// Length that was planned, s.
+        planned_s: f64,
+        /// Servo period of the start.
+        tick: u64,
+    },
+    /// A command has been executed.
+    Done {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// Line of the program, from 1; 0 when there is none.
+        line: usize,
+        /// Name of the command.
+        name: &'static str,
+        /// Servo periods it took; 0 for a command that takes no time.
+        ticks: u64,
+    },
+    /// A command could not be executed and had no effect.
+    Refused {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// Line of the program, from 1; 0 when there is none.
+        line: usize,
+        /// Name of the command.
+        name: &'static str,
+        /// Why.
+        error: CommandError,
+        /// How many commands behind it were dropped.
+        dropped: usize,
+    },
+    /// A text for the operator.
+    Message {
+        /// The text.
+        text: String,
+    },
+    /// The program said that it is over.
+    Ended {
+        /// Its reason: 0 is success.
+        reason: i64,
+    },
+    /// The arm rests on the path after a pause or a stop.
+    Stopped,
+    /// The arm rests and all commands are dropped.
+    Aborted {
+        /// How many commands were dropped.
+        dropped: usize,
+    },
+    /// Something went wrong; the arm is stopped until the operator recovers.
+    Faulted {
+        /// Who is to blame.
+        blame: Blame,
+        /// What went wrong: joint, value, limit.
+        reason: String,
+        /// Servo period in which it was seen.
+        tick: u64,
+        /// How many commands were dropped.
+        dropped: usize,
+    },
+    /// The fault is cleared; the arm is ready for InitCanon.
+    Recovered,
+    /// The session is over; nothing follows.
+    Closed,
+}

@@ -1,0 +1,84 @@
+//! Where a session is, for operators.
+
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use crate::executor::Counters;
+use crate::modal::{CanonState, Settings};
+
+/// A picture of a running session.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Status {
+    /// `<cell>/<arm>`.
+    pub arm: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Name of the driver.
+    pub driver: String,
+    /// `unready`, `ready` or `ended`.
+    pub state: &'static str,
+    /// Name of the command under way, if any.
+    pub command: Option<&'static str>,
+    /// Commands that wait.
+    pub queued: usize,
+    /// Whether nothing is left to do.
+    pub idle: bool,
+    /// Whether a pause or a stop holds the arm.
+    pub held: bool,
+    /// The latched fault, if any.
+    pub fault: Option<String>,
+    /// Share of the planned speed, now.
+    pub path_rate: f64,
+    /// Measured joint positions, rad or m.
+    pub joints: Vec<f64>,
+    /// Joint positions of the last setpoint, rad or m.
+    pub setpoint: Vec<f64>,
+    /// Measured position of the controlled point in the workstation, m.
+    pub position_m: [f64; 3],
+    /// Its orientation: w, x, y, z.
+    pub orientation_wxyz: [f64; 4],
+    /// Settings in force, SI.
+    pub settings: Option<Settings>,
+    /// Servo periods.
+    pub cycles: Cycles,
+}
+
+/// Counts of servo periods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cycles {
+    /// Periods in all: published and skipped.
+    pub ticks: u64,
+    /// Setpoints published.
+    pub published: u64,
+    /// Periods that came too late and were left out.
+    pub skipped: u64,
+    /// Setpoints that the driver missed, by its own count.
+    pub driver_missed: u64,
+}
+
+impl From<Counters> for Cycles {
+    fn from(counters: Counters) -> Self {
+        Self {
+            ticks: counters.ticks,
+            published: counters.published,
+            skipped: counters.skipped,
+            driver_missed: counters.driver_missed,
+        }
+    }
+}
+
+impl Status {
+    pub(super) fn set_pose(&mut self, pose: &Isometry3<f64>) {
+        self.position_m = pose.translation.vector.into();
+        let q = pose.rotation;
+        self.orientation_wxyz = [q.w, q.i, q.j, q.k];
+    }
+}
+
+pub(super) fn state_name(state: CanonState) -> &'static str {
+    match state {
+        CanonState::Unready => "unready",
+        CanonState::Ready => "ready",
+        CanonState::Ended => "ended",
+    }
+}

@@ -1,0 +1,433 @@
+//! The worker: takes commands, plans ahead, feeds the executor, reports in order.
+
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
+use std::sync::{Arc, PoisonError};
+use std::time::Duration;
+
+use kinematics::Chain;
+use nalgebra::SVector;
+use realtime::{Piece, Segment};
+
+use super::note::{Blame, Note};
+use super::status::state_name;
+use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared};
+use crate::controller::{Controller, Step};
+use crate::dry_run::FailurePolicy;
+use crate::executor::{
+    Control, Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, ToolOrder,
+};
+use crate::queue::{Full, Queue};
+use crate::robot::Robot;
+use crate::task::{Task, ToolAction};
+
+/// How many commands are planned ahead of the one that moves.
+const AHEAD: usize = 8;
+/// How long a tool may take beyond its nominal time, s.
+const TOOL_PATIENCE: f64 = 5.0;
+
+/// The worker's ends of the channels.
+pub(super) struct Ends {
+    pub orders: Receiver<Order>,
+    pub notes: Sender<Note>,
+    pub shared: Arc<Shared>,
+}
+
+/// What still has to go through the ring.
+enum Work<const N: usize> {
+    Motion(Segment<N>),
+    Tool(ToolOrder),
+}
+
+/// A command that left the queue and is not yet reported.
+struct InFlight<const N: usize> {
+    id: u32,
+    line: usize,
+    name: &'static str,
+    planned_s: f64,
+    chain: Chain<N>,
+    started: Option<u64>,
+    finished: Option<u64>,
+    /// What is reported beside `Done` when its turn comes.
+    says: Option<Note>,
+    /// A refused command is reported as such and not as done.
+    refused: bool,
+}
+
+struct Worker<'a, const N: usize> {
+    config: &'a SessionConfig,
+    controller: Controller<N>,
+    queue: Queue,
+    feeder: Feeder<N>,
+    monitor: Monitor<N>,
+    remote: Remote<N>,
+    work: VecDeque<Work<N>>,
+    flight: VecDeque<InFlight<N>>,
+    /// Tool in force for recorded samples.
+    chain: Chain<N>,
+    held: bool,
+    fault: Option<String>,
+    closing: bool,
+    ends: Ends,
+}
+
+/// Runs a session until it is closed.
+pub(super) fn run<const N: usize>(
+    robot: &Robot,
+    config: &SessionConfig,
+    ends: Ends,
+    begin: &SyncSender<Result<Begun, SessionError>>,
+) {
+    let (executor, mut worker) = match start::<N>(robot, config, ends) {
+        Ok(started) => started,
+        Err(error) => {
+            // The caller waits for exactly this answer.
+            let _ = begin.send(Err(error));
+            return;
+        }
+    };
+    let begun = Begun {
+        warning: executor.warning.clone(),
+        driver: executor.driver.clone(),
+        start: worker.controller.joints().as_slice().to_vec(),
+    };
+    worker.write_status(robot, &executor.driver);
+    let _ = begin.send(Ok(begun));
+    while !worker.closing {
+        worker.turn();
+        worker.write_status(robot, &executor.driver);
+    }
+    executor.shutdown();
+    worker.read_reports();
+    worker.say(Note::Closed);
+}
+
+fn start<'a, const N: usize>(
+    robot: &Robot,
+    config: &'a SessionConfig,
+    ends: Ends,
+) -> Result<(Executor<N>, Worker<'a, N>), SessionError> {
+    let mut controller = Controller::<N>::new(robot, config.rate_hz, config.default_length)?;
+    let limits = controller.limits();
+    let limits = realtime::Limits {
+        lower: limits.lower,
+        upper: limits.upper,
+        velocity: limits.velocity,
+        acceleration: limits.acceleration,
+        jerk: limits.jerk,
+    };
+    let mut wanted = ExecutorConfig::new(config.arm.clone(), limits);
+    wanted.rate_hz = config.rate_hz;
+    wanted.clock = config.clock;
+    wanted.record = config.record;
+    wanted.connect = config.connect;
+    wanted.model = ipc::model_hash(robot.urdf.as_bytes());
+    let (executor, feeder, monitor) = Executor::start(wanted)?;
+    let remote = executor.remote();
+    controller.set_joints(remote.measured().setpoint);
+    let worker = Worker {
+        config,
+        queue: Queue::new(config.capacity),
+        chain: controller.chain().clone(),
+        controller,
+        feeder,
+        monitor,
+        remote,
+        work: VecDeque::new(),
+        flight: VecDeque::new(),
+        held: false,
+        fault: None,
+        closing: false,
+        ends,
+    };
+    Ok((executor, worker))
+}
+
+impl<const N: usize> Worker<'_, N> {
+    /// One turn: orders, reports, then the next command and what fits into the ring.
+    fn turn(&mut self) {
+        self.read_orders();
+        self.read_reports();
+        self.report_done();
+        if self.flight.len() < AHEAD && self.work.is_empty() && !self.held && self.fault.is_none()
+        {
+            self.take_next();
+        }
+        self.feed();
+    }
+
+    fn read_orders(&mut self) {
+        let busy = !self.work.is_empty() || (!self.queue.is_empty() && self.flight.len() < AHEAD);
+        let wait = Duration::from_micros(if busy { 50 } else { 500 });
+        let mut order = match self.ends.orders.recv_timeout(wait) {
+            Ok(order) => Some(order),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => Some(Order::Close),
+        };
+        while let Some(given) = order {
+            self.obey(given);
+            order = self.ends.orders.try_recv().ok();
+        }
+    }
+
+    fn obey(&mut self, order: Order) {
+        match order {
+            Order::Submit(commands, answer) => {
+                let result = self.submit(commands);
+                // The client may have gone; its commands stay.
+                let _ = answer.send(result);
+            }
+            Order::Control(control) => self.control(control),
+            Order::Recover => self.remote.recover(),
+            Order::Close => self.closing = true,
+        }
+    }
+
+    fn submit(&mut self, commands: Vec<crcl::Located>) -> Result<Vec<u32>, Full> {
+        if self.queue.len() + commands.len() > self.config.capacity {
+            return Err(Full { capacity: self.config.capacity });
+        }
+        let mut ids = Vec::with_capacity(commands.len());
+        for located in commands {
+            if let crcl::Command::StopMotion { emergency } = located.command
+                && !self.flight.is_empty()
+            {
+                // A stop does not wait behind what it is to stop.
+                self.control(Control::Stop { fast: emergency != 0 });
+            }
+            ids.push(self.queue.push(located)?);
+        }
+        Ok(ids)
+    }
+
+    fn control(&mut self, control: Control) {
+        if control == Control::Resume {
+            self.held = false;
+        }
+        self.remote.control(control);
+    }
+
+    /// Takes the next command off the queue and turns it into work.
+    fn take_next(&mut self) {
+        let Some(queued) = self.queue.pop() else { return };
+        let command = &queued.located.command;
+        let mut flight = InFlight {
+            id: queued.id,
+            line: queued.located.line,
+            name: command.name(),
+            planned_s: 0.0,
+            chain: self.controller.chain().clone(),
+            started: None,
+            finished: None,
+            says: None,
+            refused: false,
+        };
+        match self.controller.step(command) {
+            Ok(step) => {
+                flight.planned_s = step.ticks as f64 / self.config.rate_hz;
+                self.enlist(&mut flight, step);
+            }
+            Err(error) => {
+                let dropped = match self.config.on_refusal {
+                    FailurePolicy::Abort => {
+                        self.controller.abort();
+                        self.queue.flush()
+                    }
+                    FailurePolicy::Hold => {
+                        self.held = true;
+                        0
+                    }
+                    FailurePolicy::Skip => 0,
+                };
+                let (id, line, name) = (flight.id, flight.line, flight.name);
+                flight.says = Some(Note::Refused { id, line, name, error, dropped });
+                flight.refused = true;
+                flight.finished = Some(0);
+            }
+        }
+        self.flight.push_back(flight);
+    }
+
+    /// The work of one step; a command without work is finished at once.
+    fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>) {
+        let command = flight.id;
+        match step.task {
+            Task::Message { text } => flight.says = Some(Note::Message { text }),
+            Task::End { reason } => flight.says = Some(Note::Ended { reason }),
+            Task::Dwell { .. } if step.ticks > 0 => {
+                let piece = Piece::hold(*self.controller.joints(), flight.planned_s);
+                self.work.push_back(Work::Motion(Segment { piece, command, last: true }));
+                return;
+            }
+            Task::Tool(action) => {
+                let order = tool_order(command, action, flight.planned_s);
+                self.work.push_back(Work::Tool(order));
+                return;
+            }
+            _ => {}
+        }
+        let pieces = step.planned.as_ref().map_or(&[][..], |planned| planned.trajectory.pieces());
+        for (index, piece) in pieces.iter().enumerate() {
+            let last = index + 1 == pieces.len();
+            self.work.push_back(Work::Motion(Segment { piece: *piece, command, last }));
+        }
+        if pieces.is_empty() {
+            flight.finished = Some(0);
+        }
+    }
+
+    fn feed(&mut self) {
+        while let Some(work) = self.work.front() {
+            let taken = match work {
+                Work::Motion(segment) => self.feeder.push(*segment),
+                Work::Tool(order) => self.feeder.tool(*order),
+            };
+            if taken.is_err() {
+                return;
+            }
+            self.work.pop_front();
+        }
+    }
+
+    fn read_reports(&mut self) {
+        while let Some(sample) = self.monitor.sample() {
+            self.record(&sample);
+        }
+        while let Some(event) = self.monitor.event() {
+            self.on_event(event);
+        }
+    }
+
+    fn on_event(&mut self, event: Event) {
+        match event {
+            Event::Started { command, tick } => {
+                let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) else { return };
+                flight.started = Some(tick);
+                let (id, line, name) = (flight.id, flight.line, flight.name);
+                let planned_s = flight.planned_s;
+                // What came before has ended, and is reported before.
+                self.report_done();
+                self.say(Note::Started { id, line, name, planned_s, tick });
+            }
+            Event::Finished { command, tick } => {
+                if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
+                    flight.finished = Some(tick);
+                }
+                self.report_done();
+            }
+            Event::Stopped { .. } => self.say(Note::Stopped),
+            Event::Aborted { .. } => {
+                let dropped = self.drop_all();
+                self.say(Note::Aborted { dropped });
+            }
+            Event::Faulted { fault, tick } => {
+                let (blame, reason) = (blame(&fault), fault.to_string());
+                let dropped = self.drop_all();
+                self.fault = Some(reason.clone());
+                self.say(Note::Faulted { blame, reason, tick, dropped });
+            }
+            Event::Recovered { .. } => {
+                let dropped = self.drop_all();
+                self.fault = None;
+                tracing::debug!(dropped, "recovered");
+                self.say(Note::Recovered);
+            }
+            Event::Ended { .. } => self.closing = true,
+        }
+    }
+
+    /// Forgets all that is planned or queued and begins again from where the arm is.
+    fn drop_all(&mut self) -> usize {
+        let dropped = self.queue.flush() + self.flight.len();
+        self.work.clear();
+        self.flight.clear();
+        self.feeder.renew();
+        self.held = false;
+        self.controller.abort();
+        self.controller.set_joints(self.remote.measured().setpoint);
+        dropped
+    }
+
+    /// Reports, in order, every command that has ended.
+    fn report_done(&mut self) {
+        while self.flight.front().is_some_and(|flight| flight.finished.is_some()) {
+            let Some(flight) = self.flight.pop_front() else { return };
+            if let Some(note) = flight.says {
+                self.say(note);
+            }
+            self.chain = flight.chain;
+            if flight.refused {
+                continue;
+            }
+            let ticks = match (flight.started, flight.finished) {
+                (Some(from), Some(to)) => to.saturating_sub(from),
+                _ => 0,
+            };
+            let (id, line, name) = (flight.id, flight.line, flight.name);
+            self.say(Note::Done { id, line, name, ticks });
+        }
+    }
+
+    fn record(&self, sample: &Recorded<N>) {
+        let flight = self.flight.iter().find(|flight| flight.id == sample.command);
+        let chain = flight.map_or(&self.chain, |flight| &flight.chain);
+        let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
+        let measured = SVector::from(sample.measured);
+        let recorded = RunSample {
+            tick: sample.tick,
+            command: sample.command,
+            path_time: sample.path_time,
+            q: list(&sample.setpoint.position),
+            dq: list(&sample.setpoint.velocity),
+            ddq: list(&sample.setpoint.acceleration),
+            measured: sample.measured.to_vec(),
+            workstation_from_tool: chain.forward(&sample.setpoint.position),
+            measured_pose: chain.forward(&measured),
+        };
+        let samples = &self.ends.shared.samples;
+        samples.lock().unwrap_or_else(PoisonError::into_inner).push(recorded);
+    }
+
+    fn write_status(&self, robot: &Robot, driver: &str) {
+        let now = self.remote.measured();
+        let mut status =
+            self.ends.shared.status.lock().unwrap_or_else(PoisonError::into_inner);
+        self.config.arm.to_string().clone_into(&mut status.arm);
+        robot.name.clone_into(&mut status.robot);
+        driver.clone_into(&mut status.driver);
+        status.state = state_name(self.controller.modal().state());
+        status.command = self.flight.front().map(|flight| flight.name);
+        status.queued = self.queue.len() + self.flight.len().saturating_sub(1);
+        status.idle = now.idle && self.flight.is_empty() && self.queue.is_empty();
+        status.held = now.held || self.held;
+        status.fault.clone_from(&self.fault);
+        status.path_rate = now.path_rate;
+        status.joints = now.position.as_slice().to_vec();
+        status.setpoint = now.setpoint.as_slice().to_vec();
+        status.set_pose(&self.controller.chain().forward(&now.position));
+        status.settings = Some(self.controller.modal().settings().clone());
+        status.cycles = self.remote.counters().into();
+    }
+
+    fn say(&self, note: Note) {
+        // Nobody has to listen.
+        let _ = self.ends.notes.send(note);
+    }
+}
+
+fn tool_order(command: u32, action: ToolAction, nominal: f64) -> ToolOrder {
+    let (tool, action) = match action {
+        ToolAction::OpenGripper => (ipc::GRIPPER, ipc::ToolAction::Open),
+        ToolAction::CloseGripper => (ipc::GRIPPER, ipc::ToolAction::Close),
+        ToolAction::OpenToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Open),
+        ToolAction::CloseToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Close),
+    };
+    ToolOrder { command, tool, action, timeout: nominal + TOOL_PATIENCE }
+}
+
+fn blame(fault: &Fault) -> Blame {
+    match fault {
+        Fault::Limit(_) | Fault::BrokenSegment | Fault::Stalled { .. } => Blame::Guard,
+        _ => Blame::Driver,
+    }
+}

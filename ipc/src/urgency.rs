@@ -1,0 +1,123 @@
+//! What a thread with deadlines asks of the operating system.
+
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+
+/// What a thread with deadlines asks for. All of it is optional: what is refused is reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Urgency {
+    /// `SCHED_FIFO` priority, 1 to 98; 0 does not ask.
+    pub priority: i32,
+    /// The processor to stay on.
+    pub processor: Option<usize>,
+    /// Keep all memory of the process in RAM.
+    pub lock_memory: bool,
+    /// Keep the processors awake while the guard lives.
+    pub low_latency: bool,
+}
+
+impl Default for Urgency {
+    fn default() -> Self {
+        Self {
+            priority: 60,
+            processor: None,
+            lock_memory: true,
+            low_latency: true,
+        }
+    }
+}
+
+/// What was granted. The processors stay awake as long as this lives.
+#[derive(Debug, Default)]
+pub struct Granted {
+    /// What was refused, each with the remedy.
+    pub refused: Vec<String>,
+    _latency: Option<File>,
+}
+
+impl Granted {
+    /// One warning for a person, or nothing if all was granted.
+    pub fn warning(&self) -> Option<String> {
+        (!self.refused.is_empty())
+            .then(|| format!("deadlines are not guaranteed: {}", self.refused.join("; ")))
+    }
+}
+
+/// Asks for the calling thread.
+pub fn urge(wish: Urgency) -> Granted {
+    let mut granted = Granted::default();
+    if wish.lock_memory && !lock_memory() {
+        granted
+            .refused
+            .push("memory is not locked (raise `ulimit -l`)".to_owned());
+    }
+    if wish.priority > 0 && !set_priority(wish.priority) {
+        granted.refused.push(
+            "no SCHED_FIFO (set rtprio in /etc/security/limits.d or grant CAP_SYS_NICE)".to_owned(),
+        );
+    }
+    if let Some(processor) = wish.processor
+        && !set_processor(processor)
+    {
+        granted
+            .refused
+            .push(format!("cannot stay on processor {processor}"));
+    }
+    if wish.low_latency {
+        granted._latency = hold_latency();
+        if granted._latency.is_none() {
+            granted
+                .refused
+                .push("processors may sleep (allow writing /dev/cpu_dma_latency)".to_owned());
+        }
+    }
+    granted
+}
+
+/// Locks all memory, now and later; not where a limit would make later requests for memory fail.
+#[expect(unsafe_code, reason = "no safe interface in the standard library")]
+fn lock_memory() -> bool {
+    const ENOUGH: libc::rlim_t = 1 << 30;
+    let mut limit = libc::rlimit {
+        rlim_cur: 0,
+        rlim_max: 0,
+    };
+    // SAFETY: the pointer is to a live limit; the other calls take numbers only.
+    unsafe {
+        let known = libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) == 0;
+        let roomy = known && limit.rlim_cur >= ENOUGH;
+        (roomy || libc::geteuid() == 0) && libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0
+    }
+}
+
+#[expect(unsafe_code, reason = "no safe interface in the standard library")]
+fn set_priority(priority: i32) -> bool {
+    let wish = libc::sched_param {
+        sched_priority: priority,
+    };
+    // SAFETY: the pointer is to a live parameter; 0 is the calling thread.
+    unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const wish) == 0 }
+}
+
+#[expect(unsafe_code, reason = "no safe interface in the standard library")]
+fn set_processor(processor: usize) -> bool {
+    if processor >= libc::CPU_SETSIZE as usize {
+        return false;
+    }
+    // SAFETY: all zeros is an empty set; the index is within it; 0 is the calling thread.
+    unsafe {
+        let mut set: libc::cpu_set_t = core::mem::zeroed();
+        libc::CPU_SET(processor, &mut set);
+        libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set) == 0
+    }
+}
+
+/// A wish for no latency holds as long as the file is open.
+fn hold_latency() -> Option<File> {
+    let mut file = OpenOptions::new()
+        .write(true)
+        .open("/dev/cpu_dma_latency")
+        .ok()?;
+    file.write_all(&0_i32.to_ne_bytes()).ok()?;
+    Some(file)
+}

@@ -1,0 +1,106 @@
+//! One continuous joint path for a whole path of the tool.
+//!
+//! The joints start where the arm stands and follow by continuity, so the path
+//! stays on one branch; at each point the three derivatives of the joints to the
+//! path parameter are exact solutions of the differentiated kinematics. Between
+//! two points the polynomial of degree seven through both keeps the tool within
+//! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
+//! as near a singular pose, where joints turn fast over a short way.
+
+mod differential;
+mod error;
+mod linear;
+mod redundancy;
+mod trace;
+
+pub use error::{FollowCause, FollowError};
+
+use crate::ik::Solver;
+use nalgebra::{Isometry3, SVector, Vector3};
+
+/// The tool at one path parameter `u`, in the frame of the chain's poses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwistPoint {
+    /// Pose of the tool.
+    pub pose: Isometry3<f64>,
+    /// First to third derivative of its position, m/u, m/u2, m/u3.
+    pub linear: [Vector3<f64>; 3],
+    /// Its angular velocity and the first two derivatives of that, rad/u, rad/u2, rad/u3.
+    pub angular: [Vector3<f64>; 3],
+}
+
+/// The joints at one path parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowPoint<const N: usize> {
+    /// Path parameter.
+    pub u: f64,
+    /// Joint positions (rad, m) and their first three derivatives to `u`.
+    pub q: [SVector<f64, N>; 4],
+    /// Smallest singular value of the Jacobian (lengths in units of 0.3 m): zero
+    /// where the arm is singular.
+    pub smallest: f64,
+}
+
+/// How closely to follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowOptions {
+    /// Largest distance (m, and rad times 0.3 m) of the tool from its path between two points.
+    pub accuracy: f64,
+    /// Most points, those that are added included.
+    pub most_points: usize,
+}
+
+impl Default for FollowOptions {
+    fn default() -> Self {
+        Self {
+            accuracy: 1e-7,
+            most_points: 50_000,
+        }
+    }
+}
+
+/// Joint path of a tool path.
+///
+/// `tool` is the path of the tool, `grid` the rising parameters at which points are
+/// wanted (first and last are the ends; knots of the path belong in it), `start`
+/// where the arm stands: `tool(grid[0])` must be its pose there. Returned are the
+/// grid's points and those added between.
+///
+/// Arms with more than six joints choose their spare motion over the whole path:
+/// still if that keeps them well inside their limits, else along the smooth course
+/// that stays farthest from limits and singular poses.
+///
+/// # Errors
+/// [`FollowError`]: where, which joint, why, and by how much.
+pub fn follow<const N: usize>(
+    solver: &Solver<N>,
+    tool: &dyn Fn(f64) -> TwistPoint,
+    grid: &[f64],
+    start: &SVector<f64, N>,
+    options: &FollowOptions,
+) -> Result<Vec<FollowPoint<N>>, FollowError> {
+    let ascends = grid.len() >= 2
+        && grid.iter().all(|u| u.is_finite())
+        && grid.windows(2).all(|pair| pair[0] < pair[1]);
+    if !ascends {
+        let u = grid.first().copied().unwrap_or(0.0);
+        return Err(FollowError {
+            u,
+            joint: None,
+            cause: FollowCause::BadGrid,
+            amount: grid.len() as f64,
+        });
+    }
+    let task = trace::Task {
+        solver,
+        tool,
+        grid,
+        options,
+    };
+    task.check_start(start)?;
+    if N > 6 {
+        redundancy::resolve(&task, start)
+    } else {
+        task.trace(start, &redundancy::Spare::none())
+    }
+}

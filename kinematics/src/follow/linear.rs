@@ -1,0 +1,126 @@
+//! Small linear systems on the stack: task rows times joint motion equals a task motion.
+
+/// Rows of a task: six of the tool, then one for each spare joint.
+pub(super) type Rows = [[f64; 8]; 8];
+
+/// Smallest pivot, as a fraction of the largest, for which elimination is trusted.
+const SMALLEST_PIVOT: f64 = 1e-7;
+/// Weight of the prior against the rows where elimination is not trusted.
+const PRIOR: f64 = 1e-12;
+
+/// Solves `rows * x = b` for `N` unknowns.
+///
+/// Where the rows do not settle `x` (singular, or fewer joints than six), the
+/// least-squares solution nearest to `prior`.
+pub(super) fn solve<const N: usize>(rows: &Rows, b: &[f64; 8], prior: &[f64; 8]) -> [f64; 8] {
+    if N >= 6
+        && let Some(x) = eliminate::<N>(rows, b)
+    {
+        return x;
+    }
+    let count = N.max(6);
+    let mut x = *prior;
+    // The second pass takes out what the first left by rounding.
+    for _ in 0..2 {
+        let mut rest = *b;
+        for (r, row) in rows.iter().enumerate().take(count) {
+            for j in 0..N {
+                rest[r] -= row[j] * x[j];
+            }
+        }
+        let y = normal::<N>(rows, &rest, count);
+        for j in 0..N {
+            x[j] += y[j];
+        }
+    }
+    x
+}
+
+/// Gaussian elimination with row exchange; `None` where a pivot is too small.
+fn eliminate<const N: usize>(rows: &Rows, b: &[f64; 8]) -> Option<[f64; 8]> {
+    let (mut m, mut b) = (*rows, *b);
+    let mut largest = 0.0_f64;
+    for k in 0..N {
+        let pivot = (k..N).max_by(|i, j| m[*i][k].abs().total_cmp(&m[*j][k].abs()))?;
+        m.swap(k, pivot);
+        b.swap(k, pivot);
+        let size = m[k][k].abs();
+        largest = largest.max(size);
+        if size.is_nan() || size <= SMALLEST_PIVOT * largest {
+            return None;
+        }
+        for i in k + 1..N {
+            let factor = m[i][k] / m[k][k];
+            for j in k..N {
+                m[i][j] -= factor * m[k][j];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    let mut x = [0.0; 8];
+    for k in (0..N).rev() {
+        let sum = (k + 1..N).fold(b[k], |sum, j| sum - m[k][j] * x[j]);
+        x[k] = sum / m[k][k];
+    }
+    Some(x)
+}
+
+/// `(A^T A + PRIOR) y = A^T b`.
+fn normal<const N: usize>(rows: &Rows, b: &[f64; 8], count: usize) -> [f64; 8] {
+    let mut m: Rows = [[0.0; 8]; 8];
+    let mut c = [0.0; 8];
+    for (row, value) in rows.iter().zip(b).take(count) {
+        for i in 0..N {
+            for j in 0..N {
+                m[i][j] += row[i] * row[j];
+            }
+            c[i] += row[i] * value;
+        }
+    }
+    for i in 0..N {
+        m[i][i] += PRIOR;
+    }
+    let mut x = [0.0; 8];
+    for k in 0..N {
+        for i in k + 1..N {
+            let factor = m[i][k] / m[k][k];
+            for j in k..N {
+                m[i][j] -= factor * m[k][j];
+            }
+            c[i] -= factor * c[k];
+        }
+    }
+    for k in (0..N).rev() {
+        let sum = (k + 1..N).fold(c[k], |sum, j| sum - m[k][j] * x[j]);
+        x[k] = sum / m[k][k];
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A regular system is solved; a singular one gives the solution nearest to the prior.
+    #[test]
+    fn solves_regular_and_singular_systems() {
+        let mut rows: Rows = [[0.0; 8]; 8];
+        for i in 0..6 {
+            rows[i][i] = 2.0;
+        }
+        rows[0][5] = 1.0;
+        let x = solve::<6>(&rows, &[3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0], &[0.0; 8]);
+        assert!(x[..6].iter().all(|value| (value - 1.0).abs() < 1e-15));
+        // Columns 4 and 5 alike: only their sum is settled.
+        let mut rows: Rows = [[0.0; 8]; 8];
+        for i in 0..5 {
+            rows[i][i] = 1.0;
+        }
+        rows[4][5] = 1.0;
+        let x = solve::<6>(&rows, &[1.0; 8], &[0.0, 0.0, 0.0, 0.0, 3.0, -1.0, 0.0, 0.0]);
+        assert!(
+            (x[4] - 2.5).abs() < 1e-9 && (x[5] + 1.5).abs() < 1e-9,
+            "{x:?}"
+        );
+    }
+}

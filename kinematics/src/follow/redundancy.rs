@@ -1,0 +1,125 @@
+//! The spare motion of arms with more than six joints.
+//!
+//! The spare motion is fixed by linear functions of the joints, `c . q = r(u)`, where
+//! `c` is the direction in which the arm can move at the start without moving its
+//! tool, and `r` a polynomial of `u`. Thus it has exact derivatives, and nothing drifts.
+
+use super::FollowPoint;
+use super::error::FollowError;
+use super::trace::Task;
+use nalgebra::{SMatrix, SVector};
+
+/// Coefficients of a course `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
+pub(super) type Course = [f64; 6];
+
+/// Spare motion: up to two linear functions of the joints with their courses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spare<const N: usize> {
+    directions: [SVector<f64, N>; 2],
+    courses: [Course; 2],
+    from: f64,
+    span: f64,
+    u: f64,
+}
+
+impl<const N: usize> Spare<N> {
+    /// For arms of up to six joints, which have none.
+    pub(super) fn none() -> Self {
+        Self {
+            directions: [SVector::zeros(); 2],
+            courses: [[0.0; 6]; 2],
+            from: 0.0,
+            span: 1.0,
+            u: 0.0,
+        }
+    }
+
+    /// The direction of a linear function.
+    pub(super) fn direction(&self, k: usize) -> &SVector<f64, N> {
+        &self.directions[k]
+    }
+
+    /// The same, with derivatives taken at `u`.
+    pub(super) fn moved_to(mut self, u: f64) -> Self {
+        self.u = u;
+        self
+    }
+
+    /// Value of each course at `u`.
+    pub(super) fn at(&self, u: f64) -> [f64; 2] {
+        let x = (u - self.from) / self.span;
+        self.courses
+            .map(|course| course.iter().rev().fold(0.0, |sum, c| sum * x + c))
+    }
+
+    /// First to third derivative of each course to `u`.
+    pub(super) fn rates(&self) -> [[f64; 3]; 2] {
+        let x = (self.u - self.from) / self.span;
+        self.courses.map(|course| {
+            let mut c = course;
+            std::array::from_fn(|_| {
+                for k in 0..5 {
+                    c[k] = c[k + 1] * (k as f64 + 1.0) / self.span;
+                }
+                c[5] = 0.0;
+                c.iter().rev().fold(0.0, |sum, c| sum * x + c)
+            })
+        })
+    }
+}
+
+/// Follows with the spare motion standing still.
+pub(super) fn resolve<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+) -> Result<Vec<FollowPoint<N>>, FollowError> {
+    let (_, jacobian) = task.solver.chain().jacobian(start);
+    let directions = null_space(&jacobian);
+    let (from, to) = (task.grid[0], task.grid[task.grid.len() - 1]);
+    let courses = directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let still = Spare {
+        directions,
+        courses,
+        from,
+        span: to - from,
+        u: from,
+    };
+    task.trace(start, &still)
+}
+
+/// Directions in which the joints can move without moving the tool: `N - 6` of them,
+/// at right angles to each other and to the rows of the Jacobian.
+fn null_space<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [SVector<f64, N>; 2] {
+    let mut basis: Vec<SVector<f64, N>> = Vec::new();
+    let mut reduce = |mut v: SVector<f64, N>, keep: bool| {
+        // Twice, so that rounding of the first pass is taken out by the second.
+        for _ in 0..2 {
+            for b in &basis {
+                v -= b * b.dot(&v);
+            }
+        }
+        let length = v.norm();
+        if keep && length > 1e-9 {
+            basis.push(v / length);
+        }
+        (v, length)
+    };
+    for i in 0..6 {
+        reduce(jacobian.row(i).transpose(), true);
+    }
+    std::array::from_fn(|k| {
+        if k + 6 >= N {
+            return SVector::zeros();
+        }
+        let unit = |i: usize| SVector::from_fn(|row, _| if row == i { 1.0 } else { 0.0 });
+        let longest = (0..N)
+            .max_by(|a, b| {
+                reduce(unit(*a), false)
+                    .1
+                    .total_cmp(&reduce(unit(*b), false).1)
+            })
+            .unwrap_or(0);
+        let (v, length) = reduce(unit(longest), true);
+        v / length.max(1e-300)
+    })
+}

@@ -1,0 +1,266 @@
+//! Following by continuity, point after point.
+
+use super::differential::{derivatives, task_rows};
+use super::error::{FollowCause, FollowError};
+use super::redundancy::Spare;
+use super::{FollowOptions, FollowPoint, TwistPoint, linear};
+use crate::ik::{Goal, LENGTH, Solver};
+use crate::measure;
+use nalgebra::{Isometry3, SMatrix, SVector};
+
+/// A path to follow.
+pub(super) struct Task<'a, const N: usize> {
+    pub(super) solver: &'a Solver<N>,
+    pub(super) tool: &'a dyn Fn(f64) -> TwistPoint,
+    pub(super) grid: &'a [f64],
+    pub(super) options: &'a FollowOptions,
+}
+
+/// Distance that counts as being at the start of the path, m (rad times [`LENGTH`]).
+const START: f64 = 1e-6;
+/// Distance at which a point counts as exactly reached.
+const EXACT: f64 = 1e-12;
+/// Distance that is good enough where rounding allows no better.
+const ENOUGH: f64 = 1e-10;
+/// Largest difference from the predicted joint positions, rad: more is another branch.
+const SURPRISE: f64 = 0.1;
+/// Shortest step as a fraction of the whole path.
+const SHORTEST: f64 = 1e-9;
+/// Rounding that a limit forgives.
+const SLACK: f64 = 1e-9;
+
+/// The worst that a joint passes its limit along a path.
+struct Overrun {
+    u: f64,
+    joint: usize,
+    amount: f64,
+}
+
+impl<const N: usize> Task<'_, N> {
+    /// Whether the arm stands at the start of the path.
+    pub(super) fn check_start(&self, start: &SVector<f64, N>) -> Result<(), FollowError> {
+        let u = self.grid[0];
+        let error = distance(&self.solver.chain().forward(start), &(self.tool)(u).pose);
+        if error <= START {
+            return Ok(());
+        }
+        Err(FollowError {
+            u,
+            joint: None,
+            cause: FollowCause::Start,
+            amount: error,
+        })
+    }
+
+    /// The joint path from `start`, with the spare motion given.
+    pub(super) fn trace(
+        &self,
+        start: &SVector<f64, N>,
+        spare: &Spare<N>,
+    ) -> Result<Vec<FollowPoint<N>>, FollowError> {
+        let first = self.first(start, spare);
+        let mut points = vec![first];
+        let mut overrun = self.overrun(first.u, start);
+        let mut last = first;
+        for &goal in &self.grid[1..] {
+            while last.u < goal {
+                if points.len() >= self.options.most_points {
+                    let amount = points.len() as f64;
+                    let cause = FollowCause::TooManyPoints;
+                    return Err(FollowError {
+                        u: last.u,
+                        joint: None,
+                        cause,
+                        amount,
+                    });
+                }
+                last = self.advance(&last, goal, spare)?;
+                points.push(last);
+                let next = self.overrun(last.u, &last.q[0]);
+                if next.amount > overrun.amount {
+                    overrun = next;
+                }
+            }
+        }
+        if overrun.amount > SLACK {
+            let Overrun { u, joint, amount } = overrun;
+            return Err(FollowError {
+                u,
+                joint: Some(joint),
+                cause: FollowCause::Limit,
+                amount,
+            });
+        }
+        Ok(points)
+    }
+
+    fn first(&self, start: &SVector<f64, N>, spare: &Spare<N>) -> FollowPoint<N> {
+        let u = self.grid[0];
+        let still = FollowPoint {
+            u,
+            q: [*start, SVector::zeros(), SVector::zeros(), SVector::zeros()],
+            smallest: 0.0,
+        };
+        // The start may be off by rounding; the path goes on from the exact point.
+        let exact = self.settle(&still, u, spare).unwrap_or(*start);
+        self.finish(u, &exact, &still, spare)
+    }
+
+    /// The farthest point that one step reaches towards `goal`.
+    fn advance(
+        &self,
+        last: &FollowPoint<N>,
+        goal: f64,
+        spare: &Spare<N>,
+    ) -> Result<FollowPoint<N>, FollowError> {
+        let shortest = SHORTEST * (self.grid[self.grid.len() - 1] - self.grid[0]);
+        let mut u = goal;
+        loop {
+            if let Some(point) = self.step(last, u, spare) {
+                return Ok(point);
+            }
+            let half = 0.5 * (last.u + u);
+            if u - last.u < shortest || half <= last.u || half >= u {
+                return Err(self.refusal(last, u));
+            }
+            u = half;
+        }
+    }
+
+    /// One step, or `None` where it is too long to be sure of it.
+    fn step(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<FollowPoint<N>> {
+        let q = self.settle(last, u, spare)?;
+        let point = self.finish(u, &q, last, spare);
+        let middle = midpoint(last, &point);
+        let pose = (self.tool)(0.5 * (last.u + u)).pose;
+        let error = distance(&self.solver.chain().forward(&middle), &pose);
+        (error <= self.options.accuracy).then_some(point)
+    }
+
+    /// Joint positions at `u`, near those predicted from the last point.
+    fn settle(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<SVector<f64, N>> {
+        let target = Goal::Pose((self.tool)(u).pose);
+        let predicted = predict(last, u);
+        let at = spare.at(u);
+        let mut q = predicted;
+        let mut reached = f64::INFINITY;
+        for _ in 0..12 {
+            let (miss, jacobian) = self.solver.miss_at(&target, &q);
+            let rows = task_rows(&jacobian, spare);
+            let mut b = [0.0; 8];
+            b[..6].copy_from_slice(&miss.rows);
+            for k in 0..N.saturating_sub(6) {
+                b[6 + k] = at[k] - spare.direction(k).dot(&q);
+            }
+            let error = b.iter().fold(0.0_f64, |most, value| most.max(value.abs())) * LENGTH;
+            if error <= EXACT || (error <= ENOUGH && error > 0.5 * reached) {
+                return Some(q);
+            }
+            if !error.is_finite() || error > 4.0 * reached {
+                return None;
+            }
+            reached = error;
+            let x = linear::solve::<N>(&rows, &b, &[0.0; 8]);
+            q += SVector::from_fn(|i, _| x[i]);
+            if (q - predicted).amax() > SURPRISE {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// A point with its derivatives.
+    fn finish(
+        &self,
+        u: f64,
+        q: &SVector<f64, N>,
+        last: &FollowPoint<N>,
+        spare: &Spare<N>,
+    ) -> FollowPoint<N> {
+        let h = u - last.u;
+        let prior = [
+            last.q[1] + last.q[2] * h + last.q[3] * (0.5 * h * h),
+            last.q[2] + last.q[3] * h,
+            last.q[3],
+        ];
+        let (_, jacobian) = self.solver.chain().jacobian(q);
+        let [q1, q2, q3] = derivatives(&jacobian, &(self.tool)(u), &spare.moved_to(u), &prior);
+        FollowPoint {
+            u,
+            q: [*q, q1, q2, q3],
+            smallest: smallest(jacobian),
+        }
+    }
+
+    fn overrun(&self, u: f64, q: &SVector<f64, N>) -> Overrun {
+        let chain = self.solver.chain();
+        let mut worst = Overrun {
+            u,
+            joint: 0,
+            amount: f64::NEG_INFINITY,
+        };
+        for joint in 0..N {
+            let amount = (q[joint] - chain.upper()[joint]).max(chain.lower()[joint] - q[joint]);
+            if amount > worst.amount {
+                worst = Overrun { u, joint, amount };
+            }
+        }
+        worst
+    }
+
+    /// Why no step, however short, leads on from a point.
+    #[cold]
+    fn refusal(&self, last: &FollowPoint<N>, u: f64) -> FollowError {
+        let goal = Goal::Pose((self.tool)(u).pose);
+        let fastest = last.q[1].iamax();
+        if let Err(report) = self.solver.reach(&goal, &last.q[0]) {
+            let amount = report.position_error.max(report.rotation_error);
+            return FollowError {
+                u,
+                joint: None,
+                cause: FollowCause::Unreachable(report.obstacle),
+                amount,
+            };
+        }
+        FollowError {
+            u,
+            joint: Some(fastest),
+            cause: FollowCause::Singular,
+            amount: last.smallest,
+        }
+    }
+}
+
+/// Smallest singular value of a Jacobian, lengths in units of [`LENGTH`].
+fn smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
+    jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+    measure::singular_values(&jacobian)[6 - N.min(6)]
+}
+
+/// Distance of two poses, m, angles times [`LENGTH`].
+fn distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    let position = (a.translation.vector - b.translation.vector).norm();
+    // Twice the vector part of the quaternion between them is the angle when it is small.
+    let angle = 2.0 * (a.rotation.inverse() * b.rotation).imag().norm();
+    let error = position.max(angle * LENGTH);
+    if error.is_nan() { f64::INFINITY } else { error }
+}
+
+/// Joint positions at `u` from the derivatives at a point.
+fn predict<const N: usize>(last: &FollowPoint<N>, u: f64) -> SVector<f64, N> {
+    let h = u - last.u;
+    last.q[0] + (last.q[1] + (last.q[2] + last.q[3] * (h / 3.0)) * (h / 2.0)) * h
+}
+
+/// Middle of the polynomial of degree seven through two points and their derivatives,
+/// as its eight control points give it.
+fn midpoint<const N: usize>(a: &FollowPoint<N>, b: &FollowPoint<N>) -> SVector<f64, N> {
+    let h = b.u - a.u;
+    let side = |p: &FollowPoint<N>, h: f64| {
+        let one = p.q[0] + p.q[1] * (h / 7.0);
+        let two = one * 2.0 - p.q[0] + p.q[2] * (h * h / 42.0);
+        let three = two * 3.0 - one * 3.0 + p.q[0] + p.q[3] * (h * h * h / 210.0);
+        p.q[0] + one * 7.0 + two * 21.0 + three * 35.0
+    };
+    (side(a, h) + side(b, -h)) / 128.0
+}

@@ -1,0 +1,181 @@
+//! Following a tool path: exact, continuous, with true derivatives, or a clear refusal.
+
+use crate::arms::{self, SEVEN, SIX};
+use crate::ik::error;
+use kinematics::{FollowCause, FollowOptions, Solver, TwistPoint, follow};
+use nalgebra::{Isometry3, SVector, Translation3, Unit, UnitQuaternion, Vector3};
+
+/// Positions in which the shipped arms stand well.
+fn ready<const N: usize>(name: &str) -> SVector<f64, N> {
+    let q: &[f64] = match name {
+        "ur5e" | "ur10e" => &[0.1, -1.6, 1.5, -1.5, -1.6, 0.2],
+        "xarm6" => &[0.1, -0.5, -0.8, 0.1, 1.3, 0.0],
+        "lrmate200id" => &[0.1, 0.2, 0.0, 0.1, -1.3, 0.0],
+        "tx2_60" => &[0.1, 0.5, 1.3, 0.1, 1.3, 0.0],
+        "gantry" => &[1.0, 1.0, 0.75, 0.1, 0.2, 0.1],
+        "panda" | "fr3" => &[0.1, -0.8, 0.1, -2.3, 0.1, 1.6, 0.8],
+        "iiwa7" | "iiwa14" => &[0.1, 0.5, 0.1, -1.4, 0.1, 1.2, 0.1],
+        "xarm7" => &[0.1, -0.4, 0.1, 0.9, 0.1, 1.3, 0.1],
+        _ => &[0.1, 0.3, 0.2, 0.1, 1.0, 0.1],
+    };
+    SVector::from_column_slice(q)
+}
+
+/// A curve with a turn: `u` from 0 to 1, about 0.2 m and 0.5 rad long.
+fn curve(start: &Isometry3<f64>, scale: f64) -> impl Fn(f64) -> TwistPoint + use<> {
+    let (p, r) = (start.translation.vector, start.rotation);
+    let axis = Unit::new_normalize(Vector3::new(0.3, 1.0, -0.4));
+    move |u| {
+        let (s, c) = (3.0 * u).sin_cos();
+        let angle = 0.5 * scale * u * u;
+        let wave = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * scale;
+        TwistPoint {
+            pose: Isometry3::from_parts(
+                Translation3::from(p + wave(0.1 * u, 0.05 * s, 0.04 * (c - 1.0))),
+                UnitQuaternion::from_axis_angle(&axis, angle) * r,
+            ),
+            linear: [
+                wave(0.1, 0.15 * c, -0.12 * s),
+                wave(0.0, -0.45 * s, -0.36 * c),
+                wave(0.0, -1.35 * c, 1.08 * s),
+            ],
+            angular: [
+                axis.into_inner() * scale * u,
+                axis.into_inner() * scale,
+                Vector3::zeros(),
+            ],
+        }
+    }
+}
+
+fn follows<const N: usize>(name: &str) {
+    let solver = Solver::new(arms::chain::<N>(name));
+    let start = ready::<N>(name);
+    let tool = curve(&solver.chain().forward(&start), 1.0);
+    let grid: Vec<f64> = (0..=1000).map(|i| f64::from(i) / 1000.0).collect();
+    let points = follow(&solver, &tool, &grid, &start, &FollowOptions::default())
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert!(
+        grid.iter()
+            .all(|u| points.iter().any(|point| point.u == *u)),
+        "{name}"
+    );
+    for pair in points.windows(2) {
+        let [a, b] = pair else { unreachable!() };
+        let (position, rotation) = error(&solver.chain().forward(&b.q[0]), &tool(b.u).pose);
+        assert!(
+            position < 1e-10 && rotation < 1e-9,
+            "{name}: off by {position} m, {rotation} rad"
+        );
+        // Each derivative is that of the one before: compared over a step, by trapezoids.
+        let h = b.u - a.u;
+        for k in 0..3 {
+            let change = (b.q[k] - a.q[k]) / h;
+            let mean = (a.q[k + 1] + b.q[k + 1]) / 2.0;
+            let bound = 1e-6 * (1.0 + mean.amax()) + h * h * 2e3;
+            assert!(
+                (change - mean).amax() < bound,
+                "{name}: derivative {} at {}: {change} against {mean}",
+                k + 1,
+                a.u
+            );
+        }
+    }
+}
+
+#[test]
+fn joint_paths_are_exact_and_continuous() {
+    SIX.iter().for_each(|name| follows::<6>(name));
+    SEVEN.iter().for_each(|name| follows::<7>(name));
+}
+
+/// The answer does not depend on anything but the question.
+#[test]
+fn two_runs_are_identical() {
+    let solver = Solver::new(arms::chain::<7>("iiwa7"));
+    let start = ready::<7>("iiwa7");
+    let tool = curve(&solver.chain().forward(&start), 1.0);
+    let run = || {
+        follow(
+            &solver,
+            &tool,
+            &[0.0, 0.5, 1.0],
+            &start,
+            &FollowOptions::default(),
+        )
+    };
+    assert_eq!(run().unwrap(), run().unwrap());
+}
+
+#[test]
+fn refusals_name_place_and_cause() {
+    let solver = Solver::new(arms::chain::<6>("irb120"));
+    let start = ready::<6>("irb120");
+    let options = FollowOptions::default();
+    let pose = solver.chain().forward(&start);
+    let grid = [0.0, 0.25, 0.5, 0.75, 1.0];
+    // Ten times too far.
+    let refused = follow(&solver, &curve(&pose, 10.0), &grid, &start, &options).unwrap_err();
+    assert!(
+        matches!(
+            refused.cause,
+            FollowCause::Unreachable(_) | FollowCause::Limit | FollowCause::Singular
+        ),
+        "{refused}"
+    );
+    assert!(refused.u > 0.0 && refused.amount > 0.0, "{refused}");
+    // From somewhere else.
+    let elsewhere = start.add_scalar(0.01);
+    let refused = follow(&solver, &curve(&pose, 1.0), &grid, &elsewhere, &options).unwrap_err();
+    assert_eq!(refused.cause, FollowCause::Start);
+    // Turning the flange on the spot until joint 6 is at its end.
+    let axis = Unit::new_normalize(pose.rotation * Vector3::z());
+    let spin = |u: f64| TwistPoint {
+        pose: Isometry3::from_parts(
+            pose.translation,
+            UnitQuaternion::from_axis_angle(&axis, 9.0 * u) * pose.rotation,
+        ),
+        linear: [Vector3::zeros(); 3],
+        angular: [axis.into_inner() * 9.0, Vector3::zeros(), Vector3::zeros()],
+    };
+    let refused = follow(&solver, &spin, &grid, &start, &options).unwrap_err();
+    assert_eq!(
+        (refused.joint, refused.cause),
+        (Some(5), FollowCause::Limit),
+        "{refused}"
+    );
+    let beyond = 9.0 + 0.1 - solver.chain().upper()[5];
+    assert!((refused.amount - beyond).abs() < 1e-6, "{refused}");
+    let refused = follow(&solver, &spin, &[0.0, 0.0], &start, &options).unwrap_err();
+    assert_eq!(refused.cause, FollowCause::BadGrid);
+}
+
+/// The wrist's singular pose lies on the line: passed exactly, joint 5 changing sign.
+#[test]
+fn a_wrist_singularity_is_passed() {
+    let solver = Solver::new(arms::chain::<6>("irb120"));
+    let start = SVector::from([0.0, 0.3, -0.4, 0.0, 0.1, 0.0]);
+    let pose = solver.chain().forward(&start);
+    // Pitching the flange in the plane of the arm moves only joints 2, 3 and 5.
+    let tilt = |u: f64| TwistPoint {
+        pose: Isometry3::from_parts(
+            pose.translation,
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -0.4 * u) * pose.rotation,
+        ),
+        linear: [Vector3::zeros(); 3],
+        angular: [Vector3::y() * -0.4, Vector3::zeros(), Vector3::zeros()],
+    };
+    let grid: Vec<f64> = (0..=40).map(|i| f64::from(i) / 40.0).collect();
+    let points = follow(&solver, &tilt, &grid, &start, &FollowOptions::default()).unwrap();
+    let last = points.last().unwrap();
+    assert!(
+        points[0].q[0][4] > 0.0 && last.q[0][4] < -0.05,
+        "joint 5 ends at {}",
+        last.q[0][4]
+    );
+    assert!(
+        points
+            .iter()
+            .all(|point| point.q[0][3].abs() < 1e-6 && point.q[1].amax() < 2.0)
+    );
+}

@@ -1,0 +1,216 @@
+//! The last check before a setpoint leaves, and the check of what came back.
+
+use nalgebra::SVector;
+
+use crate::piece::of;
+use crate::{Limits, Sample};
+
+/// What a trip is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// A number that is not finite.
+    Finite,
+    /// Position (rad).
+    Position,
+    /// Velocity (rad/s).
+    Velocity,
+    /// Acceleration (rad/s²).
+    Acceleration,
+    /// Jerk (rad/s³).
+    Jerk,
+    /// Positions that do not follow from the velocities (rad).
+    Step,
+    /// Distance between setpoint and measured position (rad).
+    Following,
+}
+
+impl Quantity {
+    /// The quantity's name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Finite => "finite number",
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+            Self::Step => "position step",
+            Self::Following => "following error",
+        }
+    }
+
+    /// The unit, for a revolute joint.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Finite => "",
+            Self::Position | Self::Step | Self::Following => "rad",
+            Self::Velocity => "rad/s",
+            Self::Acceleration => "rad/s2",
+            Self::Jerk => "rad/s3",
+        }
+    }
+}
+
+/// A limit that was broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trip {
+    /// The joint, from 0.
+    pub joint: usize,
+    /// What was broken.
+    pub quantity: Quantity,
+    /// The value that was found.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+}
+
+/// Room for rounding, as a share of a limit.
+const ROUNDING: f64 = 1e-3;
+
+/// Room for rounding of positions (rad).
+const POSITION_ROUNDING: f64 = 1e-6;
+
+/// What is wrong with going from the setpoint `previous` to `next` within `period` (s): numbers
+/// that are not finite, position, velocity, acceleration, jerk, or positions that jump.
+pub fn check<const N: usize>(
+    previous: &Sample<N>,
+    next: &Sample<N>,
+    limits: &Limits<N>,
+    period: f64,
+) -> Option<Trip> {
+    (0..N).find_map(|joint| {
+        check_range(joint, next, limits).or_else(|| {
+            let (v0, v1) = (of(&previous.velocity, joint), of(&next.velocity, joint));
+            let (a0, a1) = (
+                of(&previous.acceleration, joint),
+                of(&next.acceleration, joint),
+            );
+            let moved = of(&next.position, joint) - of(&previous.position, joint);
+            let most = of(&limits.jerk, joint);
+            let curve = most * period * period * period / 6.0 + POSITION_ROUNDING;
+            [
+                (Quantity::Velocity, v1, of(&limits.velocity, joint)),
+                (Quantity::Acceleration, a1, of(&limits.acceleration, joint)),
+                (Quantity::Jerk, (a1 - a0) / period, most),
+                (Quantity::Step, moved - (v0 + v1) * (period / 2.0), curve),
+            ]
+            .into_iter()
+            .find(|(_, value, limit)| libm::fabs(*value) > limit * (1.0 + ROUNDING))
+            .map(|(quantity, value, limit)| Trip {
+                joint,
+                quantity,
+                value,
+                limit,
+            })
+        })
+    })
+}
+
+/// What is wrong with one joint of a setpoint by itself: a number that is not finite, or a
+/// position out of range.
+fn check_range<const N: usize>(joint: usize, next: &Sample<N>, limits: &Limits<N>) -> Option<Trip> {
+    let position = of(&next.position, joint);
+    let trip = |quantity, limit| {
+        Some(Trip {
+            joint,
+            quantity,
+            value: position,
+            limit,
+        })
+    };
+    let (velocity, acceleration) = (of(&next.velocity, joint), of(&next.acceleration, joint));
+    let (lower, upper) = (of(&limits.lower, joint), of(&limits.upper, joint));
+    if !(position.is_finite() && velocity.is_finite() && acceleration.is_finite()) {
+        trip(Quantity::Finite, f64::INFINITY)
+    } else if position < lower - POSITION_ROUNDING {
+        trip(Quantity::Position, lower)
+    } else if position > upper + POSITION_ROUNDING {
+        trip(Quantity::Position, upper)
+    } else {
+        None
+    }
+}
+
+/// How far the measured position may be from the setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Following {
+    /// At rest (rad).
+    pub base: f64,
+    /// More for each rad/s of the setpoint's speed: the delay that is allowed for (s).
+    pub delay: f64,
+}
+
+/// Which joint's measured position is too far from the setpoint.
+pub fn check_following<const N: usize>(
+    setpoint: &Sample<N>,
+    measured: &SVector<f64, N>,
+    allowed: Following,
+) -> Option<Trip> {
+    (0..N).find_map(|joint| {
+        let value = of(measured, joint) - of(&setpoint.position, joint);
+        let limit = allowed.base + allowed.delay * libm::fabs(of(&setpoint.velocity, joint));
+        let bad = !value.is_finite() || libm::fabs(value) > limit;
+        bad.then_some(Trip {
+            joint,
+            quantity: Quantity::Following,
+            value,
+            limit,
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::vector;
+
+    fn limits() -> Limits<2> {
+        Limits {
+            lower: vector![-3.0, -3.0],
+            upper: vector![3.0, 3.0],
+            velocity: vector![2.0, 2.0],
+            acceleration: vector![5.0, 5.0],
+            jerk: vector![50.0, 50.0],
+        }
+    }
+
+    #[test]
+    fn each_limit_trips_and_names_its_joint() {
+        let rest = Sample::rest(vector![0.0, 2.9999]);
+        assert_eq!(check(&rest, &rest, &limits(), 0.001), None);
+        let found = |next: Sample<2>, from: &Sample<2>| check(from, &next, &limits(), 0.001);
+        let mut bad = rest;
+        bad.position[1] = f64::NAN;
+        assert_eq!(found(bad, &rest).unwrap().quantity, Quantity::Finite);
+        bad.position[1] = 3.0001;
+        let trip = found(bad, &rest).unwrap();
+        assert_eq!(
+            (trip.joint, trip.quantity, trip.limit),
+            (1, Quantity::Position, 3.0)
+        );
+        let mut bad = rest;
+        bad.velocity[0] = -2.1;
+        assert_eq!(found(bad, &rest).unwrap().quantity, Quantity::Velocity);
+        let mut bad = rest;
+        bad.acceleration[0] = 5.1;
+        assert_eq!(found(bad, &rest).unwrap().quantity, Quantity::Acceleration);
+        bad.acceleration[0] = 0.06;
+        assert_eq!(found(bad, &rest).unwrap().quantity, Quantity::Jerk);
+        let mut bad = rest;
+        bad.position[0] = 1e-4;
+        assert_eq!(found(bad, &rest).unwrap().quantity, Quantity::Step);
+    }
+
+    #[test]
+    fn the_following_error_scales_with_velocity() {
+        let allowed = Following {
+            base: 0.01,
+            delay: 0.02,
+        };
+        let mut setpoint = Sample::rest(vector![0.0, 0.0]);
+        let measured = vector![0.0, 0.02];
+        assert!(check_following(&setpoint, &measured, allowed).is_some());
+        setpoint.velocity[1] = 1.0;
+        assert!(check_following(&setpoint, &measured, allowed).is_none());
+        assert!(check_following(&setpoint, &vector![f64::NAN, 0.0], allowed).is_some());
+    }
+}

@@ -1,0 +1,247 @@
+//! Bounds on every limit over a motion in pieces.
+
+use nalgebra::Vector3;
+use realtime::Piece;
+
+use super::certificate::{ActiveSpan, Limit, LimitPeak};
+use super::grid::{Bounded, Local};
+use super::pieces::Pieces;
+use crate::{Path, ToolLimits};
+
+/// A limit counts as active from this ratio on.
+const ACTIVE: f64 = 0.97;
+/// Places in a piece at which the tool is sampled, its ends included.
+const TOOL_SAMPLES: usize = 5;
+
+/// Ratios of every limit over every piece.
+#[derive(Clone, Debug)]
+pub(super) struct Audit {
+    /// The finite limits.
+    pub limits: Vec<Limit>,
+    /// One row for each piece, one column for each of `limits`.
+    pub ratios: Vec<f64>,
+    /// What sampled tool ratios were raised by, at most.
+    pub tool_margin: f64,
+    durations: Vec<f64>,
+}
+
+/// How a ratio shrinks when time is stretched: as the first, second or third power.
+pub(super) fn order(limit: Limit) -> i32 {
+    match limit {
+        Limit::JointVelocity(_) | Limit::ToolSpeed | Limit::AngularSpeed | Limit::Rate => 1,
+        Limit::JointAcceleration(_) | Limit::ToolAcceleration | Limit::AngularAcceleration => 2,
+        Limit::JointJerk(_) | Limit::ToolJerk | Limit::AngularJerk => 3,
+    }
+}
+
+impl Audit {
+    /// Bounds every limit over every piece.
+    pub(super) fn new<P: Path<N>, const N: usize>(
+        bounded: Bounded<'_, P, N>,
+        pieces: &Pieces<N>,
+    ) -> Self {
+        let joints = joint_limits(&bounded);
+        let tool = tool_limits(bounded.tool);
+        let mut limits: Vec<Limit> = joints.iter().map(|(limit, _)| *limit).collect();
+        limits.extend(tool.iter().flatten().map(|(limit, _)| *limit));
+        limits.extend(bounded.options.rate_cap.map(|_| Limit::Rate));
+        let mut audit = Self {
+            ratios: Vec::with_capacity(limits.len() * pieces.joint.len()),
+            limits,
+            tool_margin: 0.0,
+            durations: pieces.joint.iter().map(|piece| piece.duration).collect(),
+        };
+        for (joint, law) in pieces.joint.iter().zip(&pieces.law) {
+            for (limit, value) in &joints {
+                audit.ratios.push(joint_bound(joint, *limit, *value));
+            }
+            if tool.iter().any(Option::is_some) {
+                audit.push_tool(bounded.path, law, &tool);
+            }
+            if let Some(cap) = bounded.options.rate_cap {
+                audit.ratios.push(rate_bound(law, cap));
+            }
+        }
+        audit
+    }
+
+    /// Adds the ratios of the tool over one piece.
+    fn push_tool<P: Path<N>, const N: usize>(
+        &mut self,
+        path: &P,
+        law: &Piece<1>,
+        tool: &[Option<(Limit, f64)>; 6],
+    ) {
+        let mut samples = [[0.0; 6]; TOOL_SAMPLES];
+        for (i, sample) in samples.iter_mut().enumerate() {
+            let t = law.duration * i as f64 / (TOOL_SAMPLES - 1) as f64;
+            *sample = tool_norms(path, law, t);
+        }
+        for (column, entry) in tool.iter().enumerate() {
+            if let Some((_, limit)) = entry {
+                let values = samples.map(|sample| sample[column] / limit);
+                let most = values.iter().fold(0.0_f64, |most, x| most.max(*x));
+                let bend = values.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());
+                let margin = 0.125 * bend.fold(0.0, f64::max);
+                self.tool_margin = self.tool_margin.max(margin);
+                self.ratios.push(most + margin);
+            }
+        }
+    }
+
+    /// The largest ratio of column `i`.
+    fn column(&self, i: usize) -> impl Iterator<Item = f64> + '_ {
+        self.ratios
+            .iter()
+            .copied()
+            .skip(i)
+            .step_by(self.limits.len().max(1))
+    }
+
+    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
+    /// room.
+    pub(super) fn stretch(&self) -> f64 {
+        let mut factor = 0.0_f64;
+        for (i, limit) in self.limits.iter().enumerate() {
+            let most = self.column(i).fold(0.0, f64::max);
+            factor = factor.max(root(most, order(*limit)));
+        }
+        factor
+    }
+
+    /// Each limit's peak once time is stretched by `factor`.
+    pub(super) fn peaks(&self, factor: f64) -> Vec<LimitPeak> {
+        let peak = |(i, limit): (usize, &Limit)| {
+            let (mut ratio, mut time, mut clock) = (0.0, 0.0, 0.0);
+            for (value, duration) in self.column(i).zip(&self.durations) {
+                if value > ratio {
+                    (ratio, time) = (value, clock + 0.5 * duration);
+                }
+                clock += duration;
+            }
+            let ratio = ratio / factor.powi(order(*limit));
+            LimitPeak {
+                limit: *limit,
+                ratio,
+                time: time * factor,
+            }
+        };
+        self.limits.iter().enumerate().map(peak).collect()
+    }
+
+    /// Which limit is active when, once time is stretched by `factor`.
+    pub(super) fn active(&self, factor: f64) -> Vec<ActiveSpan> {
+        let mut spans = Vec::new();
+        for (i, limit) in self.limits.iter().enumerate() {
+            let mut open: Option<ActiveSpan> = None;
+            let mut clock = 0.0;
+            for (value, duration) in self.column(i).zip(&self.durations) {
+                let end = clock + duration * factor;
+                if value / factor.powi(order(*limit)) >= ACTIVE {
+                    let start = open.map_or(clock, |span| span.start);
+                    open = Some(ActiveSpan {
+                        limit: *limit,
+                        start,
+                        end,
+                    });
+                } else {
+                    spans.extend(open.take());
+                }
+                clock = end;
+            }
+            spans.extend(open);
+        }
+        spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+        spans
+    }
+}
+
+/// Root of the order 1, 2 or 3.
+fn root(x: f64, order: i32) -> f64 {
+    match order {
+        1 => x,
+        2 => x.sqrt(),
+        _ => x.cbrt(),
+    }
+}
+
+/// The finite limits of the joints.
+fn joint_limits<P, const N: usize>(bounded: &Bounded<'_, P, N>) -> Vec<(Limit, f64)> {
+    let joint = bounded.joint;
+    let mut limits: Vec<(Limit, f64)> = Vec::with_capacity(3 * N);
+    limits.extend(
+        joint
+            .velocity
+            .iter()
+            .enumerate()
+            .map(|(j, x)| (Limit::JointVelocity(j), *x)),
+    );
+    let accelerations = joint.acceleration.iter().enumerate();
+    limits.extend(accelerations.map(|(j, x)| (Limit::JointAcceleration(j), *x)));
+    limits.extend(
+        joint
+            .jerk
+            .iter()
+            .enumerate()
+            .map(|(j, x)| (Limit::JointJerk(j), *x)),
+    );
+    limits.retain(|(_, value)| value.is_finite());
+    limits
+}
+
+/// The finite limits of the tool, in the order of [`tool_norms`].
+fn tool_limits(tool: &ToolLimits) -> [Option<(Limit, f64)>; 6] {
+    [
+        (Limit::ToolSpeed, tool.speed),
+        (Limit::ToolAcceleration, tool.acceleration),
+        (Limit::ToolJerk, tool.jerk),
+        (Limit::AngularSpeed, tool.angular_speed),
+        (Limit::AngularAcceleration, tool.angular_acceleration),
+        (Limit::AngularJerk, tool.angular_jerk),
+    ]
+    .map(|entry| entry.1.is_finite().then_some(entry))
+}
+
+/// Bound of one joint's limit over a piece, as a ratio.
+fn joint_bound<const N: usize>(piece: &Piece<N>, limit: Limit, value: f64) -> f64 {
+    let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
+    // Below the floor the hull is enough: no such piece decides anything.
+    let (floor, tolerance) = (0.9 * value, 1e-7 * value);
+    let found = match limit {
+        Limit::JointVelocity(j) => {
+            let v = [c1[j], 2.0 * c2[j], 3.0 * c3[j], 4.0 * c4[j], 5.0 * c5[j]];
+            super::bound::bound(&v, piece.duration, floor, tolerance)
+        }
+        Limit::JointAcceleration(j) => {
+            let a = [2.0 * c2[j], 6.0 * c3[j], 12.0 * c4[j], 20.0 * c5[j]];
+            super::bound::bound(&a, piece.duration, floor, tolerance)
+        }
+        Limit::JointJerk(j) => {
+            let jerk = [6.0 * c3[j], 24.0 * c4[j], 60.0 * c5[j]];
+            super::bound::bound(&jerk, piece.duration, floor, tolerance)
+        }
+        _ => 0.0,
+    };
+    found / value
+}
+
+/// Bound of the rate of the path parameter over a piece, as a ratio.
+fn rate_bound(law: &Piece<1>, cap: f64) -> f64 {
+    joint_bound(law, Limit::JointVelocity(0), cap)
+}
+
+/// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
+fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [f64; 6] {
+    let at = law.sample(t);
+    let warp = [
+        at.position[0],
+        at.velocity[0],
+        at.acceleration[0],
+        at.jerk[0],
+    ];
+    let local = Local::new(&path.at(warp[0].clamp(0.0, path.end())), warp);
+    let norm = |v: Vector3<f64>| v.norm();
+    let [l1, l2, l3] = local.linear.map(norm);
+    let [a1, a2, a3] = local.angular.map(norm);
+    [l1, l2, l3, a1, a2, a3]
+}

@@ -1,0 +1,298 @@
+//! A path, its warp and its limits as a [`Problem`].
+
+use nalgebra::{SVector, Vector3};
+
+use super::lanes::{LANE, Lane};
+use super::problem::Problem;
+use super::survey::{ASIDE, Survey, joint_ratio, speed_cap};
+use super::warp::Warp;
+use super::{Boundary, TimingOptions};
+use crate::{JointLimits, Path, PathPoint, ToolLimits};
+
+/// Cells over the time in which accelerations build up.
+const CELLS_PER_RAMP: f64 = 5.0;
+
+/// Cells from either end whose jerk rows stand closer: the path starts there like the cube of the
+/// parameter, which two places cannot hold.
+const DENSE: usize = 2;
+
+/// The grid of a law: where its nodes lie.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    /// The parameter of the law.
+    pub warp: Warp,
+    /// Nodes, over the parameter of the law (s).
+    pub nodes: Vec<f64>,
+    /// Whether a node lies on a knot of the path, where derivatives may jump.
+    pub knot: Vec<bool>,
+}
+
+/// Derivatives 1 to 3 of joints and tool to the parameter of the law.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Local<const N: usize> {
+    /// Joints.
+    pub joint: [SVector<f64, N>; 3],
+    /// Position of the controlled point.
+    pub linear: [Vector3<f64>; 3],
+    /// Angular velocity and its derivatives.
+    pub angular: [Vector3<f64>; 3],
+    /// `du/dw`.
+    pub speed: f64,
+}
+
+/// A path with everything that bounds it.
+pub(super) struct Bounded<'a, P, const N: usize> {
+    /// The path.
+    pub path: &'a P,
+    /// Limits of the joints.
+    pub joint: &'a JointLimits<N>,
+    /// Limits of the tool.
+    pub tool: &'a ToolLimits,
+    /// What is asked.
+    pub options: &'a TimingOptions,
+}
+
+impl<P, const N: usize> Clone for Bounded<'_, P, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P, const N: usize> Copy for Bounded<'_, P, N> {}
+
+/// Derivatives to a new parameter from those to the old one and those of the old to the new.
+fn chain<const D: usize>(
+    [d1, d2, d3]: [SVector<f64, D>; 3],
+    [_, u1, u2, u3]: [f64; 4],
+) -> [SVector<f64, D>; 3] {
+    [
+        d1 * u1,
+        d2 * (u1 * u1) + d1 * u2,
+        d3 * (u1 * u1 * u1) + d2 * (3.0 * u1 * u2) + d1 * u3,
+    ]
+}
+
+impl<const N: usize> Local<N> {
+    /// The derivatives of `point` to a parameter to which `u` has the derivatives `warp`.
+    pub(super) fn new(point: &PathPoint<N>, warp: [f64; 4]) -> Self {
+        let [_, q1, q2, q3] = point.joint.q;
+        Self {
+            joint: chain([q1, q2, q3], warp),
+            linear: chain(point.tool.linear, warp),
+            angular: chain(point.tool.angular, warp),
+            speed: warp[1],
+        }
+    }
+}
+
+impl Grid {
+    /// The grid for a path with these knots, from the survey's law made smooth.
+    pub(super) fn new(survey: &Survey, knots: &[f64], end: f64, options: &TimingOptions) -> Self {
+        let fast = survey.duration();
+        let ramp = survey.ramp.clamp(0.02 * fast, fast);
+        let (start_rest, end_rest) = (
+            options.start == Boundary::Rest,
+            options.end == Boundary::Rest,
+        );
+        let lead = if start_rest { 0.5 * ramp } else { 0.0 };
+        let total = fast + lead + if end_rest { 0.5 * ramp } else { 0.0 };
+        let wanted = (CELLS_PER_RAMP * total / ramp).ceil().clamp(40.0, 20_000.0);
+        let cells = options.cells.unwrap_or(wanted as usize).max(8);
+        let spans = (cells / 2).max(12);
+        let span = total / spans as f64;
+        let floor = 1e-3 * end / fast;
+        let samples: Vec<f64> = (0..=spans)
+            .map(|i| {
+                let t = i as f64 * span - lead;
+                let (before, after) = (t - 0.5 * ramp, t + 0.5 * ramp);
+                ((survey.parameter(after) - survey.parameter(before)) / ramp).max(floor)
+            })
+            .collect();
+        let warp = Warp::new(&samples, span, end, (options.start, options.end));
+        let warp = if warp.ascends() {
+            warp
+        } else {
+            // A start too far from the law of the survey: an even speed is always sound.
+            let even = vec![end / total; spans + 1];
+            Warp::new(&even, span, end, (options.start, options.end))
+        };
+        Self::with_warp(warp, knots, end, cells)
+    }
+
+    /// The grid of about `cells` cells over `warp`, with nodes on the knots.
+    fn with_warp(warp: Warp, knots: &[f64], end: f64, cells: usize) -> Self {
+        let total = warp.duration();
+        let step = total / cells as f64;
+        let mut marks = vec![0.0];
+        for &u in knots
+            .iter()
+            .filter(|u| **u > 1e-9 * end && **u < (1.0 - 1e-9) * end)
+        {
+            let w = warp.inverse(u);
+            let last = marks.last().copied().unwrap_or(0.0);
+            if w - last > 0.3 * step && total - w > 0.3 * step {
+                marks.push(w);
+            }
+        }
+        marks.push(total);
+        let parts = shares(&marks, step, cells);
+        let (mut nodes, mut knot) = (Vec::with_capacity(cells + 1), Vec::with_capacity(cells + 1));
+        for (pair, &parts) in marks.windows(2).zip(&parts) {
+            for i in 0..parts {
+                nodes.push(pair[0] + (pair[1] - pair[0]) * (i as f64 / parts as f64));
+                knot.push(i == 0);
+            }
+        }
+        nodes.push(total);
+        knot.push(true);
+        Self { warp, nodes, knot }
+    }
+
+    /// The path at `w`; its third derivatives seen from the side: -1 before, 0 at, 1 after.
+    pub(super) fn point<const N: usize>(
+        &self,
+        path: &impl Path<N>,
+        w: f64,
+        side: f64,
+    ) -> (PathPoint<N>, [f64; 4]) {
+        let warp = self.warp.at(w);
+        let end = path.end();
+        let mut point = path.at(warp[0].clamp(0.0, end));
+        if side != 0.0 {
+            let aside = path.at((warp[0] + side * ASIDE * end).clamp(0.0, end));
+            point.joint.q[3] = aside.joint.q[3];
+            point.tool.linear[2] = aside.tool.linear[2];
+            point.tool.angular[2] = aside.tool.angular[2];
+        }
+        (point, warp)
+    }
+}
+
+/// How many cells each part between marks gets: in proportion, at least one, `cells` in all where
+/// that is possible.
+fn shares(marks: &[f64], step: f64, cells: usize) -> Vec<usize> {
+    let exact: Vec<f64> = marks
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / step)
+        .collect();
+    let mut parts: Vec<usize> = exact.iter().map(|x| (x.floor() as usize).max(1)).collect();
+    let used: usize = parts.iter().sum();
+    let mut order: Vec<usize> = (0..parts.len()).collect();
+    let rest = |i: &usize| exact[*i] - parts[*i] as f64;
+    order.sort_by(|i, j| rest(j).total_cmp(&rest(i)));
+    for &i in order.iter().take(cells.saturating_sub(used)) {
+        parts[i] += 1;
+    }
+    parts
+}
+
+impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
+    /// The problem over `grid`.
+    pub(super) fn problem(&self, grid: &Grid) -> Problem {
+        let nodes = &grid.nodes;
+        let cells = nodes.len() - 1;
+        let mut problem = Problem {
+            widths: nodes.windows(2).map(|pair| pair[1] - pair[0]).collect(),
+            lanes: N.div_ceil(LANE),
+            moving: matches!(self.options.start, Boundary::Moving { .. }),
+            ..Problem::default()
+        };
+        let mut before = self.local(grid, nodes[0], 1.0);
+        for k in 0..cells {
+            let (h, first) = (problem.widths[k], problem.jerk.len() / problem.lanes);
+            problem.jerk_places.push(first);
+            self.push_values(&mut problem, &before);
+            self.push_jerks(&mut problem, &before);
+            let middle = self.local(grid, nodes[k] + 0.5 * h, 0.0);
+            self.push_values(&mut problem, &middle);
+            if k.min(cells - 1 - k) < DENSE {
+                self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.25 * h, 0.0));
+                self.push_jerks(&mut problem, &middle);
+                self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.75 * h, 0.0));
+            } else {
+                self.push_jerks(&mut problem, &middle);
+            }
+            let after = self.local(
+                grid,
+                nodes[k + 1],
+                if grid.knot[k + 1] { -1.0 } else { 0.0 },
+            );
+            self.push_jerks(&mut problem, &after);
+            before = if grid.knot[k + 1] && k + 1 < cells {
+                self.local(grid, nodes[k + 1], 1.0)
+            } else {
+                after
+            };
+        }
+        problem.jerk_places.push(problem.jerk.len() / problem.lanes);
+        self.push_values(&mut problem, &before);
+        problem
+    }
+
+    /// The derivatives at `w`, seen from a side.
+    fn local(&self, grid: &Grid, w: f64, side: f64) -> Local<N> {
+        let (point, warp) = grid.point(self.path, w, side);
+        Local::new(&point, warp)
+    }
+
+    /// Adds the rows of a location that do not know the jerk.
+    fn push_values(&self, problem: &mut Problem, local: &Local<N>) {
+        let [first, second, _] = &local.joint;
+        let limit = &self.joint.acceleration;
+        for i in 0..problem.lanes {
+            let mut rows: [Lane; 2] = [[0.0; LANE]; 2];
+            for l in 0..LANE.min(N - i * LANE) {
+                let j = i * LANE + l;
+                rows[0][l] = first[j] / limit[j];
+                rows[1][l] = second[j] / limit[j];
+            }
+            problem.acceleration.push(rows);
+        }
+        let tool = self.tool;
+        for ([p, q, _], limit) in [
+            (local.linear, tool.acceleration),
+            (local.angular, tool.angular_acceleration),
+        ] {
+            if limit.is_finite() {
+                problem.norm_acceleration.push([p / limit, q / limit]);
+            }
+        }
+        let speeds = [
+            joint_ratio(first, &self.joint.velocity),
+            local.linear[0].norm(),
+            local.angular[0].norm(),
+        ];
+        let rate = self.options.rate_cap.map_or(0.0, |cap| local.speed / cap);
+        // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
+        problem
+            .cap
+            .push((1.0 / speed_cap::<N>(speeds, tool, rate)).max(1e-6));
+    }
+
+    /// Adds the jerk rows of a cell end.
+    fn push_jerks(&self, problem: &mut Problem, local: &Local<N>) {
+        let [first, second, third] = &local.joint;
+        let limit = &self.joint.jerk;
+        for i in 0..problem.lanes {
+            let mut rows: [Lane; 3] = [[0.0; LANE]; 3];
+            for l in 0..LANE.min(N - i * LANE) {
+                let j = i * LANE + l;
+                rows[0][l] = third[j] / limit[j];
+                rows[1][l] = 3.0 * second[j] / limit[j];
+                rows[2][l] = first[j] / limit[j];
+            }
+            problem.jerk.push(rows);
+        }
+        let tool = self.tool;
+        for ([p, q, r], limit) in [
+            (local.linear, tool.jerk),
+            (local.angular, tool.angular_jerk),
+        ] {
+            if limit.is_finite() {
+                problem
+                    .norm_jerk
+                    .push([r / limit, q * (3.0 / limit), p / limit]);
+            }
+        }
+    }
+}

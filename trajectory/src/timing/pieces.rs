@@ -1,0 +1,160 @@
+//! From a law over the path to quintic pieces in time.
+
+use nalgebra::SVector;
+use realtime::{Piece, Sample};
+
+use super::grid::{Bounded, Grid, Local};
+use super::problem::{Problem, Spot};
+use crate::Path;
+
+/// Jerk of a piece may differ from that of the law by this share of the limit.
+const JERK_FIT: f64 = 2e-3;
+/// A cell is halved at most this often.
+const DEPTH: usize = 5;
+
+/// Pieces of a motion, with the cell of the law that each belongs to.
+#[derive(Clone, Debug)]
+pub(super) struct Pieces<const N: usize> {
+    /// The joints.
+    pub joint: Vec<Piece<N>>,
+    /// The path parameter.
+    pub law: Vec<Piece<1>>,
+    /// The cell of each piece.
+    pub cell: Vec<usize>,
+    /// Largest distance of a joint from the path (rad), at the middle and quarters.
+    pub fit_error: f64,
+}
+
+/// The motion at one place of the path.
+#[derive(Clone, Copy)]
+struct State<const N: usize> {
+    joint: Sample<N>,
+    law: Sample<1>,
+    spot: Spot,
+}
+
+/// Makes pieces out of one law.
+pub(super) struct Maker<'a, P, const N: usize> {
+    bounded: Bounded<'a, P, N>,
+    grid: &'a Grid,
+    out: Pieces<N>,
+}
+
+impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
+    /// For laws over `grid`.
+    pub(super) fn new(bounded: Bounded<'a, P, N>, grid: &'a Grid) -> Self {
+        let out = Pieces {
+            joint: Vec::new(),
+            law: Vec::new(),
+            cell: Vec::new(),
+            fit_error: 0.0,
+        };
+        Self { bounded, grid, out }
+    }
+
+    /// The pieces of the law `x`.
+    pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
+        let nodes = &self.grid.nodes;
+        for k in 0..problem.cells() {
+            let spot = problem.spot(k, x);
+            // The same place seen from both sides gives the same values; only jerks differ.
+            let side = |k: usize| if self.grid.knot[k] { 1.0 } else { 0.0 };
+            let start = self.state(nodes[k], side(k), spot);
+            let end = self.state(nodes[k + 1], -side(k + 1), spot.moved(problem.widths[k]));
+            self.halve(k, (nodes[k], start), (nodes[k + 1], end), DEPTH);
+        }
+        self.out
+    }
+
+    /// The motion at `w`, where the law is `spot`.
+    fn state(&self, w: f64, side: f64, spot: Spot) -> State<N> {
+        let (point, warp) = self.grid.point(self.bounded.path, w, side);
+        let local = Local::new(&point, warp);
+        let root = spot.a.sqrt();
+        let joint = Sample {
+            position: point.joint.q[0],
+            velocity: local.joint[0] * root,
+            acceleration: local.joint[1] * spot.a + local.joint[0] * spot.b,
+            jerk: (local.joint[2] * spot.a
+                + local.joint[1] * (3.0 * spot.b)
+                + local.joint[0] * spot.c)
+                * root,
+        };
+        let one = |x: f64| SVector::<f64, 1>::from_element(x);
+        let [u, u1, u2, u3] = warp;
+        let law = Sample {
+            position: one(u),
+            velocity: one(u1 * root),
+            acceleration: one(u2 * spot.a + u1 * spot.b),
+            jerk: one((u3 * spot.a + 3.0 * u2 * spot.b + u1 * spot.c) * root),
+        };
+        State { joint, law, spot }
+    }
+
+    /// Adds the pieces between two places in cell `k`: one if it is true to the path, else those
+    /// of both halves.
+    fn halve(
+        &mut self,
+        k: usize,
+        (w0, start): (f64, State<N>),
+        (w1, end): (f64, State<N>),
+        depth: usize,
+    ) {
+        let duration = passage(start.spot, w1 - w0);
+        let joint = Piece::hermite(duration, &start.joint, &end.joint);
+        let law = Piece::hermite(duration, &start.law, &end.law);
+        let error = self.fit_error(&joint, &law);
+        if depth > 0 && (error > self.bounded.options.fit || !self.jerk_fits(&joint, &start, &end))
+        {
+            let middle = 0.5 * (w0 + w1);
+            let state = self.state(middle, 0.0, start.spot.moved(middle - w0));
+            self.halve(k, (w0, start), (middle, state), depth - 1);
+            self.halve(k, (middle, state), (w1, end), depth - 1);
+            return;
+        }
+        self.out.fit_error = self.out.fit_error.max(error);
+        self.out.joint.push(joint);
+        self.out.law.push(law);
+        self.out.cell.push(k);
+    }
+
+    /// Distance of the joints from the path in the middle of a piece.
+    fn fit_error(&self, joint: &Piece<N>, law: &Piece<1>) -> f64 {
+        let t = 0.5 * joint.duration;
+        let u = law.sample(t).position[0];
+        let end = self.bounded.path.end();
+        let wanted = self.bounded.path.at(u.clamp(0.0, end)).joint.q[0];
+        (joint.sample(t).position - wanted).amax()
+    }
+
+    /// Whether the jerk of a piece at its ends is near that of the law.
+    fn jerk_fits(&self, piece: &Piece<N>, start: &State<N>, end: &State<N>) -> bool {
+        let limit = &self.bounded.joint.jerk;
+        let off = |t: f64, state: &State<N>| {
+            (piece.sample(t).jerk - state.joint.jerk)
+                .component_div(limit)
+                .amax()
+        };
+        // Both ends of the cell have the same third derivative of the law only within it.
+        off(0.0, start).max(off(piece.duration, end)) <= JERK_FIT
+    }
+}
+
+/// Time (s) in which the law that is `spot` here goes `width` further within the cell.
+///
+/// # Source
+/// Gauss-Legendre quadrature with five points (Abramowitz and Stegun, table 25.4).
+fn passage(spot: Spot, width: f64) -> f64 {
+    const PLACES: [f64; 3] = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
+    const WEIGHTS: [f64; 3] = [
+        0.568_888_888_888_888_9,
+        0.478_628_670_499_366_5,
+        0.236_926_885_056_189_1,
+    ];
+    let slow = |x: f64| 1.0 / spot.moved(0.5 * width * (1.0 + x)).a.sqrt();
+    let mut sum = WEIGHTS[0] * slow(0.0);
+    for i in 1..3 {
+        sum += WEIGHTS[i] * (slow(PLACES[i]) + slow(-PLACES[i]));
+    }
+    0.5 * width * sum
+}

@@ -1,0 +1,190 @@
+//! The fastest law under velocity and acceleration limits alone, by reachability.
+
+use super::lanes::{LANE, Lane};
+
+/// A path on a grid with its limits, ready for [`ReachGrid::solve`]: `a = (du/dt)^2` and
+/// `b = d²u/dt²` have to meet `a <= cap` and `|p b + q a| <= 1` for each row `(p, q)`.
+#[derive(Clone, Debug, Default)]
+pub struct ReachGrid {
+    at: Vec<f64>,
+    cap: Vec<f64>,
+    /// Lanes of rows a grid point has.
+    width: usize,
+    /// `|1 / p|` of each row.
+    reach: Vec<Lane>,
+    /// `q / p` of each row.
+    slope: Vec<Lane>,
+}
+
+/// The lines that bound `b` at a given `a`: the least upper and the greatest lower one, each
+/// `offset - slope a`.
+struct Envelope {
+    high: (f64, f64),
+    low: (f64, f64),
+}
+
+impl ReachGrid {
+    /// An empty grid for `rows` rows at each point.
+    pub fn new(rows: usize) -> Self {
+        Self {
+            width: rows.div_ceil(LANE),
+            ..Self::default()
+        }
+    }
+
+    /// Adds the next point, at `u`, with the cap of `a` and rows `(p, q)`. Rows beyond the number
+    /// given to [`ReachGrid::new`] are not taken.
+    pub fn push(&mut self, u: f64, cap: f64, rows: impl Iterator<Item = (f64, f64)>) {
+        let first = self.reach.len();
+        self.reach.resize(first + self.width, [f64::MAX; LANE]);
+        self.slope.resize(first + self.width, [0.0; LANE]);
+        let mut cap = cap;
+        let lanes = self.reach[first..].iter_mut().zip(&mut self.slope[first..]);
+        let slots = lanes.flat_map(|(reach, slope)| reach.iter_mut().zip(slope));
+        for ((reach, slope), (p, q)) in slots.zip(rows) {
+            let inverse = 1.0 / p;
+            // A joint that hardly moves here bounds the speed by its curvature alone.
+            if inverse.abs() < 1e12 {
+                *reach = inverse.abs();
+                *slope = q * inverse;
+            } else if q != 0.0 {
+                cap = cap.min(1.0 / q.abs());
+            }
+        }
+        self.at.push(u);
+        self.cap.push(cap);
+    }
+
+    /// The grid with every second point only; the last stays.
+    pub fn halved(&self) -> Self {
+        let last = self.at.len().saturating_sub(1);
+        let mut half = Self {
+            width: self.width,
+            ..Self::default()
+        };
+        for k in (0..=last).filter(|k| k % 2 == 0 || *k == last) {
+            let rows = k * self.width..(k + 1) * self.width;
+            half.at.extend(self.at.get(k));
+            half.cap.extend(self.cap.get(k));
+            half.reach
+                .extend(self.reach.get(rows.clone()).unwrap_or_default());
+            half.slope.extend(self.slope.get(rows).unwrap_or_default());
+        }
+        half
+    }
+
+    /// Parameter values of the points.
+    pub fn at(&self) -> &[f64] {
+        &self.at
+    }
+
+    /// The largest `a` at each point with `a = first` at the start and at most `last` at the end,
+    /// by a backward pass of controllable sets and a greedy forward pass.
+    ///
+    /// # Source
+    /// Pham and Pham, "A new approach to time-optimal path parameterization based on reachability
+    /// analysis", IEEE T-RO 34(3), 2018, algorithms 1 and 2. Each linear program has two
+    /// unknowns; it is solved by Newton steps on the concave gap between the bounds of `b`.
+    pub fn solve(&self, first: f64, last: f64) -> Vec<f64> {
+        let count = self.at.len();
+        let mut top = self.cap.clone();
+        if count == 0 {
+            return top;
+        }
+        top[count - 1] = top[count - 1].min(last);
+        for k in (0..count - 1).rev() {
+            let half = 0.5 / (self.at[k + 1] - self.at[k]);
+            top[k] = self.controllable(k, half, top[k + 1]);
+        }
+        top[0] = top[0].min(first);
+        for k in 0..count - 1 {
+            let half = 0.5 / (self.at[k + 1] - self.at[k]);
+            let (a, next) = (top[k], top[k + 1]);
+            let bounds = self.envelope(k, a);
+            let b = (bounds.high.0 - bounds.high.1 * a).min((next - a) * half);
+            top[k + 1] = (a + b / half).clamp(0.0, next);
+        }
+        top
+    }
+
+    /// The largest `a` at point `k` from which some `b` leads to at most `next` at the next.
+    fn controllable(&self, k: usize, half: f64, next: f64) -> f64 {
+        let mut a = self.cap[k];
+        for _ in 0..30 {
+            let mut bounds = self.envelope(k, a);
+            let arrive = (next * half, half);
+            if arrive.0 - arrive.1 * a < bounds.high.0 - bounds.high.1 * a {
+                bounds.high = arrive;
+            }
+            if -half * a > bounds.low.0 - bounds.low.1 * a {
+                bounds.low = (0.0, half);
+            }
+            let gap = bounds.high.0 - bounds.low.0;
+            let closing = bounds.high.1 - bounds.low.1;
+            if gap - closing * a >= -1e-12 * gap.abs() || closing <= 0.0 {
+                break;
+            }
+            a = (gap / closing).clamp(0.0, a);
+        }
+        a
+    }
+
+    /// The bounds of `b` at point `k` for `a`.
+    fn envelope(&self, k: usize, a: f64) -> Envelope {
+        let rows = k * self.width..(k + 1) * self.width;
+        let mut high = ([f64::MAX; LANE], [f64::MAX; LANE], [0.0; LANE]);
+        let mut low = ([f64::MIN; LANE], [f64::MIN; LANE], [0.0; LANE]);
+        for (reach, slope) in self.reach[rows.clone()].iter().zip(&self.slope[rows]) {
+            for l in 0..LANE {
+                let shift = slope[l] * a;
+                let (up, down) = (reach[l] - shift, -reach[l] - shift);
+                let better = up < high.0[l];
+                high.0[l] = if better { up } else { high.0[l] };
+                high.1[l] = if better { reach[l] } else { high.1[l] };
+                high.2[l] = if better { slope[l] } else { high.2[l] };
+                let better = down > low.0[l];
+                low.0[l] = if better { down } else { low.0[l] };
+                low.1[l] = if better { -reach[l] } else { low.1[l] };
+                low.2[l] = if better { slope[l] } else { low.2[l] };
+            }
+        }
+        let (mut best_high, mut best_low) = (0, 0);
+        for l in 1..LANE {
+            if high.0[l] < high.0[best_high] {
+                best_high = l;
+            }
+            if low.0[l] > low.0[best_low] {
+                best_low = l;
+            }
+        }
+        Envelope {
+            high: (high.1[best_high], high.2[best_high]),
+            low: (low.1[best_low], low.2[best_low]),
+        }
+    }
+}
+
+/// Time (s) that a law `a` takes over the grid `at` with constant acceleration in each cell.
+pub fn duration(at: &[f64], a: &[f64]) -> f64 {
+    let cells = at.windows(2).zip(a.windows(2));
+    cells
+        .map(|(u, a)| 2.0 * (u[1] - u[0]) / (a[0].sqrt() + a[1].sqrt()))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One joint over one radian: bang-bang takes 2 sqrt(d / A).
+    #[test]
+    fn straight_line_is_bang_bang() {
+        let mut grid = ReachGrid::new(1);
+        for k in 0..=100 {
+            grid.push(f64::from(k) / 100.0, 1e9, std::iter::once((0.1, 0.0)));
+        }
+        let a = grid.solve(0.0, 0.0);
+        let time = duration(grid.at(), &a);
+        assert!((time - 2.0 * (0.1_f64).sqrt()).abs() < 1e-12, "{time}");
+    }
+}

@@ -1,0 +1,319 @@
+//! A first look at a path: is it sound, and how fast could it be without jerk limits.
+
+use nalgebra::{SVector, Vector3};
+
+use super::reach::{self, ReachGrid};
+use super::{Boundary, TimingOptions};
+use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
+
+/// Cells that a survey spreads over the path, besides those at the knots.
+const CELLS: usize = 256;
+/// A squared rate that nothing bounds.
+const FREE: f64 = 1e100;
+/// Least number of cells from one knot to the next.
+const PER_KNOT: f64 = 4.0;
+/// Share of the path parameter by which one-sided values stand aside from a knot.
+pub(super) const ASIDE: f64 = 1e-9;
+
+/// The fastest law without jerk limits, and what it tells of the time scale.
+#[derive(Clone, Debug)]
+pub(super) struct Survey {
+    /// Path parameters.
+    pub at: Vec<f64>,
+    /// Rates `du/dt` there.
+    pub rate: Vec<f64>,
+    /// Times there (s).
+    pub times: Vec<f64>,
+    /// Time over which accelerations of this law could be built up within the jerk limits (s).
+    pub ramp: f64,
+    /// No motion is shorter than this (s), as far as velocity and acceleration limits say.
+    pub bound: f64,
+}
+
+/// The cap of `(du/dt)^2` from speeds: joints, tool and the rate itself.
+pub(super) fn speed_cap<const N: usize>(
+    [joint, linear, angular]: [f64; 3],
+    limits: &ToolLimits,
+    rate: f64,
+) -> f64 {
+    let ratio = joint
+        .max(linear / limits.speed)
+        .max(angular / limits.angular_speed);
+    1.0 / (ratio * ratio).max(rate * rate)
+}
+
+/// The largest `|d_j| / limit_j`.
+pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f64, N>) -> f64 {
+    d.component_div(limit).amax()
+}
+
+impl Survey {
+    /// Surveys `path`.
+    ///
+    /// # Errors
+    /// [`TimingError`] for paths that are not finite, have a corner, or limits that bound nothing.
+    pub(super) fn new<const N: usize>(
+        path: &impl Path<N>,
+        joint: &JointLimits<N>,
+        tool: &ToolLimits,
+        options: &TimingOptions,
+    ) -> Result<Self, TimingError> {
+        let at = places(path)?;
+        let mut points = Vec::with_capacity(at.len());
+        for &u in &at {
+            points.push(finite(path.at(u), u)?);
+        }
+        if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
+            corners(path, &points)?;
+        }
+        let grid = Rows {
+            joint,
+            tool,
+            rate_cap: options.rate_cap,
+        }
+        .grid(&at, &points);
+        let first = first_value(options);
+        let last = if options.end == Boundary::Rest {
+            0.0
+        } else {
+            f64::MAX
+        };
+        let a = grid.solve(first, last);
+        if matches!(options.start, Boundary::Moving { .. }) && first > a[0] * (1.0 + 1e-9) {
+            let limit = "velocity and acceleration".to_owned();
+            return Err(TimingError::StartTooFast {
+                ratio: (first / a[0]).sqrt(),
+                limit,
+            });
+        }
+        let total = reach::duration(&at, &a);
+        if !(total.is_finite() && total > 0.0 && a.iter().all(|a| *a < FREE)) {
+            return Err(TimingError::Unbounded);
+        }
+        let bound = bound(&grid, total, (first, last));
+        let ramp = ramp(joint, tool, &at, &a, &points);
+        let times = clock(&at, &a);
+        let rate = a.into_iter().map(f64::sqrt).collect();
+        Ok(Self {
+            at,
+            rate,
+            times,
+            ramp,
+            bound,
+        })
+    }
+}
+
+/// `(du/dt)^2` at the start: what the boundary says, or anything.
+fn first_value(options: &TimingOptions) -> f64 {
+    match options.start {
+        Boundary::Rest => 0.0,
+        Boundary::Free => FREE,
+        Boundary::Moving { rate, .. } => rate * rate,
+    }
+}
+
+/// Time at each place.
+fn clock(at: &[f64], a: &[f64]) -> Vec<f64> {
+    let mut time = 0.0;
+    let mut times = vec![0.0];
+    for (u, a) in at.windows(2).zip(a.windows(2)) {
+        time += 2.0 * (u[1] - u[0]) / (a[0].sqrt() + a[1].sqrt());
+        times.push(time);
+    }
+    times
+}
+
+/// The duration less twice the change that a grid of half the points makes: an error bar.
+fn bound(grid: &ReachGrid, total: f64, (first, last): (f64, f64)) -> f64 {
+    let half = grid.halved();
+    let coarse = reach::duration(half.at(), &half.solve(first, last));
+    (total - 2.0 * (coarse - total).abs()).max(0.0)
+}
+
+/// Knots, places between them, and more of them near ends at rest.
+fn places<const N: usize>(path: &impl Path<N>) -> Result<Vec<f64>, TimingError> {
+    let end = path.end();
+    if !(end > 0.0 && end.is_finite()) {
+        return Err(TimingError::EmptyPath { end });
+    }
+    let mut knots: Vec<f64> = path.knots().to_vec();
+    knots.retain(|u| *u > 0.0 && *u < end);
+    knots.push(0.0);
+    knots.push(end);
+    knots.sort_by(f64::total_cmp);
+    knots.dedup_by(|b, a| *b - *a < 1e-8 * end);
+    if let Some(last) = knots.last_mut() {
+        *last = end;
+    }
+    let step = end / CELLS as f64;
+    let mut at = Vec::new();
+    for pair in knots.windows(2) {
+        let parts = ((pair[1] - pair[0]) / step).ceil().max(PER_KNOT);
+        for i in 0..parts as usize {
+            at.push(pair[0] + (pair[1] - pair[0]) * (i as f64 / parts));
+        }
+    }
+    at.push(end);
+    let graded = [0.002, 0.01, 0.03, 0.08, 0.2, 0.5];
+    let (first, last) = (at[1], end - at[at.len() - 2]);
+    at.extend(graded.iter().map(|x| x * first));
+    at.extend(graded.iter().map(|x| end - x * last));
+    at.sort_by(f64::total_cmp);
+    Ok(at)
+}
+
+/// The point, if it is finite.
+fn finite<const N: usize>(point: PathPoint<N>, u: f64) -> Result<PathPoint<N>, TimingError> {
+    let joints = point
+        .joint
+        .q
+        .iter()
+        .all(|d| d.iter().all(|x| x.is_finite()));
+    let vectors = point.tool.linear.iter().chain(&point.tool.angular);
+    let tool = vectors.flat_map(|v| v.iter()).all(|x| x.is_finite());
+    if joints && tool {
+        Ok(point)
+    } else {
+        Err(TimingError::NotFinite { u })
+    }
+}
+
+/// Looks for jumps of the first two derivatives at knots.
+fn corners<const N: usize>(
+    path: &impl Path<N>,
+    points: &[PathPoint<N>],
+) -> Result<(), TimingError> {
+    let end = path.end();
+    let size = |order: usize| {
+        points
+            .iter()
+            .map(|p| p.joint.q[order].amax())
+            .fold(0.0, f64::max)
+    };
+    let first = size(1);
+    let second = size(2) + 4.0 * first / end;
+    let third = size(3);
+    for &u in path.knots().iter().filter(|u| **u > 0.0 && **u < end) {
+        let before = path.at(u - ASIDE * end).joint;
+        let after = path.at(u + ASIDE * end).joint;
+        let allowed = [
+            1e-6 * first + 1e-8 * end * second,
+            1e-4 * second + 1e-8 * end * third,
+        ];
+        for order in 1..=2 {
+            let jump = after.q[order] - before.q[order];
+            let joint = jump.iamax();
+            if jump[joint].abs() > allowed[order - 1] {
+                return Err(TimingError::Corner {
+                    u,
+                    joint,
+                    order,
+                    jump: jump[joint],
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The limits from which the rows of a reachability grid are made.
+struct Rows<'a, const N: usize> {
+    joint: &'a JointLimits<N>,
+    tool: &'a ToolLimits,
+    rate_cap: Option<f64>,
+}
+
+impl<const N: usize> Rows<'_, N> {
+    /// The grid at the places `at`.
+    fn grid(&self, at: &[f64], points: &[PathPoint<N>]) -> ReachGrid {
+        let mut grid = ReachGrid::new(N + 6);
+        let caps: Vec<f64> = points.iter().map(|point| self.cap(point)).collect();
+        let most = caps
+            .iter()
+            .copied()
+            .filter(|cap| *cap < FREE)
+            .fold(0.0, f64::max);
+        // Where the path stands still over its parameter nothing bounds the rate by itself.
+        let most = if most > 0.0 { most } else { FREE };
+        for ((&u, point), cap) in at.iter().zip(points).zip(caps) {
+            grid.push(u, cap.min(most), self.rows(point));
+        }
+        grid
+    }
+
+    /// What speeds allow at a point. Jerk limits count as if the rate were constant there.
+    fn cap(&self, point: &PathPoint<N>) -> f64 {
+        let speeds = [
+            joint_ratio(&point.joint.q[1], &self.joint.velocity),
+            point.tool.linear[0].norm(),
+            point.tool.angular[0].norm(),
+        ];
+        speed_cap::<N>(
+            speeds,
+            self.tool,
+            self.rate_cap.map_or(0.0, |cap| 1.0 / cap),
+        )
+    }
+
+    /// Acceleration rows `(p, q)` of a point; those of the tool for each axis, which is a little
+    /// weaker than for the norm.
+    fn rows(&self, point: &PathPoint<N>) -> impl Iterator<Item = (f64, f64)> {
+        let limit = self.joint.acceleration;
+        let [_, first, second, _] = point.joint.q;
+        let joints = (0..N).map(move |j| (first[j] / limit[j], second[j] / limit[j]));
+        let axes = |[p, q, _]: [Vector3<f64>; 3], limit: f64| {
+            (0..3).map(move |i| (p[i] / limit, q[i] / limit))
+        };
+        let linear = axes(point.tool.linear, self.tool.acceleration);
+        joints
+            .chain(linear)
+            .chain(axes(point.tool.angular, self.tool.angular_acceleration))
+    }
+}
+
+/// How long the accelerations of the law `a` take to build up within the jerk limits.
+fn ramp<const N: usize>(
+    joint: &JointLimits<N>,
+    tool: &ToolLimits,
+    at: &[f64],
+    a: &[f64],
+    points: &[PathPoint<N>],
+) -> f64 {
+    let mut ramp = 0.0_f64;
+    for k in 0..at.len() - 1 {
+        let b = 0.5 * (a[k + 1] - a[k]) / (at[k + 1] - at[k]);
+        let [_, first, second, _] = points[k].joint.q;
+        let joints = first * b + second * a[k];
+        ramp = ramp.max(joint_ratio(&joints, &joint.jerk));
+        let used = |[p, q, _]: [Vector3<f64>; 3]| (p * b + q * a[k]).norm();
+        ramp = ramp.max(used(points[k].tool.linear).min(tool.acceleration) / tool.jerk);
+        let angular = used(points[k].tool.angular).min(tool.angular_acceleration);
+        ramp = ramp.max(angular / tool.angular_jerk);
+    }
+    ramp
+}
+
+impl Survey {
+    /// Duration of the law (s).
+    pub(super) fn duration(&self) -> f64 {
+        self.times.last().copied().unwrap_or(0.0)
+    }
+
+    /// The path parameter at the time `t`; before the start and after the end it goes on with the
+    /// rate it has there.
+    pub(super) fn parameter(&self, t: f64) -> f64 {
+        let last = self.at.len() - 1;
+        if t <= 0.0 {
+            return t * self.rate[0];
+        }
+        if t >= self.times[last] {
+            return self.at[last] + (t - self.times[last]) * self.rate[last];
+        }
+        let k = (self.times.partition_point(|x| *x <= t).max(1) - 1).min(last - 1);
+        let x = t - self.times[k];
+        let span = self.times[k + 1] - self.times[k];
+        let gain = (self.rate[k + 1] - self.rate[k]) / span;
+        self.at[k] + x * (self.rate[k] + 0.5 * gain * x)
+    }
+}

@@ -1,0 +1,143 @@
+//! Laws of path timing.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use nalgebra::{Isometry3, SVector};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use trajectory::timing::Limit;
+use trajectory::{
+    JointLimits, JointLine, JointPoint, SplinePath, Timed, TimingOptions, ToolLimits, ToolPoint,
+    time_path,
+};
+
+fn config() -> ProptestConfig {
+    ProptestConfig {
+        cases: 48,
+        rng_seed: RngSeed::Fixed(40),
+        ..ProptestConfig::default()
+    }
+}
+
+fn spline(points: &[[f64; 3]]) -> SplinePath<3> {
+    let points: Vec<SVector<f64, 3>> = points.iter().map(|p| SVector::from(*p)).collect();
+    SplinePath::new(&points).unwrap()
+}
+
+fn time(path: &SplinePath<3>, limits: &JointLimits<3>) -> Timed<3> {
+    time_path(
+        path,
+        limits,
+        &ToolLimits::UNLIMITED,
+        &TimingOptions::default(),
+    )
+    .unwrap()
+}
+
+/// Largest ratios of velocity, acceleration and jerk at many samples.
+fn sampled(timed: &Timed<3>, limits: &JointLimits<3>) -> [f64; 3] {
+    let mut most = [0.0_f64; 3];
+    let count = 20_000;
+    for i in 0..=count {
+        let t = timed.trajectory.duration() * f64::from(i) / f64::from(count);
+        let s = timed.trajectory.sample(t);
+        most[0] = most[0].max(s.velocity.component_div(&limits.velocity).amax());
+        most[1] = most[1].max(s.acceleration.component_div(&limits.acceleration).amax());
+        most[2] = most[2].max(s.jerk.component_div(&limits.jerk).amax());
+    }
+    most
+}
+
+prop_compose! {
+    fn limits()(v in 0.2..4.0_f64, a in 0.5..30.0_f64, j in 5.0..1000.0_f64) -> JointLimits<3> {
+        JointLimits::uniform(v, a, j)
+    }
+}
+
+fn waypoints() -> impl Strategy<Value = Vec<[f64; 3]>> {
+    prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64), 2..9)
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    /// The certificate holds, samples agree with it, and the motion starts and ends at rest.
+    #[test]
+    fn certificate_holds(points in waypoints(), limits in limits()) {
+        let path = spline(&points);
+        let timed = time(&path, &limits);
+        prop_assert!(timed.certificate.holds());
+        prop_assert!(timed.certificate.fit_error < 1e-7);
+        for ratio in sampled(&timed, &limits) {
+            prop_assert!(ratio <= 1.0 + 1e-9);
+        }
+        let duration = timed.trajectory.duration();
+        for (t, wanted) in [(0.0, points[0]), (duration, points[points.len() - 1])] {
+            let s = timed.trajectory.sample(t);
+            prop_assert!((s.position - SVector::from(wanted)).amax() < 1e-9);
+            prop_assert!(s.velocity.amax() < 1e-9 && s.acceleration.amax() < 1e-6);
+        }
+        prop_assert!(duration >= timed.certificate.lower_bound);
+    }
+
+    /// Limits of velocity, acceleration and jerk that grow by k, k² and k³ make it k times as fast.
+    #[test]
+    fn scales_with_limits(points in waypoints(), limits in limits(), k in 0.1..10.0_f64) {
+        let path = spline(&points);
+        let faster = JointLimits {
+            velocity: limits.velocity * k,
+            acceleration: limits.acceleration * (k * k),
+            jerk: limits.jerk * (k * k * k),
+            ..limits
+        };
+        let (slow, fast) = (time(&path, &limits), time(&path, &faster));
+        let ratio = slow.trajectory.duration() / (fast.trajectory.duration() * k);
+        prop_assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+    }
+}
+
+/// From a nanometre to a kilometre a straight line is timed, near its textbook duration.
+#[test]
+fn straight_lines_of_any_length() {
+    let still = |_: &JointPoint<2>| ToolPoint::still(Isometry3::identity());
+    let limits = JointLimits::uniform(2.0, 10.0, 100.0);
+    let start = SVector::<f64, 2>::new(1.0, 1.0);
+    for (length, textbook) in [
+        (1e-6, 0.006_840),
+        (1e-3, 0.068_4),
+        (1.0, 0.8),
+        (100.0, 50.3),
+    ] {
+        let end = start + SVector::<f64, 2>::new(length, -0.3 * length);
+        let line = JointLine::new(start, end, still);
+        let options = TimingOptions::default();
+        let timed = time_path(&line, &limits, &ToolLimits::UNLIMITED, &options).unwrap();
+        assert!(timed.certificate.holds());
+        let ratio = timed.trajectory.duration() / textbook;
+        assert!(ratio > 0.999 && ratio < 1.04, "{length}: {ratio}");
+    }
+}
+
+/// Something always decides the speed: nearly all of the motion has an active limit.
+#[test]
+fn some_limit_is_active() {
+    let path = spline(&[
+        [0.0, 0.0, 0.0],
+        [1.0, -1.0, 0.5],
+        [0.2, 0.3, -1.0],
+        [1.0, 1.0, 1.0],
+    ]);
+    let timed = time(&path, &JointLimits::uniform(1.0, 5.0, 50.0));
+    let certificate = &timed.certificate;
+    assert!(certificate.ratio(|limit| matches!(limit, Limit::JointJerk(_))) > 0.98);
+    let mut covered = 0.0;
+    let mut until = 0.0_f64;
+    for span in &certificate.active {
+        covered += (span.end - span.start.max(until)).max(0.0);
+        until = until.max(span.end);
+    }
+    assert!(
+        covered > 0.7 * certificate.duration,
+        "{covered} of {}",
+        certificate.duration
+    );
+}
