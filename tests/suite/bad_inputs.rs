@@ -20,7 +20,7 @@ fn said(ran: &Ran) -> String {
 
 fn robot_for(name: &str) -> &'static str {
     if name == "behind_a_joint_limit" {
-        "panda"
+        "iiwa14"
     } else {
         "ur5e"
     }

@@ -86,9 +86,9 @@ fn solve<const N: usize>(
             let time = begin.elapsed().as_nanos();
             if !found.is_empty() {
                 sheet.total_ns += time;
-                found
-                    .iter()
-                    .try_for_each(|solution| sheet.solution(row, solution, errors(&solver, pose, solution), time))?;
+                found.iter().try_for_each(|solution| {
+                    sheet.solution(row, solution, errors(&solver, pose, solution), time)
+                })?;
                 sheet.count("reached");
                 continue;
             }
