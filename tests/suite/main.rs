@@ -4,6 +4,7 @@
 mod arrows;
 mod canter;
 mod command_line;
+mod session;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
 #[test]
