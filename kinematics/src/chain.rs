@@ -1,6 +1,7 @@
 //! A serial arm as flat data: forward kinematics, Jacobian, limits.
 
 use crate::arith::{self, Arith, Build, Op, V4};
+use crate::ik::Line;
 use crate::urdf::{JointKind, Model};
 use nalgebra::{
     Isometry3, Matrix3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
@@ -273,6 +274,20 @@ impl<const N: usize> Chain<N> {
             derivative.fixed_view_mut::<3, 1>(3, i).copy_from(&dw);
         }
         derivative
+    }
+
+    /// Axes of the joints and pose of the tool with all joints at zero; `None` where a joint slides.
+    pub(crate) fn lines(&self) -> Option<(Vec<Line>, Isometry3<f64>)> {
+        if !self.all_turn {
+            return None;
+        }
+        let (points, axes, tool) = self.frames(arith::Plain, &SVector::zeros());
+        let first = |v: V4| [v.0[0], v.0[1], v.0[2]];
+        let lines = points.into_iter().zip(axes).map(|(p, h)| Line {
+            h: first(h),
+            p: first(p),
+        });
+        Some((lines.collect(), tool.isometry()))
     }
 
     /// Position and axis of every joint and the tool frame, in base axes.

@@ -1,22 +1,33 @@
 //! Inverse kinematics: from a pose of the tool to joint positions.
 
+mod classify;
+mod closed;
 mod goal;
+mod lanes;
 mod numeric;
 mod report;
+mod six;
+mod swivel;
 mod turns;
 
 pub use goal::Goal;
 pub(crate) use goal::{LENGTH, Miss};
 pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
+pub(crate) use six::Line;
 
 use crate::chain::Chain;
 use crate::measure;
+use closed::{Branching, Closed, Raw};
 use goal::Target;
 use nalgebra::{Isometry3, SMatrix, SVector};
 use numeric::{Descent, Landing, Stop};
 
 /// Restarts before a goal counts as not reached.
-const RESTARTS: u32 = 120;
+const RESTARTS: u32 = 600;
+/// Restarts after which a position that is out of reach by itself ends the search.
+const PATIENCE: u32 = 40;
+/// Restarts of the search for all solutions.
+const SEARCH: u32 = 120;
 
 /// Solves inverse kinematics for one arm with its base and tool.
 ///
@@ -35,6 +46,7 @@ const RESTARTS: u32 = 120;
 pub struct Solver<const N: usize> {
     chain: Chain<N>,
     stop: Stop,
+    closed: Option<Closed>,
 }
 
 impl<const N: usize> Solver<N> {
@@ -48,7 +60,31 @@ impl<const N: usize> Solver<N> {
             steps: 40,
             limits: true,
         };
-        Self { chain, stop }
+        let mut solver = Self {
+            chain,
+            stop,
+            closed: Closed::of(&chain),
+        };
+        if !solver.closed_form_holds() {
+            solver.closed = None;
+        }
+        solver
+    }
+
+    /// A solver that never uses a closed form.
+    #[must_use]
+    pub fn numeric(chain: Chain<N>) -> Self {
+        let stop = Stop {
+            position: 1e-9,
+            rotation: 1e-9,
+            steps: 40,
+            limits: true,
+        };
+        Self {
+            chain,
+            stop,
+            closed: None,
+        }
     }
 
     /// The same solver with other tolerances (m, rad) for numeric answers; 1e-9 each
@@ -65,15 +101,30 @@ impl<const N: usize> Solver<N> {
         &self.chain
     }
 
-    /// One solution, without regard to where the arm stands.
+    /// Which closed form the arm has, or `numeric`.
+    #[must_use]
+    pub fn family(&self) -> &'static str {
+        self.closed.as_ref().map_or("numeric", Closed::name)
+    }
+
+    /// Whether the closed form is exact to rounding; near ones (calibrated arms) seed a polish.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.closed.as_ref().is_some_and(Closed::exact)
+    }
+
+    /// One solution: for arms with a closed form the branch nearest to the middle of
+    /// the joint ranges.
     ///
     /// # Errors
     /// [`Report`]: what is in the way, and the nearest pose that was found.
     pub fn solve(&self, pose: &Isometry3<f64>) -> Result<Solution<N>, Report<N>> {
-        self.reach(&Goal::Pose(*pose), &numeric::restart(&self.chain, 0))
+        self.nearest(pose, &numeric::restart(&self.chain, 0))
     }
 
-    /// The solution nearest to `seed` (rad, m), with the turns of its joints chosen nearest too.
+    /// The solution nearest to `seed` (rad, m), with the turns of its joints chosen
+    /// nearest too. Arms with seven joints keep their free parameter (see
+    /// [`Solver::parameter`]) where they can, and else the nearest that works.
     ///
     /// # Errors
     /// [`Report`]: what is in the way, and the nearest pose that was found.
@@ -82,7 +133,73 @@ impl<const N: usize> Solver<N> {
         pose: &Isometry3<f64>,
         seed: &SVector<f64, N>,
     ) -> Result<Solution<N>, Report<N>> {
+        let Some(closed) = &self.closed else {
+            return self.reach(&Goal::Pose(*pose), seed);
+        };
+        let parameter = closed.parameter(seed);
+        if let Some(solution) = self.nearest_at(closed, pose, seed, parameter) {
+            return Ok(solution);
+        }
+        if closed.spare() {
+            const STEPS: u32 = 60;
+            for step in 1..=STEPS {
+                for side in [1.0, -1.0] {
+                    let moved = parameter
+                        + side * std::f64::consts::PI * f64::from(step) / f64::from(STEPS);
+                    if let Some(solution) = self.nearest_at(closed, pose, seed, moved) {
+                        return Ok(solution);
+                    }
+                }
+            }
+        }
         self.reach(&Goal::Pose(*pose), seed)
+    }
+
+    /// All branches of a pose inside the limits, at most [`MOST_BRANCHES`], each with
+    /// its turns nearest to the middle of the joint ranges. Where the pose is singular
+    /// two branches may be the same joint position.
+    ///
+    /// Arms with seven joints have one free parameter; the branches are those at the
+    /// parameter of the middle of the joint ranges, see [`Solver::solve_all_at`].
+    /// Arms without a closed form are searched from a fixed sequence of seeds.
+    #[must_use]
+    pub fn solve_all(&self, pose: &Isometry3<f64>) -> Branches<N> {
+        let middle = numeric::restart(&self.chain, 0);
+        match &self.closed {
+            Some(closed) => self.branches_at(closed, pose, &middle, closed.parameter(&middle)),
+            None => self.search_all(pose),
+        }
+    }
+
+    /// All branches at one value (rad) of the free parameter, turns and free joints of
+    /// singular poses nearest to `seed`. For arms without a free parameter that is all.
+    #[must_use]
+    pub fn solve_all_at(
+        &self,
+        pose: &Isometry3<f64>,
+        parameter: f64,
+        seed: &SVector<f64, N>,
+    ) -> Branches<N> {
+        match &self.closed {
+            Some(closed) => self.branches_at(closed, pose, seed, parameter),
+            None => self.search_all(pose),
+        }
+    }
+
+    /// The free parameter of a seven-joint arm at `q`, rad: its swivel (spherical
+    /// shoulder and wrist), or the joint that its closed form takes as given.
+    #[must_use]
+    pub fn parameter(&self, q: &SVector<f64, N>) -> f64 {
+        self.closed
+            .as_ref()
+            .map_or(0.0, |closed| closed.parameter(q))
+    }
+
+    /// Distance (m) and angle (rad) of the tool at `q` from a pose.
+    #[must_use]
+    pub fn error(&self, pose: &Isometry3<f64>, q: &SVector<f64, N>) -> (f64, f64) {
+        let (miss, _) = self.miss_at(&Goal::Pose(*pose), q);
+        (miss.position, miss.rotation)
     }
 
     /// Reaches any kind of goal, from `seed` and then from a fixed sequence of restarts.
@@ -123,11 +240,10 @@ impl<const N: usize> Solver<N> {
     }
 
     /// Solutions found from the whole sequence of restarts, each once.
-    #[must_use]
-    pub fn solve_all(&self, pose: &Isometry3<f64>) -> Branches<N> {
+    fn search_all(&self, pose: &Isometry3<f64>) -> Branches<N> {
         let target = Goal::Pose(*pose).target();
         let mut found = Branches::new();
-        for index in 0..RESTARTS {
+        for index in 0..SEARCH {
             let landing = self.restarted(&target, index);
             let known =
                 |other: &Solution<N>| turns::distance(&self.chain, &other.q, &landing.q) < 1e-5;
@@ -154,11 +270,11 @@ impl<const N: usize> Solver<N> {
         })
     }
 
-    /// One restart. Every second one walks through the limits, which gets it past
+    /// One restart. Every first of two walks through the limits, which gets it past
     /// corners that they form, and counts when it ends inside them.
     fn restarted(&self, target: &Target, index: u32) -> Landing<N> {
         let seed = numeric::restart(&self.chain, index);
-        let limits = index % 2 == 0;
+        let limits = index % 2 == 1;
         let mut landing = self.descend(
             target,
             &seed,
@@ -181,9 +297,136 @@ impl<const N: usize> Solver<N> {
         Solution {
             q: turns::nearest(&self.chain, &landing.q, seed),
             branch: None,
-            position_error: landing.position,
-            rotation_error: landing.rotation,
         }
+    }
+
+    fn raw(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        parameter: f64,
+        hold: &SVector<f64, N>,
+    ) -> Raw<N> {
+        self.chain.build().run(Branching {
+            closed,
+            pose,
+            parameter,
+            hold,
+        })
+    }
+
+    /// The joint position of one branch, inside the limits and polished if need be.
+    #[inline]
+    fn branch(
+        &self,
+        closed: &Closed,
+        raw: &Raw<N>,
+        (group, lane): (usize, usize),
+        seed: &SVector<f64, N>,
+    ) -> Option<SVector<f64, N>> {
+        if !raw.real[group][lane] {
+            return None;
+        }
+        let q = SVector::from_fn(|i, _| raw.joints[group][i][lane]);
+        let q = turns::nearest(&self.chain, &q, seed);
+        if closed.exact() {
+            return self.chain.within_limits(&q, 0.0).then_some(q);
+        }
+        Some(q)
+    }
+
+    /// Brings a near branch onto the pose; `None` where it does not get there.
+    #[cold]
+    fn polished(
+        &self,
+        pose: &Isometry3<f64>,
+        q: &SVector<f64, N>,
+        seed: &SVector<f64, N>,
+    ) -> Option<SVector<f64, N>> {
+        let target = Goal::Pose(*pose).target();
+        let landing = self.descend(
+            &target,
+            q,
+            Stop {
+                limits: false,
+                steps: 12,
+                ..self.stop
+            },
+        );
+        // A branch that has to go far was none.
+        if !landing.reached || turns::distance(&self.chain, &landing.q, q) > 0.5 {
+            return None;
+        }
+        let q = turns::nearest(&self.chain, &landing.q, seed);
+        self.chain.within_limits(&q, 0.0).then_some(q)
+    }
+
+    fn branches_at(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        seed: &SVector<f64, N>,
+        parameter: f64,
+    ) -> Branches<N> {
+        let raw = self.raw(closed, pose, parameter, seed);
+        let mut found = Branches::new();
+        for id in 0..8_u8 {
+            let place = (usize::from(id / 4), usize::from(id % 4));
+            let Some(mut q) = self.branch(closed, &raw, place, seed) else {
+                continue;
+            };
+            if !closed.exact() {
+                let Some(polished) = self.polished(pose, &q, seed) else {
+                    continue;
+                };
+                q = polished;
+            }
+            found.push(Solution {
+                q,
+                branch: Some(id),
+            });
+        }
+        found
+    }
+
+    fn nearest_at(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        seed: &SVector<f64, N>,
+        parameter: f64,
+    ) -> Option<Solution<N>> {
+        let mut best: Option<(f64, Solution<N>)> = None;
+        for solution in &self.branches_at(closed, pose, seed, parameter) {
+            let distance = (solution.q - seed).norm_squared();
+            if best.as_ref().is_none_or(|(least, _)| distance < *least) {
+                best = Some((distance, *solution));
+            }
+        }
+        best.map(|(_, solution)| solution)
+    }
+
+    /// Whether the closed form finds its way back from a thousand joint positions.
+    fn closed_form_holds(&self) -> bool {
+        let Some(closed) = &self.closed else {
+            return false;
+        };
+        let (mut lost, mut wrong) = (0, 0);
+        for index in 0..1000 {
+            let q = numeric::restart(&self.chain, index);
+            let pose = self.chain.forward(&q);
+            let branches = self.branches_at(closed, &pose, &q, closed.parameter(&q));
+            lost += u32::from(
+                !branches
+                    .iter()
+                    .any(|b| turns::distance(&self.chain, &b.q, &q) < 1e-6),
+            );
+            for branch in &branches {
+                let (position, rotation) = self.error(&pose, &branch.q);
+                wrong += u32::from(position > 2e-9 || rotation > 2e-9);
+            }
+        }
+        wrong == 0 && lost <= if closed.exact() { 0 } else { 20 }
     }
 
     /// Finds out why a goal was not reached.
@@ -234,6 +477,16 @@ impl<const N: usize> Solver<N> {
                 angle: best.rotation,
             },
         )
+    }
+
+    /// Whether at least the position of a goal can be reached.
+    fn place_reached(&self, goal: &Goal, seed: &SVector<f64, N>) -> bool {
+        let point = match goal {
+            Goal::Pose(pose) => pose.translation.vector.into(),
+            Goal::Position(point) | Goal::Axis(point, _) => *point,
+        };
+        self.best_of(&Goal::Position(point), 12, self.stop, seed)
+            .reached
     }
 
     fn best_of(&self, goal: &Goal, tries: u32, stop: Stop, seed: &SVector<f64, N>) -> Landing<N> {

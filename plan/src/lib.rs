@@ -2,7 +2,9 @@
 
 pub mod error;
 pub mod finding;
+pub mod interp;
 pub mod kitting;
+pub mod pddl;
 pub mod run;
 pub mod world;
 

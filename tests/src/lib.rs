@@ -6,3 +6,4 @@
 pub mod arm;
 pub mod motion;
 pub mod repository;
+pub mod servo_arm;

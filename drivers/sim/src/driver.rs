@@ -121,6 +121,18 @@ impl Driver {
         self.session.as_ref().map(|session| session.watchdog_ns)
     }
 
+    /// How many joints there are.
+    pub fn joints(&self) -> usize {
+        self.servos.len()
+    }
+
+    /// Where a joint is, without noise (rad); not a number where there is no such joint.
+    pub fn position(&self, joint: usize) -> f64 {
+        self.servos
+            .get(joint)
+            .map_or(f64::NAN, |servo| servo.position)
+    }
+
     /// The last setpoint that was accepted.
     pub fn last_setpoint(&self) -> &Setpoint {
         &self.last

@@ -34,6 +34,14 @@ pub enum SimError {
         /// What it is.
         value: f64,
     },
+    /// The log of setpoints cannot be written.
+    #[error("cannot write {}: {cause}", path.display())]
+    Log {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the operating system said.
+        cause: String,
+    },
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] ipc::IpcError),

@@ -11,6 +11,7 @@
 
 mod driver;
 mod error;
+mod log;
 mod noise;
 mod options;
 mod process;

@@ -1,5 +1,7 @@
 //! What the simulated robot is like.
 
+use std::path::PathBuf;
+
 use ipc::{Arm, MAX_JOINTS};
 
 use crate::SimError;
@@ -63,6 +65,8 @@ pub struct Options {
     pub gripper: Option<ToolOptions>,
     /// The tool changer.
     pub tool_changer: Option<ToolOptions>,
+    /// Where to write each setpoint received, as CSV.
+    pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
     pub urgency: ipc::Urgency,
 }
@@ -91,6 +95,7 @@ impl Options {
                 open: false,
                 ..ToolOptions::default()
             }),
+            log: None,
             urgency: ipc::Urgency {
                 priority: 50,
                 ..ipc::Urgency::default()

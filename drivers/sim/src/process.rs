@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use ipc::{Clock, DriverLink, now_ns, sleep_until_ns, urge};
 
+use crate::log::Log;
 use crate::{Driver, Options, SimError};
 
 /// The period without a session (ns).
@@ -35,13 +36,16 @@ pub struct Report {
 pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, SimError> {
     let urgency = options.urgency;
     let link = DriverLink::open(&options.arm)?;
+    let mut log = Log::open(options.log.as_deref())?;
     let mut driver = Driver::new(options)?;
     let mut report = Report::default();
     // While an engine paces the driver it may spin, which a real-time thread must not.
     let mut granted = None;
     while !stop.load(Ordering::Relaxed) {
         match driver.clock() {
-            Some(Clock::LockStep) => report.periods += lock_step(&link, &mut driver, stop),
+            Some(Clock::LockStep) => {
+                report.periods += lock_step(&link, &mut driver, (&mut log, stop))
+            }
             _ => {
                 if driver.clock().is_some() && granted.is_none() {
                     let given = urge(urgency);
@@ -49,7 +53,7 @@ pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, SimError> {
                     granted = Some(given);
                 }
                 report.periods += 1;
-                wall_period(&link, &mut driver);
+                wall_period(&link, &mut driver, &mut log);
             }
         }
     }
@@ -67,7 +71,7 @@ fn answer_greeting(link: &DriverLink, driver: &mut Driver) {
 }
 
 /// One period by the clock: 0.4 periods after the engine's.
-fn wall_period(link: &DriverLink, driver: &mut Driver) {
+fn wall_period(link: &DriverLink, driver: &mut Driver, log: &mut Log) {
     let period = driver.period_ns().unwrap_or(IDLE_NS);
     let phase = match driver.last_setpoint().tick_ns {
         0 => 0,
@@ -77,9 +81,13 @@ fn wall_period(link: &DriverLink, driver: &mut Driver) {
     let next = now + period - (now.wrapping_sub(phase)) % period;
     sleep_until_ns(next);
     answer_greeting(link, driver);
+    if driver.clock() == Some(Clock::LockStep) {
+        return;
+    }
     let now = now_ns();
     while let Some(setpoint) = link.next_setpoint() {
         driver.receive(&setpoint, now);
+        log.write(&setpoint, driver, now);
     }
     let state = driver.step(now, period);
     link.send(state);
@@ -87,7 +95,7 @@ fn wall_period(link: &DriverLink, driver: &mut Driver) {
 
 /// Periods as fast as the engine asks for them; time is what the setpoints say. Returns after a
 /// few thousand, or when the engine is silent.
-fn lock_step(link: &DriverLink, driver: &mut Driver, stop: &AtomicBool) -> u64 {
+fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &AtomicBool)) -> u64 {
     let Some(period) = driver.period_ns() else {
         return 0;
     };
@@ -106,6 +114,7 @@ fn lock_step(link: &DriverLink, driver: &mut Driver, stop: &AtomicBool) -> u64 {
         };
         virtual_ns = virtual_ns.max(setpoint.tick.saturating_mul(period));
         driver.receive(&setpoint, virtual_ns);
+        log.write(&setpoint, driver, virtual_ns);
         link.send(driver.step(virtual_ns, period));
         if driver.clock() != Some(Clock::LockStep) {
             return periods;

@@ -14,10 +14,6 @@ pub struct Solution<const N: usize> {
     /// Which of the arm's branches it is on (bits: shoulder or base, elbow, wrist);
     /// `None` where the arm has no closed form.
     pub branch: Option<u8>,
-    /// Distance of the tool from the goal, m.
-    pub position_error: f64,
-    /// Angle of the tool from the goal, rad.
-    pub rotation_error: f64,
 }
 
 /// The solutions of one pose, on the stack.
@@ -32,8 +28,6 @@ impl<const N: usize> Branches<N> {
         let none = Solution {
             q: SVector::zeros(),
             branch: None,
-            position_error: f64::INFINITY,
-            rotation_error: f64::INFINITY,
         };
         Self {
             items: [none; MOST_BRANCHES],

@@ -15,6 +15,73 @@ pub(crate) fn error(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     )
 }
 
+/// Every branch reproduces its pose, and the position that the pose came from is among them.
+fn all_branches<const N: usize>(name: &str, family: &str, count: u32) {
+    let solver = Solver::new(arms::chain::<N>(name));
+    assert_eq!(
+        (solver.family(), solver.is_exact()),
+        (family, true),
+        "{name}"
+    );
+    let mut random = Random(17);
+    let (mut lost, mut branches) = (0, 0);
+    for i in 0..count {
+        let q = random.joints(solver.chain());
+        let pose = solver.chain().forward(&q);
+        let found = solver.solve_all_at(&pose, solver.parameter(&q), &q);
+        for solution in &found {
+            branches += 1;
+            let (position, rotation) = solver.error(&pose, &solution.q);
+            assert!(
+                position < 1e-9 && rotation < 1e-9,
+                "{name} {i}: {position} m, {rotation} rad"
+            );
+            assert!(solver.chain().within_limits(&solution.q, 0.0), "{name} {i}");
+        }
+        lost += u32::from(!found.iter().any(|solution| (solution.q - q).amax() < 1e-6));
+    }
+    assert!(
+        f64::from(lost) <= 1e-4 * f64::from(count),
+        "{name}: {lost} of {count} lost"
+    );
+    assert!(branches > count, "{name}: only {branches} branches");
+}
+
+const CLOSED_SIX: [(&str, &str); 7] = [
+    ("ur5e", "three parallel axes"),
+    ("ur10e", "three parallel axes"),
+    ("irb120", "spherical wrist"),
+    ("irb1200_5_90", "spherical wrist"),
+    ("irb1200_7_70", "spherical wrist"),
+    ("lrmate200id", "spherical wrist"),
+    ("tx2_60", "spherical wrist"),
+];
+const CLOSED_SEVEN: [(&str, &str); 5] = [
+    ("panda", "seven joints, last given"),
+    ("fr3", "seven joints, last given"),
+    ("xarm7", "seven joints, last given"),
+    ("iiwa7", "spherical shoulder and wrist, swivel given"),
+    ("iiwa14", "spherical shoulder and wrist, swivel given"),
+];
+
+#[test]
+fn closed_forms_find_every_branch() {
+    CLOSED_SIX
+        .iter()
+        .for_each(|(name, family)| all_branches::<6>(name, family, cases()));
+    CLOSED_SEVEN
+        .iter()
+        .for_each(|(name, family)| all_branches::<7>(name, family, cases()));
+}
+
+/// Poses tried for each arm; `CANTER_POSES` asks for more.
+fn cases() -> u32 {
+    std::env::var("CANTER_POSES")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(2000)
+}
+
 fn cold<const N: usize>(name: &str, count: u32) {
     let solver = Solver::new(arms::chain::<N>(name));
     let mut random = Random(5);

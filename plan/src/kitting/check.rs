@@ -81,11 +81,26 @@ impl Checker<'_> {
 
     /// The expression must be of this type.
     pub(super) fn expect(&mut self, expression: &Expression, wanted: Type, subject: Option<Class>) {
+        self.typed(expression, wanted, subject);
+    }
+
+    /// The expression must be of this type; the type that it has.
+    pub(super) fn typed(
+        &mut self,
+        expression: &Expression,
+        wanted: Type,
+        subject: Option<Class>,
+    ) -> Type {
         let found = self.infer(expression, subject);
         if !wanted.accepts(found) {
-            let message = format!("expected {}, found {}", wanted.describe(), found.describe());
-            self.error("plan::type", message, expression.span);
+            let (wanted, found) = (wanted.describe(), found.describe());
+            self.error(
+                "plan::type",
+                format!("expected {wanted}, found {found}"),
+                expression.span,
+            );
         }
+        found
     }
 
     pub(super) fn check_sku(&mut self, id: &str, span: Span) {

@@ -265,22 +265,13 @@ impl Checker<'_> {
                 Type::Truth
             }
             _ => {
-                self.expect(left, NUMBER, subject);
-                self.expect(right, NUMBER, subject);
+                let left = self.typed(left, NUMBER, subject);
+                let right = self.typed(right, NUMBER, subject);
                 let whole = |kind| matches!(kind, Type::Number { whole: true, .. });
-                let operands = (self.quiet(left, subject), self.quiet(right, subject));
-                let whole = whole(operands.0) && whole(operands.1) && operator != Operator::Over;
+                let whole = whole(left) && whole(right) && operator != Operator::Over;
                 Type::Number { whole, least: None }
             }
         }
-    }
-
-    /// The type without new findings.
-    fn quiet(&mut self, expression: &Expression, subject: Option<Class>) -> Type {
-        let before = self.findings.len();
-        let kind = self.infer(expression, subject);
-        self.findings.truncate(before);
-        kind
     }
 
     fn infer_equality(&mut self, left: &Expression, right: &Expression, subject: Option<Class>) {

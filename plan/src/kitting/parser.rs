@@ -7,6 +7,9 @@ use crate::finding::Finding;
 /// Deepest nesting of expressions and statements.
 pub(super) const DEEPEST: usize = 100;
 
+/// Most operators and property steps in one statement or field.
+const MOST_OPERATORS: usize = 300;
+
 /// Something was found that does not fit; a finding was made.
 pub(super) struct Misfit;
 
@@ -19,6 +22,8 @@ pub(super) struct Parser {
     pub(super) at: usize,
     pub(super) findings: Vec<Finding>,
     pub(super) depth: usize,
+    /// Operators and property steps of the statement or field so far.
+    pub(super) operators: usize,
     /// In the condition of a requirement, `=` means `==`.
     pub(super) in_condition: bool,
 }
@@ -165,6 +170,15 @@ impl Parser {
         result
     }
 
+    fn count_operator(&mut self, span: Span) -> Read<()> {
+        self.operators += 1;
+        if self.operators > MOST_OPERATORS {
+            let message = format!("more than {MOST_OPERATORS} operators");
+            return self.fail("plan::depth", message, span);
+        }
+        Ok(())
+    }
+
     pub(super) fn expression(&mut self) -> Read<Expression> {
         self.deeper(|parser| parser.binary(1))
     }
@@ -173,6 +187,7 @@ impl Parser {
     fn binary(&mut self, weakest: u8) -> Read<Expression> {
         let mut left = self.unary()?;
         while let Some((operator, strength)) = self.operator(weakest) {
+            self.count_operator(self.span())?;
             self.at += 1;
             let right = self.deeper(|parser| parser.binary(strength + 1))?;
             let span = left.span.to(right.span);
@@ -221,17 +236,9 @@ impl Parser {
 
     fn postfix(&mut self) -> Read<Expression> {
         let mut value = self.primary()?;
-        let mut length = 0;
         while self.take_symbol(".") {
             let property = self.ident("the name of a property")?;
-            length += 1;
-            if length > DEEPEST {
-                return self.fail(
-                    "plan::depth",
-                    "property path too long".into(),
-                    property.span,
-                );
-            }
+            self.count_operator(property.span)?;
             let span = value.span.to(property.span);
             value = Expression {
                 term: Term::Property(Box::new(value), property.text),

@@ -37,6 +37,7 @@ pub fn read(source: &str) -> Reading {
         at: 0,
         findings,
         depth: 0,
+        operators: 0,
         in_condition: false,
     };
     let mut plan = Plan::default();
@@ -228,6 +229,7 @@ impl Parser {
     }
 
     fn item_field(&mut self, item: &mut Item) -> Read<()> {
+        self.operators = 0;
         let is_where = self.is_ident("where");
         let is_field = matches!(self.peek().kind, Kind::Ident(_))
             && matches!(self.peek_at(1).kind, Kind::Symbol("="));

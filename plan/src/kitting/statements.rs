@@ -73,6 +73,7 @@ impl Parser {
 
     /// One statement; `label` is the label above it in the outline layout.
     fn statement(&mut self, label: Option<&[u32]>) -> Read<Statement> {
+        self.operators = 0;
         let start = self.span();
         let name = self.ident("a statement")?;
         let action = self.deeper(|parser| parser.action(&name, label))?;

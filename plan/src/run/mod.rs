@@ -24,5 +24,6 @@ pub use machine::{Act, Counters, Outcome, State, Step};
 pub use motion::{Motion, MotionFailure, Situation};
 pub use program::Program;
 pub use robot::RobotOptions;
+pub(crate) use robot::{Robot, situation};
 pub use simulated::SimulatedMotion;
 pub use value::{PoseValue, Value};

@@ -51,7 +51,8 @@ fn ready(count: usize, pairs: &[(usize, usize)], order: &[usize]) -> Vec<usize> 
 /// Follows branches in thought and takes the order that is over first.
 ///
 /// The search goes depth first with the written order as the first bound, so that the result is
-/// never slower than the written order, by the same prediction. Lists inside the members are
+/// never slower than the written order, by the same prediction; the motion that follows the list
+/// counts, because it begins where the list ends. Lists inside the members are
 /// followed in their written order.
 pub(crate) struct Foresight<'a> {
     pub(crate) motion: &'a mut dyn Motion,
@@ -61,6 +62,8 @@ pub(crate) struct Foresight<'a> {
 
 struct Search<'p> {
     program: &'p Program,
+    /// What goes on after the list.
+    rest: Vec<Frame>,
     list: &'p [usize],
     pairs: &'p [(usize, usize)],
     /// Members of an order: all, or one of a DoOne.
@@ -87,6 +90,11 @@ impl Chooser for Foresight<'_> {
             return (first, 0.0);
         }
         let mut search = Search {
+            rest: {
+                let mut rest = state.stack.clone();
+                rest.pop();
+                rest
+            },
             program,
             list,
             pairs,
@@ -100,7 +108,10 @@ impl Chooser for Foresight<'_> {
                 self.follow(program, list[*member], time, &state, &model)
             });
         }
-        let slowest = at.map(|(time, _, _)| time);
+        // The members' own frame is done when they are: the rest of the plan goes on below it.
+        let rest = search.rest.clone();
+        let slowest =
+            at.map(|(time, state, model)| time + self.tail(program, &rest, &state, &model));
         search.best = slowest.map(|time| (time, first.clone()));
         self.search(&mut search, &mut Vec::new(), (0.0, state, model));
         match (search.best, slowest) {
@@ -119,6 +130,7 @@ impl Foresight<'_> {
         (time, state, model): (f64, &State, &Model),
     ) {
         if order.len() == search.length {
+            let time = time + self.tail(search.program, &search.rest, state, model);
             if search
                 .best
                 .as_ref()
@@ -149,6 +161,40 @@ impl Foresight<'_> {
             self.search(search, order, (later, &state, &model));
             order.pop();
         }
+    }
+
+    /// Time of the next motion after the list (s): it begins where the list ended.
+    fn tail(&mut self, program: &Program, rest: &[Frame], state: &State, model: &Model) -> f64 {
+        let mut state = State {
+            stack: rest.to_vec(),
+            ..state.clone()
+        };
+        let mut model = model.clone();
+        for _ in 0..MOST_STATEMENTS {
+            let machine = Machine {
+                program,
+                model: &model,
+                options: self.options,
+            };
+            let Ok(step) = machine.step(&state, &mut Written) else {
+                return 0.0;
+            };
+            match step.act {
+                Act::Nothing => {}
+                Act::Motion(batch) => {
+                    let Ok(start) = situation(&model) else {
+                        return 0.0;
+                    };
+                    return self.motion.predict(&start, &batch).unwrap_or(0.0);
+                }
+                _ => return 0.0,
+            }
+            state = step.state;
+            if model.apply_all(&step.changes).is_err() {
+                return 0.0;
+            }
+        }
+        0.0
     }
 
     /// Executes a node in thought; none when it fails or ends the plan.

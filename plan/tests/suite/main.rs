@@ -1,7 +1,12 @@
 //! Tests of plans and the world model, one binary.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod bad_plans;
 mod fixtures;
+mod fuzz;
+mod killed;
+mod ordering;
+mod pddl;
 mod reading;
 mod running;
 mod world;

@@ -36,7 +36,10 @@ impl Trial {
             source: source.to_owned(),
             world: import_toml(&repository_text(world)).unwrap(),
             kits,
-            motion: SimulatedMotion { reach: Some(0.85), ..SimulatedMotion::default() },
+            motion: SimulatedMotion {
+                reach: Some(0.85),
+                ..SimulatedMotion::default()
+            },
             options: RunOptions::default(),
             adjust: |_| {},
         }
@@ -73,10 +76,16 @@ impl Trial {
         let mut controller =
             Controller::start(cell, &self.source, &given, &stock, self.options).unwrap();
         let mut events = Vec::new();
-        let report = controller.run(&mut |event| events.push(event.clone())).unwrap();
+        let report = controller
+            .run(&mut |event| events.push(event.clone()))
+            .unwrap();
         drop(controller);
         let world = read_world(&path);
-        Result { report, world, events }
+        Result {
+            report,
+            world,
+            events,
+        }
     }
 }
 
@@ -86,8 +95,10 @@ pub(crate) fn read_world(path: &Path) -> Model {
 
 /// No error in the world.
 pub(crate) fn assert_consistent(world: &Model) {
-    let errors: Vec<_> =
-        check(world).into_iter().filter(|c| c.severity == Severity::Error).collect();
+    let errors: Vec<_> = check(world)
+        .into_iter()
+        .filter(|c| c.severity == Severity::Error)
+        .collect();
     assert!(errors.is_empty(), "{errors:#?}");
 }
 
@@ -102,7 +113,10 @@ pub(crate) fn assert_kits(world: &Model, kits: usize) {
     for kit in found {
         let holder = world.object(kit.location.reference).unwrap();
         assert_eq!(holder.class, Class::LargeContainer);
-        let mut parts: Vec<_> = world.children(kit.id).filter(|c| c.class == Class::Part).collect();
+        let mut parts: Vec<_> = world
+            .children(kit.id)
+            .filter(|c| c.class == Class::Part)
+            .collect();
         assert_eq!(parts.len(), design.parts.len());
         for wanted in &design.parts {
             let near = parts.iter().position(|part| {
@@ -122,19 +136,34 @@ fn effectors(events: &[Event]) -> Vec<&str> {
         _ => None,
     };
     let names: Vec<String> = events.iter().filter_map(name).collect();
-    names.iter().map(|n| if n == "TrayGripper" { "tray" } else { "part" }).collect()
+    names
+        .iter()
+        .map(|n| if n == "TrayGripper" { "tray" } else { "part" })
+        .collect()
 }
 
 fn assert_three_kits(result: &Result) {
-    let Result { report, world, events } = result;
+    let Result {
+        report,
+        world,
+        events,
+    } = result;
     assert_eq!((report.outcome, report.code), ("stopped", 0), "{report:#?}");
     let counters = &report.counters;
     assert_eq!(
-        (counters.pick_ups, counters.put_downs, counters.moves_above, counters.kits),
+        (
+            counters.pick_ups,
+            counters.put_downs,
+            counters.moves_above,
+            counters.kits
+        ),
         (18, 18, 36, 3)
     );
     // The tray gripper that brought a kit to its box takes the next tray.
-    assert_eq!(effectors(events), ["tray", "part", "tray", "part", "tray", "part", "tray"]);
+    assert_eq!(
+        effectors(events),
+        ["tray", "part", "tray", "part", "tray", "part", "tray"]
+    );
     assert_kits(world, 3);
     assert_consistent(world);
     let full = world.named("BoxOfKits").unwrap().id;
@@ -144,10 +173,18 @@ fn assert_three_kits(result: &Result) {
 /// The document's plan as it stands makes three kits.
 #[test]
 fn the_document_makes_three_kits() {
-    let Some(trial) = Trial::document(3) else { return };
+    let Some(trial) = Trial::document(3) else {
+        return;
+    };
     let result = trial.run();
     assert_three_kits(&result);
-    assert!(result.report.warnings.iter().any(|warning| warning.contains("on top of what is in")));
+    assert!(
+        result
+            .report
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("on top of what is in"))
+    );
 }
 
 /// Our own plan does the same in our own workstation.
@@ -155,4 +192,161 @@ fn the_document_makes_three_kits() {
 fn our_plan_makes_three_kits() {
     let result = Trial::own(3).run();
     assert_three_kits(&result);
+}
+
+fn document_or_own(kits: usize) -> Vec<Trial> {
+    Trial::document(kits)
+        .into_iter()
+        .chain([Trial::own(kits)])
+        .collect()
+}
+
+/// Twelve kits fill a box; supplies run empty on the way and come again in both ways.
+#[test]
+fn supplies_are_refilled_and_a_box_fills() {
+    for trial in document_or_own(12) {
+        let Result {
+            report,
+            world,
+            events,
+        } = trial.run();
+        assert_eq!(report.outcome, "stopped", "{report:#?}");
+        assert_eq!(report.counters.kits, 12);
+        let count = |wanted: &str| {
+            let is =
+                |event: &&Event| matches!(event, Event::Statement { name, .. } if *name == wanted);
+            events.iter().filter(is).count()
+        };
+        // 24 PartA out of trays of 8, 12 of each other out of trays of 6.
+        assert_eq!(count("DestroyInstance"), 2);
+        assert_eq!((count("FactotumRemove"), count("FactotumRefill")), (2, 2));
+        assert_eq!(count("FactotumReplace"), 2);
+        let full = world.named("BoxOfKits").unwrap().id;
+        assert_eq!(world.count(full, "kitABC", 1), 12);
+        assert_kits(&world, 12);
+        assert_consistent(&world);
+    }
+}
+
+/// The thirteenth kit needs another box for kits and another box of trays.
+#[test]
+fn full_and_empty_boxes_are_replaced() {
+    for trial in document_or_own(13) {
+        let Result { report, world, .. } = trial.run();
+        assert_eq!(
+            (report.outcome, report.counters.kits),
+            ("stopped", 13),
+            "{report:#?}"
+        );
+        assert_kits(&world, 1);
+        assert_consistent(&world);
+        let boxes = world
+            .objects()
+            .filter(|o| o.class == Class::LargeContainer)
+            .count();
+        assert_eq!(boxes, 2, "boxes are replaced, not added");
+        let trays = world.objects().filter(|o| {
+            o.class == Class::KitTray
+                && world.object(o.location.reference).unwrap().class == Class::LargeContainer
+        });
+        assert_eq!(trays.count(), 11);
+    }
+}
+
+/// A factotum that brings an empty tray makes the plan give up; one that brings nothing ends it.
+#[test]
+fn failed_refills_end_the_plan_with_a_positive_reason() {
+    let names = ["partASupplyRequirement", "supply of A"];
+    for mut trial in document_or_own(6) {
+        trial.adjust = |factotum| {
+            ["partASupplyRequirement", "supply of A"].map(|name| factotum.stock.empty(name));
+        };
+        let Result { report, world, .. } = trial.run();
+        assert_eq!((report.outcome, report.code), ("failed", 1), "{report:#?}");
+        assert!(report.reason.unwrap().contains("Quit"));
+        assert_eq!(report.counters.kits, 4);
+        assert_consistent(&world);
+    }
+    for mut trial in document_or_own(6) {
+        trial.adjust = |factotum| {
+            factotum.limits = ["partASupplyRequirement", "supply of A"]
+                .map(|n| (n.to_owned(), 0))
+                .into();
+        };
+        let Result { report, world, .. } = trial.run();
+        assert_eq!((report.outcome, report.code), ("failed", 4), "{report:#?}");
+        let reason = report.reason.unwrap();
+        assert!(names.iter().any(|name| reason.contains(name)), "{reason}");
+        assert_consistent(&world);
+    }
+}
+
+/// A motion that fails changes nothing in the world: every command of the first kit, one by one.
+#[test]
+fn no_change_without_its_motion() {
+    let whole = Trial::own(1).run().report.counters.commands;
+    for at in 4..whole {
+        let mut trial = Trial::own(1);
+        trial.motion.failures = vec![at];
+        let Result {
+            report,
+            world,
+            events,
+        } = trial.run();
+        assert_eq!(
+            (report.outcome, report.code),
+            ("failed", 3),
+            "command {at}: {report:#?}"
+        );
+        assert_consistent(&world);
+        let put_downs = events
+            .iter()
+            .filter(|e| {
+                matches!(
+                    e,
+                    Event::Statement {
+                        name: "RobotPutDown",
+                        ..
+                    }
+                )
+            })
+            .count();
+        let in_kit = world
+            .objects()
+            .filter(|o| {
+                o.class == Class::Part
+                    && world.object(o.location.reference).unwrap().class == Class::KitInstance
+            })
+            .count();
+        assert_eq!(in_kit, put_downs.saturating_sub(1).min(4), "command {at}");
+    }
+}
+
+/// With repair, the same failures cost time and nothing else.
+#[test]
+fn failures_are_repaired() {
+    let good = Trial::own(1).run();
+    for at in [10, 25, 40, 60] {
+        let mut trial = Trial::own(1);
+        trial.motion.failures = vec![at];
+        trial.options.policy = Policy::Repair { attempts: 1 };
+        let Result {
+            report,
+            world,
+            events,
+        } = trial.run();
+        assert_eq!(
+            (report.outcome, report.counters.kits),
+            ("stopped", 1),
+            "{report:#?}"
+        );
+        assert_eq!(
+            events
+                .iter()
+                .filter(|e| matches!(e, Event::Retry(_)))
+                .count(),
+            1
+        );
+        crate::world::assert_same(&good.world, &world);
+    }
 }

@@ -13,15 +13,21 @@
 //! changes no geometry.
 
 mod certificate;
+mod choose;
 mod exact_stop;
+mod measure;
 mod options;
 mod pass;
 mod plan;
 mod poly;
 mod ramp;
 mod span;
+mod spline;
+mod windows;
 
 pub use certificate::{Certificate, Peak};
+pub use measure::{Measure, measure};
 pub use options::{SmoothError, SmoothOptions};
 pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};
+pub use windows::Windows;

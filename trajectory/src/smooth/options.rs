@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::ToolLimits;
 
 /// Lever arm (m) that turns a length tolerance into the default angular one.
-const LEVER: f64 = 0.1;
+const LEVER: f64 = 0.05;
 
 /// Greatest default angular tolerance, rad.
 const WIDEST_ANGLE: f64 = 0.2;
@@ -21,7 +21,7 @@ const WIDEST_ANGLE: f64 = 0.2;
 /// };
 /// let options = SmoothOptions::new(0.001, limits);
 /// assert_eq!(options.corridor(), 0.001);
-/// assert!((options.angular_tolerance() - 0.01).abs() < 1e-15);
+/// assert!((options.angular_tolerance() - 0.02).abs() < 1e-15);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -35,11 +35,11 @@ pub struct SmoothOptions {
     pub corridor: Option<f64>,
     /// Greatest angle to the orientation of an intermediate pose at its
     /// closest approach, rad; `None` means the angle whose arc at a lever of
-    /// 0.1 m is the tolerance, at most 0.2 rad.
+    /// 0.05 m is the tolerance, at most 0.2 rad.
     pub angular_tolerance: Option<f64>,
     /// Limits of the controlled point; infinity means no limit.
     pub limits: ToolLimits,
-    /// Poses planned at once in a long list; 2 at least.
+    /// Poses planned at once in a long list, at least as many as braking needs.
     pub window: usize,
 }
 

@@ -2,11 +2,12 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::certificate::{self, Certificate};
-use super::exact_stop;
+use super::certificate::Certificate;
+use super::choose::Motion;
 use super::options::{SmoothError, SmoothOptions};
 use super::pass::Pass;
 use super::span::Span;
+use super::windows::Windows;
 use crate::{ToolCurve, ToolPoint};
 
 /// How a motion, or a part of it, was made.
@@ -17,6 +18,8 @@ pub enum Method {
     Still,
     /// Straight legs with a stop at each pose.
     ExactStop,
+    /// The time-optimal spline.
+    Spline,
 }
 
 /// A certified motion through a list of poses, as a curve of time.
@@ -31,11 +34,30 @@ pub struct SmoothPlan {
     spans: Vec<Span>,
     passes: Vec<Pass>,
     certificate: Certificate,
-    method: Method,
+    parts: Vec<(Method, usize)>,
     exact_stop: f64,
 }
 
 impl SmoothPlan {
+    /// A motion through `poses` with its certificate and passes.
+    pub(crate) fn new(
+        poses: &[Isometry3<f64>],
+        motion: Motion,
+        (certificate, passes): (Certificate, Vec<Pass>),
+        exact_stop: f64,
+    ) -> Self {
+        let (start, goal) = (poses[0], poses[poses.len() - 1]);
+        Self {
+            start,
+            goal,
+            spans: motion.spans,
+            passes,
+            certificate,
+            parts: motion.parts,
+            exact_stop,
+        }
+    }
+
     /// Time of the whole motion, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
@@ -54,10 +76,27 @@ impl SmoothPlan {
         &self.certificate
     }
 
-    /// How the motion was made.
+    /// How the motion was made: the time-optimal spline, when every part was.
     #[must_use]
     pub fn method(&self) -> Method {
-        self.method
+        let stops = self.parts.iter().find(|part| part.0 != Method::Spline);
+        match (self.parts.is_empty(), stops) {
+            (true, _) => Method::Still,
+            (false, Some(stop)) => stop.0,
+            (false, None) => Method::Spline,
+        }
+    }
+
+    /// Parts of the motion that are not the time-optimal spline, though they
+    /// have poses to pass.
+    #[must_use]
+    pub fn fallbacks(&self) -> usize {
+        let stops = self
+            .parts
+            .iter()
+            .filter(|part| part.0 != Method::Spline)
+            .count();
+        if self.passes.is_empty() { 0 } else { stops }
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -125,26 +164,7 @@ impl ToolCurve for SmoothPlan {
 /// # Ok::<(), smooth::SmoothError>(())
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
-    options.check(poses)?;
-    let options = &options.finite();
-    let spans = exact_stop::plan(poses, &options.limits);
-    let (certificate, passes) = certificate::certify(&spans, poses, options);
-    let method = if spans.is_empty() {
-        Method::Still
-    } else {
-        Method::ExactStop
-    };
-    let exact_stop = spans.last().map_or(0.0, Span::end);
-    let (start, goal) = (poses[0], poses[poses.len() - 1]);
-    Ok(SmoothPlan {
-        start,
-        goal,
-        spans,
-        passes,
-        certificate,
-        method,
-        exact_stop,
-    })
+    Ok(Windows::new(poses, options)?.finish())
 }
 
 #[cfg(test)]

@@ -1,0 +1,196 @@
+//! Lists that leave the order open.
+
+use plan::run::{Event, SimulatedMotion};
+use plan::world::{Change, Location};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, RngSeed, TestRng, TestRunner};
+
+use crate::running::Trial;
+
+fn config(cases: u32) -> Config {
+    Config {
+        cases,
+        rng_seed: RngSeed::Fixed(20_261_121),
+        failure_persistence: None,
+        ..Config::default()
+    }
+}
+
+/// On 100 random layouts the chosen order is never slower than the written one.
+#[test]
+fn chosen_orders_are_never_slower() {
+    let mut rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let mut random = move || f64::from(rng.next_u32()) / f64::from(u32::MAX);
+    let (mut written_s, mut chosen_s, mut better) = (0.0, 0.0, 0);
+    for layout in 0..100 {
+        let mut world = Trial::own(1).world;
+        // The three supplies in any order along the table, each pushed about a little; the kit's
+        // box and the trays stay.
+        let mut places = [-0.21, 0.0, 0.21];
+        for last in (1..3).rev() {
+            places.swap(last, (random() * (last + 1) as f64) as usize % (last + 1));
+        }
+        for (name, y) in ["SupplyA", "SupplyB", "SupplyC"].into_iter().zip(places) {
+            let supply = world.named(name).unwrap();
+            let mut pose = supply.location.pose;
+            pose.translation.x += 0.06 * (random() - 0.5);
+            pose.translation.y = y + 0.04 * (random() - 0.5);
+            let location = Location {
+                pose,
+                ..supply.location
+            };
+            let object = supply.id;
+            world.apply(&Change::Place { object, location }).unwrap();
+        }
+        let run = |choose: bool| {
+            let mut trial = Trial::own(1);
+            trial.world = world.clone();
+            trial.options.choose_order = choose;
+            let report = trial.run().report;
+            assert_eq!(report.outcome, "stopped", "{report:#?}");
+            report.counters
+        };
+        let (written, chosen) = (run(false), run(true));
+        assert!(
+            chosen.motion_s <= written.motion_s + 1e-9,
+            "layout {layout}: {} > {}",
+            chosen.motion_s,
+            written.motion_s
+        );
+        assert!((written.motion_s - chosen.motion_s - chosen.gained_s).abs() < 1e-6);
+        written_s += written.motion_s;
+        chosen_s += chosen.motion_s;
+        better += usize::from(chosen.gained_s > 1e-6);
+    }
+    println!(
+        "100 layouts: {:.2} s a kit as written, {:.2} s as chosen ({:.2} % less), better in {better}",
+        written_s / 100.0,
+        chosen_s / 100.0,
+        100.0 * (1.0 - chosen_s / written_s)
+    );
+    assert!(better > 0);
+}
+
+/// A plan of moves above random places, as entries with preconditions.
+fn precondition_plan(poses: &[(f64, f64)], edges: &[(usize, usize)]) -> String {
+    let mut text = String::from(
+        "About PlanId = \"p\" PlanWorkstation = \"workstation1\" TargetSKU = \"kitABC\"\n\
+         PlanParameters item name = \"NumberOfKitsToMake\" type = \"positiveInteger\" end\n\
+         ToDo\nStart()\nDoInPreconditionOrder begin\n",
+    );
+    for (index, (x, y)) in poses.iter().enumerate() {
+        let before: Vec<String> = edges
+            .iter()
+            .filter(|(_, to)| *to == index)
+            .map(|(from, _)| from.to_string())
+            .collect();
+        text.push_str(&format!(
+            "({index} ({}) RobotMoveAbove(Pose(Point({x:.1}, {y:.1}, 0), RollPitchYaw(0, 0, 0), ROBOT)))\n",
+            before.join(" ")
+        ));
+    }
+    text.push_str("end\nStop()\n");
+    text
+}
+
+/// The lines of the executed moves, in the order of their execution.
+fn executed(events: &[Event], first_line: usize) -> Vec<usize> {
+    let line = |event: &Event| match event {
+        Event::Statement {
+            name: "RobotMoveAbove",
+            line,
+            ..
+        } => Some(*line - first_line),
+        _ => None,
+    };
+    events.iter().filter_map(line).collect()
+}
+
+/// Every executed order has each entry after all that come before it, and every entry once.
+#[test]
+fn orders_respect_preconditions() {
+    let strategy = (2..6_usize).prop_flat_map(|count| {
+        let poses = prop::collection::vec((250.0..600.0_f64, -400.0..400.0_f64), count);
+        let edges = prop::collection::vec(any::<bool>(), count * (count - 1) / 2);
+        let names = Just((0..count).collect::<Vec<_>>()).prop_shuffle();
+        (poses, edges, names)
+    });
+    let mut runner = TestRunner::new(config(40));
+    let test = |(poses, chosen, names): (Vec<(f64, f64)>, Vec<bool>, Vec<usize>)| {
+        // Edges go along a random order of the entries, so there is no cycle.
+        let pairs = (0..poses.len()).flat_map(|a| (0..a).map(move |b| (b, a)));
+        let edges: Vec<(usize, usize)> = pairs
+            .zip(&chosen)
+            .filter(|(_, chosen)| **chosen)
+            .map(|((a, b), _)| (names[a], names[b]))
+            .collect();
+        let source = precondition_plan(&poses, &edges);
+        let mut trial = Trial::new(&source, "examples/kitting/workstation.toml", 1);
+        trial.motion = SimulatedMotion::default();
+        let result = trial.run();
+        prop_assert_eq!(result.report.outcome, "stopped");
+        let order = executed(&result.events, 6);
+        prop_assert_eq!(order.len(), poses.len());
+        for (before, after) in edges {
+            let position = |wanted: usize| order.iter().position(|index| *index == wanted).unwrap();
+            prop_assert!(
+                position(before) < position(after),
+                "{:?} {:?}",
+                order,
+                source
+            );
+        }
+        Ok(())
+    };
+    runner.run(&strategy, test).unwrap();
+}
+
+/// Members of an any-order list that share a variable keep their written order.
+#[test]
+fn orders_respect_conflicts() {
+    let strategy = prop::collection::vec(
+        (
+            (250.0..600.0_f64, -400.0..400.0_f64),
+            0..3_usize,
+            0..4_usize,
+        ),
+        2..5,
+    );
+    let mut runner = TestRunner::new(config(40));
+    let test = |members: Vec<((f64, f64), usize, usize)>| {
+        let mut source = String::from(
+            "About PlanId = \"p\" PlanWorkstation = \"workstation1\" TargetSKU = \"kitABC\"\n\
+             PlanParameters item name = \"NumberOfKitsToMake\" type = \"positiveInteger\" end\n\
+             InternalVariables item name = \"v0\" type = \"integer\" initialValue = 0 end\n\
+             item name = \"v1\" type = \"integer\" initialValue = 0 end\n\
+             item name = \"v2\" type = \"integer\" initialValue = 0 end\n\
+             ToDo Start() DoInAnyOrder begin\n",
+        );
+        // Each member reads one variable and writes another (3 stands for none).
+        for ((x, y), writes, reads) in &members {
+            let read = if *reads < 3 {
+                format!("v{reads}")
+            } else {
+                "0".into()
+            };
+            source.push_str(&format!(
+                "DoInGivenOrder begin Set(v{writes}, {read} + 1) RobotMoveAbove(Pose(Point({x:.1}, {y:.1}, 0), RollPitchYaw(0, 0, 0), ROBOT)) end\n"
+            ));
+        }
+        source.push_str("end Stop()\n");
+        let mut trial = Trial::new(&source, "examples/kitting/workstation.toml", 1);
+        trial.motion = SimulatedMotion::default();
+        let order = executed(&trial.run().events, 7);
+        prop_assert_eq!(order.len(), members.len());
+        for (second, (_, writes, reads)) in members.iter().enumerate() {
+            for (first, (_, wrote, read)) in members.iter().enumerate().take(second) {
+                if writes == read || wrote == reads {
+                    let position = |wanted: usize| order.iter().position(|i| *i == wanted).unwrap();
+                    prop_assert!(position(first) < position(second), "{:?} {}", order, source);
+                }
+            }
+        }
+        Ok(())
+    };
+    runner.run(&strategy, test).unwrap();
+}

@@ -1,0 +1,294 @@
+//! PDDL plans: simulated and executed.
+
+use std::path::Path;
+
+use plan::interp::{Code, CommandSink, PddlInterpreter, PlanInterpreter, PulledReport, pull};
+use plan::pddl::{ActionTable, Failure, read_domain, read_plan, read_problem, simulate};
+use plan::run::{RobotOptions, SimulatedMotion};
+use plan::world::{Class, Durability, Model, Writer, import_toml};
+
+use crate::fixtures::{repository_text, shared, shared_text};
+use crate::running::{assert_consistent, read_world};
+
+fn run(domain: &str, problem: &str, plan: &str) -> Option<Result<usize, Failure>> {
+    let text = |path: &str| shared_text(&format!("data/nist/pddl/{path}"));
+    let domain = read_domain(&text(domain)?).unwrap();
+    let problem = read_problem(&text(problem)?).unwrap();
+    let plan = read_plan(&text(plan)?).unwrap();
+    Some(simulate(&domain, &problem, &plan))
+}
+
+/// Plans that reach their goal.
+#[test]
+fn good_plans_reach_their_goal() {
+    let g1 = "g1-2012-06";
+    let (problem, plan) = (
+        format!("{g1}/kitting-problem.pddl"),
+        format!("{g1}/kitting-plan.txt"),
+    );
+    for number in 0..2 {
+        let domain = format!("{g1}/kitting-domain_{number}.pddl");
+        let Some(result) = run(&domain, &problem, &plan) else {
+            return;
+        };
+        assert_eq!(result, Ok(18), "{domain}");
+    }
+    let old = "g2g3-2013-2014/a2b1c1/old";
+    let result = run(
+        &format!("{old}/kitting-domain.pddl"),
+        &format!("{old}/kitting-problem_a2b1c1.pddl"),
+        &format!("{old}/plan_a2b1c1.txt"),
+    );
+    assert_eq!(result, Some(Ok(18)));
+    let g3 = "g2g3-2013-2014";
+    let result = run(
+        &format!("{g3}/domain-kitting.pddl"),
+        &format!("{g3}/a2b1c1/problem-a2b1c1.pddl"),
+        &format!("{g3}/a2b1c1/pddlplan_a2b1c1.txt"),
+    );
+    assert_eq!(result, Some(Ok(21)));
+}
+
+/// Plans that do not fit their domain or problem fail at the step they should.
+#[test]
+fn bad_plans_fail_where_they_should() {
+    let (g1, g3) = ("g1-2012-06", "g2g3-2013-2014");
+    let cases = [
+        (
+            format!("{g1}/kitting-domain_2.pddl"),
+            format!("{g1}/kitting-problem.pddl"),
+            format!("{g1}/kitting-plan.txt"),
+        ),
+        (
+            format!("{g1}/kitting-domain_3.pddl"),
+            format!("{g1}/kitting-problem.pddl"),
+            format!("{g1}/kitting-plan.txt"),
+        ),
+        (
+            format!("{g3}/domain-kitting.pddl"),
+            format!("{g3}/a2b1c1/problem-a2b1c1.pddl"),
+            format!("{g3}/a2b1c1/plan_a2b1c1.txt"),
+        ),
+        (
+            format!("{g3}/domain-fluents.pddl"),
+            format!("{g3}/a2b1c1/problem-fluents-a2b1c1.pddl"),
+            format!("{g3}/a2b1c1/plan_a2b1c1.txt.1"),
+        ),
+        (
+            "aprs/domain-mini-demo.pddl".into(),
+            "aprs/problem-mini-demo.pddl".into(),
+            "aprs/minidemo_pddl_actions.txt".into(),
+        ),
+    ];
+    let mut messages = String::new();
+    for (domain, problem, plan) in cases {
+        let Some(result) = run(&domain, &problem, &plan) else {
+            return;
+        };
+        let failure = result.unwrap_err();
+        messages.push_str(&format!("{plan} in {domain}: {failure}\n"));
+    }
+    expect_test::expect![[r#"
+        g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_2.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
+        g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_3.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
+        g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt in g2g3-2013-2014/domain-kitting.pddl: step 1, (attach-endeffector robot_1 tray_gripper tray_gripper_holder changing_station_1): the precondition (endeffectorholder-has-endeffector tray_gripper_holder tray_gripper) is false
+        g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt.1 in g2g3-2013-2014/domain-fluents.pddl: step 8, (take-part robot_1 part_c_1 part_c_tray part_gripper work_table_1 kit_a2b1c1): take-part takes 4 objects, not 6
+        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): (grasp-set-flag) has no value
+    "#]].assert_eq(&messages);
+}
+
+/// Executes a plan file with a simulated arm in the example workstation for PDDL plans.
+fn execute(plan: &Path, table: &ActionTable) -> (PulledReport, Model) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.db");
+    let mut writer = Writer::open(&path, Durability::Process).unwrap();
+    let world = repository_text("examples/kitting/workstation-pddl.toml");
+    writer.replace(&import_toml(&world).unwrap()).unwrap();
+    let mut interpreter = PddlInterpreter::new(&path, table.clone(), RobotOptions::default());
+    let mut motion = SimulatedMotion {
+        reach: Some(0.85),
+        ..SimulatedMotion::default()
+    };
+    let plan = (plan.to_str().unwrap(), "PDDL");
+    let report = pull(
+        &mut interpreter,
+        plan,
+        &mut writer,
+        &mut motion,
+        &mut |_| {},
+    )
+    .unwrap();
+    (report, read_world(&path))
+}
+
+fn assert_one_kit(world: &Model) {
+    assert_consistent(world);
+    let kit = world.named("kit_1").unwrap();
+    let box_ = world.object(kit.location.reference).unwrap();
+    assert_eq!(box_.name, "finished_kit_receiver");
+    let design = world.design("kit_design_a2b1c1").unwrap();
+    let parts: Vec<_> = world
+        .children(kit.id)
+        .filter(|c| c.class == Class::Part)
+        .collect();
+    assert_eq!(parts.len(), 4);
+    for part in parts {
+        let at = |wanted: &plan::world::DesignPart| {
+            let difference = part.location.pose.inv_mul(&wanted.pose);
+            Some(wanted.sku.as_str()) == part.sku()
+                && difference.translation.vector.norm() < 1e-6
+                && difference.rotation.angle() < 1e-6
+        };
+        assert!(
+            design.parts.iter().any(at),
+            "{} is not at a place of the design",
+            part.name
+        );
+    }
+}
+
+/// The plan of June 2012 and our own make a kit with a simulated arm.
+#[test]
+fn pddl_plans_make_a_kit() {
+    let table = ActionTable::own().unwrap();
+    let mut plans =
+        vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/kitting/one-kit.pddl")];
+    plans.extend(shared().map(|s| s.join("data/nist/pddl/g1-2012-06/kitting-plan.txt")));
+    for plan in plans {
+        let (report, world) = execute(&plan, &table);
+        assert_eq!(
+            (report.outcome, report.code, report.steps),
+            ("stopped", 0, 18),
+            "{report:?}"
+        );
+        assert_one_kit(&world);
+    }
+}
+
+/// A user's table adds an action.
+#[test]
+fn a_table_adds_an_action() {
+    let table = ActionTable::own().unwrap();
+    let more = r#"
+        [[action]]
+        names = ["greet"]
+        arguments = ["robot"]
+        do = [{ message = "hello {robot}" }, { dwell = 0.5 }]
+    "#;
+    let table = table.with(more).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("plan");
+    std::fs::write(&plan, "(greet robot_1)\n0.5: (GREET robot_1) [0.5]\n").unwrap();
+    let (report, _) = execute(&plan, &table);
+    assert_eq!(
+        (report.outcome, report.steps, report.commands),
+        ("stopped", 2, 8),
+        "{report:?}"
+    );
+    assert!(report.motion_s >= 1.0);
+    let wrong = more.replace("{ dwell = 0.5 }", "{ pick_up = \"part\" }");
+    let error = table.with(&wrong).unwrap_err().to_string();
+    assert!(error.contains("no argument is called part"), "{error}");
+}
+
+/// The codes of the five functions.
+#[test]
+fn the_interface_keeps_its_life_cycle() {
+    struct Full;
+    impl CommandSink for Full {
+        fn command(&mut self, _: crcl::Command) -> bool {
+            false
+        }
+    }
+    #[derive(Default)]
+    struct Lines(Vec<String>);
+    impl CommandSink for Lines {
+        fn command(&mut self, command: crcl::Command) -> bool {
+            self.0.push(crcl::text::write_command(&command));
+            true
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.db");
+    let mut writer = Writer::open(&path, Durability::Process).unwrap();
+    let world = repository_text("examples/kitting/workstation-pddl.toml");
+    writer.replace(&import_toml(&world).unwrap()).unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let table = ActionTable::own().unwrap();
+    let mut interpreter = PddlInterpreter::new(&path, table, RobotOptions::default());
+    let mut sink = Lines::default();
+    assert_eq!(interpreter.execute(&mut sink), Code::NotInitialised);
+    assert_eq!(interpreter.close_plan(), Code::NotInitialised);
+    assert_eq!(interpreter.exit(), Code::NotInitialised);
+    assert_eq!(interpreter.init(), Code::Ok);
+    assert_eq!(interpreter.execute(&mut sink), Code::NoPlanOpen);
+    assert_eq!(interpreter.close_plan(), Code::NoPlanOpen);
+    assert_eq!(
+        interpreter.open_plan("nowhere", "PDDL", &mut sink),
+        Code::CannotReadFile
+    );
+    let broken = file("broken", "(take-part robot_1\n");
+    assert_eq!(
+        interpreter.open_plan(&broken, "PDDL", &mut sink),
+        Code::ParseError
+    );
+    assert!(
+        interpreter.last_error().contains("line 1, column 19"),
+        "{}",
+        interpreter.last_error()
+    );
+    let unknown = file("unknown", "(dance robot_1)\n");
+    assert_eq!(
+        interpreter.open_plan(&unknown, "PDDL", &mut sink),
+        Code::UnknownAction
+    );
+    assert_eq!(
+        interpreter.open_plan(&unknown, "KITPLAN", &mut sink),
+        Code::UnsupportedPlanType
+    );
+    let ghost = file("ghost", "(attach-eff robot_1 ghost ghost_holder)\n");
+    assert_eq!(
+        interpreter.open_plan(&ghost, "PDDL", &mut Full),
+        Code::SinkFull
+    );
+    assert_eq!(interpreter.open_plan(&ghost, "PDDL", &mut sink), Code::Ok);
+    assert_eq!(
+        interpreter.open_plan(&ghost, "PDDL", &mut sink),
+        Code::PlanAlreadyOpen
+    );
+    assert_eq!(interpreter.execute(&mut sink), Code::NoSuchPose);
+    assert_eq!(interpreter.execute(&mut sink), Code::EndOfPlan);
+    assert_eq!(interpreter.close_plan(), Code::Ok);
+    let early = file(
+        "early",
+        "(take-part robot_1 part_a_1 part_a_tray part_gripper work_table_1 kit_1)\n",
+    );
+    assert_eq!(interpreter.open_plan(&early, "PDDL", &mut sink), Code::Ok);
+    assert_eq!(interpreter.execute(&mut sink), Code::PreconditionFalse);
+    assert!(
+        interpreter.last_error().contains("no end effector"),
+        "{}",
+        interpreter.last_error()
+    );
+    assert_eq!(interpreter.close_plan(), Code::Ok);
+    let empty = file("empty", "; nothing to do\n");
+    assert_eq!(interpreter.open_plan(&empty, "PDDL", &mut sink), Code::Ok);
+    assert_eq!(interpreter.execute(&mut sink), Code::EndOfPlan);
+    assert_eq!(interpreter.close_plan(), Code::Ok);
+    assert_eq!(interpreter.exit(), Code::Ok);
+    let ends: Vec<&String> = sink
+        .0
+        .iter()
+        .filter(|line| line.starts_with("EndCanon"))
+        .collect();
+    assert_eq!(
+        ends,
+        ["EndCanon (9)", "EndCanon (10)", "EndCanon (0)"],
+        "{:?}",
+        sink.0
+    );
+}

@@ -1,0 +1,159 @@
+//! The fence round the real-time path: in 100 000 periods of step, check and send there is no
+//! call of the heap and no voluntary wait.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(unsafe_code, reason = "an allocator is unsafe by its nature")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::time::Duration;
+
+use engine::executor::{Control, Event, Runner, Tick};
+use ipc::{Arm, Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
+use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
+
+thread_local! {
+    static HEAP_CALLS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, with a count of calls for each thread.
+struct Counting;
+
+// SAFETY: every call is passed on unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn count() {
+    // A thread that is ending counts no more.
+    let _ = HEAP_CALLS.try_with(|calls| calls.set(calls.get() + 1));
+}
+
+fn heap_calls() -> u64 {
+    HEAP_CALLS.with(Cell::get)
+}
+
+/// How often this thread has given up the processor by itself.
+fn waits() -> u64 {
+    let status = std::fs::read_to_string("/proc/thread-self/status").unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("voluntary_ctxt_switches"))
+        .unwrap();
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+/// Both counters count: a fence that cannot fire is none.
+#[test]
+fn the_counters_count() {
+    let (heap, waited) = (heap_calls(), waits());
+    let list = std::hint::black_box(vec![1, 2, 3]);
+    drop(list);
+    assert!(heap_calls() >= heap + 2);
+    std::thread::sleep(Duration::from_millis(1));
+    assert!(waits() > waited);
+}
+
+/// 100 000 whole periods as the real-time thread runs them: read the state from shared memory,
+/// take segments from the ring, step along the path with pauses and overrides, check, publish the
+/// setpoint; the driver's answer is sent from the same thread.
+#[test]
+fn a_hundred_thousand_periods_without_heap_or_wait() {
+    let arm: Arm = format!("alloc-{}/arm", std::process::id()).parse().unwrap();
+    let engine = EngineLink::open(&arm).unwrap();
+    let driver = DriverLink::open(&arm).unwrap();
+    let mut config = executor_config(arm, Clock::LockStep);
+    config.record = false;
+    let (mut runner, mut feeder, remote, mut monitor) = Runner::<JOINTS>::new(config);
+    let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
+    ack.session = 1;
+    ack.position[..JOINTS].copy_from_slice(home().as_slice());
+    runner.open(&ack);
+
+    let mut state = State {
+        joints: JOINTS as u32,
+        session: 1,
+        ..State::default()
+    };
+    state.position = ack.position;
+    let mut period = |number: u64| {
+        let begin_ns = number * 1_000_000;
+        let tick = Tick {
+            number,
+            begin_ns,
+            now_ns: begin_ns,
+            skipped: 0,
+        };
+        let setpoint = runner.tick(engine.last_state(), tick);
+        assert!(engine.send(setpoint));
+        let received = driver.last_setpoint().unwrap();
+        state.position = received.position;
+        state.sequence += 1;
+        state.driver_state = DriverState::Active as u32;
+        assert!(driver.send(state));
+    };
+    // Connections are made when the first messages pass.
+    (0..100).for_each(&mut period);
+
+    let (mut next, mut finished) = (0, 0);
+    let (mut heap, mut waited) = (0, 0);
+    for block in 0..100 {
+        while feeder.room() > 4000 && feed(&mut feeder, next) {
+            next += 1;
+        }
+        remote.control(match block % 10 {
+            3 => Control::Pause,
+            6 => Control::Override(0.4),
+            8 => Control::Stop { fast: true },
+            _ => Control::Resume,
+        });
+        if block % 10 == 7 {
+            remote.control(Control::Override(1.0));
+        }
+        let before = (heap_calls(), waits());
+        let first = 100 + block * 1000;
+        (first..first + 1000).for_each(&mut period);
+        // Reading the second counter is itself a call of the heap; it is read last.
+        let (after_heap, after_waits) = (heap_calls(), waits());
+        heap += after_heap - before.0 - counting_costs();
+        waited += after_waits - before.1;
+        while let Some(event) = monitor.event() {
+            match event {
+                Event::Finished { .. } => finished += 1,
+                Event::Faulted { fault, .. } => panic!("{fault}"),
+                _ => {}
+            }
+        }
+    }
+    assert!(finished > 40, "only {finished} commands");
+    assert_eq!(remote.counters().published, 100_100);
+    assert_eq!(
+        (heap, waited),
+        (0, 0),
+        "heap calls and waits in the periods"
+    );
+}
+
+/// Heap calls of one [`waits`]: it runs between the two readings of the first counter.
+fn counting_costs() -> u64 {
+    let before = heap_calls();
+    waits();
+    let cost = heap_calls() - before;
+    std::hint::black_box(cost)
+}

@@ -1,0 +1,152 @@
+//! In step with the driver: as fast as both can, and the same every time.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use engine::executor::{Event, Executor, Recorded, ToolOrder};
+use ipc::{Clock, GRIPPER, ToolAction};
+use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed, planned};
+
+/// What a run leaves.
+struct Run {
+    events: Vec<Event>,
+    samples: Vec<Recorded<JOINTS>>,
+    seconds: f64,
+}
+
+/// Commands 0 to `commands`, a gripper order after the first.
+fn run(name: &str, commands: u32) -> Run {
+    let arm: ipc::Arm = format!("servo-{}/{name}", std::process::id())
+        .parse()
+        .unwrap();
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let options = driver_options(arm.clone());
+        let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
+        let config = executor_config(arm, Clock::LockStep);
+        let start = Instant::now();
+        let (executor, mut feeder, mut monitor) = Executor::start(config).unwrap();
+        for index in 0..commands {
+            assert!(feed(&mut feeder, index));
+            if index == 0 {
+                let order = ToolOrder {
+                    command: 1000,
+                    tool: GRIPPER,
+                    action: ToolAction::Close,
+                    timeout: 1.0,
+                };
+                feeder.tool(order).unwrap();
+            }
+        }
+        let (mut events, mut samples) = (Vec::new(), Vec::new());
+        let patience = Instant::now();
+        loop {
+            while let Some(sample) = monitor.sample() {
+                samples.push(sample);
+            }
+            while let Some(event) = monitor.event() {
+                events.push(event);
+            }
+            let last = Some(commands - 1);
+            let done = events.iter().rev().find_map(|event| match event {
+                Event::Finished { command, .. } => Some(*command),
+                Event::Faulted { fault, .. } => panic!("{fault}"),
+                _ => None,
+            });
+            if done == last {
+                break;
+            }
+            assert!(
+                patience.elapsed() < Duration::from_secs(120),
+                "not done: {events:?}"
+            );
+            thread::yield_now();
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        drop(executor);
+        stop.store(true, Ordering::Relaxed);
+        driver.join().unwrap();
+        Run {
+            events,
+            samples,
+            seconds,
+        }
+    })
+}
+
+/// The samples of each command as bits, from its start tick on.
+fn bits(run: &Run, commands: u32) -> Vec<u64> {
+    let mut bits = Vec::new();
+    let finished = |event: &&Event| matches!(event, Event::Finished { command, .. } if *command + 1 == commands);
+    let Some(Event::Finished { tick: end, .. }) = run.events.iter().find(finished) else {
+        panic!()
+    };
+    for sample in &run.samples {
+        if sample.tick <= *end && sample.path_time > 0.0 {
+            bits.extend(sample.setpoint.position.iter().map(|value| value.to_bits()));
+            bits.extend(sample.setpoint.velocity.iter().map(|value| value.to_bits()));
+            bits.extend(sample.measured.iter().map(|value| value.to_bits()));
+        }
+    }
+    bits
+}
+
+/// The published samples are the plan's, to 1e-9 rad, at whole periods from each command's start;
+/// the driver follows closely.
+#[test]
+fn the_samples_are_the_plans() {
+    let run = run("plan", 6);
+    let mut started = [None; 6];
+    for event in &run.events {
+        if let Event::Started { command, tick } = event
+            && *command < 6
+        {
+            started[*command as usize] = Some(*tick);
+        }
+    }
+    let mut compared = 0;
+    let mut worst_following = 0.0_f64;
+    for sample in &run.samples {
+        let Some(start) = started[sample.command as usize] else {
+            continue;
+        };
+        if sample.tick < start {
+            continue;
+        }
+        let plan = planned(sample.command, (sample.tick - start) as f64 * 0.001);
+        let distance = (sample.setpoint.position - plan).amax();
+        assert!(
+            distance < 1e-9,
+            "{distance} rad from the plan in period {}",
+            sample.tick
+        );
+        for joint in 0..JOINTS {
+            let error = sample.measured[joint] - sample.setpoint.position[joint];
+            worst_following = worst_following.max(error.abs());
+        }
+        compared += 1;
+    }
+    assert!(compared > 5800, "{compared}");
+    // A command takes 979.2 periods: it ends with the 980th. The gripper closes in 0.2 s.
+    let span = started[5].unwrap() - started[1].unwrap();
+    assert_eq!(span, 4 * 980);
+    assert!(started[1].unwrap() - started[0].unwrap() >= 980 + 200);
+    assert!(
+        worst_following < 1e-4,
+        "following error {worst_following} rad"
+    );
+    println!(
+        "{compared} samples, {:.0} times real time",
+        compared as f64 * 0.001 / run.seconds
+    );
+}
+
+/// The same program gives the same bytes, however the processes were scheduled.
+#[test]
+fn two_runs_are_byte_identical() {
+    let first = bits(&run("twice-a", 4), 4);
+    let second = bits(&run("twice-b", 4), 4);
+    assert!(first.len() > 3800 * 3 * JOINTS);
+    assert!(first == second, "two runs differ");
+}

@@ -1,0 +1,97 @@
+//! Planned motions of a six-joint arm for the tests of the servo loop.
+
+use engine::executor::{ExecutorConfig, Feeder};
+use nalgebra::SVector;
+use realtime::{Limits, Piece, Sample, Segment};
+
+/// Joints of the test arm.
+pub const JOINTS: usize = 6;
+
+/// Positions or limits of the test arm.
+pub type Joints = SVector<f64, JOINTS>;
+
+/// Limits of the test arm.
+pub fn limits() -> Limits<JOINTS> {
+    Limits {
+        lower: Joints::from_element(-6.3),
+        upper: Joints::from_element(6.3),
+        velocity: Joints::from_element(3.1),
+        acceleration: Joints::from_element(15.0),
+        jerk: Joints::from_element(200.0),
+    }
+}
+
+/// Where the test arm begins.
+pub fn home() -> Joints {
+    Joints::from_column_slice(&[0.0, -1.2, 1.4, -1.5, -1.5, 0.0])
+}
+
+/// Options of the simulated driver of the test arm.
+pub fn driver_options(arm: ipc::Arm) -> driver_sim::Options {
+    let limits = limits();
+    let mut options = driver_sim::Options::new(arm, JOINTS);
+    options.position = home().as_slice().to_vec();
+    options.lower = limits.lower.as_slice().to_vec();
+    options.upper = limits.upper.as_slice().to_vec();
+    options.velocity = limits.velocity.as_slice().to_vec();
+    options.acceleration = limits.acceleration.as_slice().to_vec();
+    options.jerk = limits.jerk.as_slice().to_vec();
+    options
+}
+
+/// Configuration of the executor of the test arm.
+pub fn executor_config(arm: ipc::Arm, clock: ipc::Clock) -> ExecutorConfig<JOINTS> {
+    ExecutorConfig {
+        clock,
+        record: true,
+        ..ExecutorConfig::new(arm, limits())
+    }
+}
+
+/// The command `index` of a to and fro between home and a place that is 0.5 rad or less away in
+/// each joint: two pieces, a little under a second.
+pub fn command(index: u32) -> [Segment<JOINTS>; 2] {
+    let away = home() + Joints::from_column_slice(&[0.5, -0.3, 0.4, 0.2, -0.5, 0.1]);
+    let (from, to) = if index.is_multiple_of(2) {
+        (home(), away)
+    } else {
+        (away, home())
+    };
+    let middle = Sample {
+        position: (from + to) / 2.0,
+        velocity: (to - from) * 1.9,
+        ..Sample::rest(from)
+    };
+    [
+        Segment {
+            piece: Piece::hermite(0.4896, &Sample::rest(from), &middle),
+            command: index,
+            last: false,
+        },
+        Segment {
+            piece: Piece::hermite(0.4896, &middle, &Sample::rest(to)),
+            command: index,
+            last: true,
+        },
+    ]
+}
+
+/// The planned position of [`command`] at a time since its start (s).
+pub fn planned(index: u32, time: f64) -> Joints {
+    let [first, second] = command(index).map(|segment| segment.piece);
+    if time < first.duration {
+        first.sample(time).position
+    } else {
+        second
+            .sample((time - first.duration).min(second.duration))
+            .position
+    }
+}
+
+/// Hands a whole command to the executor; `false` when there was no room for it.
+pub fn feed(feeder: &mut Feeder<JOINTS>, index: u32) -> bool {
+    feeder.room() >= 2
+        && command(index)
+            .into_iter()
+            .all(|segment| feeder.push(segment).is_ok())
+}

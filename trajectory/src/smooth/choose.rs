@@ -1,0 +1,180 @@
+//! The fastest certified motion through one window of poses.
+
+use nalgebra::Isometry3;
+
+use super::certificate::{Certificate, certify};
+use super::exact_stop;
+use super::options::SmoothOptions;
+use super::pass::{Pass, RESOLUTION};
+use super::plan::Method;
+use super::span::Span;
+use super::spline::{self, Effort, Moving, Request};
+
+/// Effort of one spline: a time within 0.1 % of the optimum.
+const EFFORT: Effort = Effort {
+    steps: 90,
+    gap: 3e-3,
+};
+
+/// A certified motion through a window.
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    pub(crate) spans: Vec<Span>,
+    /// How each part was made, and how many spans it has.
+    pub(crate) parts: Vec<(Method, usize)>,
+}
+
+impl Motion {
+    fn new(spans: Vec<Span>, method: Method) -> Self {
+        let parts = if spans.is_empty() {
+            Vec::new()
+        } else {
+            vec![(method, spans.len())]
+        };
+        Self { spans, parts }
+    }
+
+    /// Time of the motion, s.
+    pub(crate) fn duration(&self) -> f64 {
+        self.spans.last().map_or(0.0, Span::end)
+    }
+
+    /// Adds a motion that starts where this one ends.
+    pub(crate) fn append(&mut self, other: Motion) {
+        let offset = self.duration();
+        self.spans.extend(other.spans.into_iter().map(|mut span| {
+            span.start += offset;
+            span
+        }));
+        self.parts.extend(other.parts);
+    }
+}
+
+/// Fastest certified motion from rest in the first pose to rest in the last.
+pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
+    let stop = Motion::new(exact_stop::plan(poses, &options.limits), Method::ExactStop);
+    if poses.len() < 3 {
+        return stop;
+    }
+    if let Some(spans) = spline(poses, options, None)
+        && spans.last().map_or(0.0, Span::end) <= stop.duration()
+    {
+        return Motion::new(spans, Method::Spline);
+    }
+    // A stop in the middle splits the window into two easier ones.
+    let middle = poses.len() / 2;
+    let mut halves = from_rest(&poses[..=middle], options);
+    halves.append(from_rest(&poses[middle..], options));
+    if halves.duration() < stop.duration() {
+        halves
+    } else {
+        stop
+    }
+}
+
+/// Certified spline from a state in motion to rest in the last pose, if one is
+/// found that takes at most `most` seconds. The first pose is the one passed
+/// last.
+pub(crate) fn from_motion(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    moving: &Moving,
+    most: f64,
+) -> Option<Motion> {
+    let spans = spline(poses, options, Some(moving))?;
+    (spans.last()?.end() <= most).then(|| Motion::new(spans, Method::Spline))
+}
+
+/// A certified spline; bounds that a first attempt breaks are narrowed for the
+/// next one.
+fn spline(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    moving: Option<&Moving>,
+) -> Option<Vec<Span>> {
+    if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
+        return None;
+    }
+    let mut inner = options.clone();
+    let mut coupled = None;
+    for attempt in 0..3 {
+        let narrowed = inner.clone();
+        let mut request = Request {
+            poses,
+            options: &narrowed,
+            moving,
+            effort: EFFORT,
+            coupled: false,
+        };
+        request.coupled = coupled.unwrap_or(!request.can_follow());
+        let Some(mut spans) = spline::plan(&request) else {
+            if request.coupled {
+                return None;
+            }
+            coupled = Some(request.moves()[1]);
+            continue;
+        };
+        let (mut certificate, mut passes) = certify(&spans, poses, options);
+        let over = certificate.worst_limit();
+        if over > 1.0 && over < 1.3 && moving.is_none() {
+            stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
+            (certificate, passes) = certify(&spans, poses, options);
+        }
+        if certificate.holds() {
+            return Some(spans);
+        }
+        narrow(&mut inner, &certificate, &passes);
+        coupled = Some(request.coupled || (attempt == 1 && request.moves()[1]));
+    }
+    None
+}
+
+/// Narrows the options by what a motion exceeded.
+fn narrow(options: &mut SmoothOptions, certificate: &Certificate, passes: &[Pass]) {
+    if certificate.corridor.ratio > 1.0 {
+        options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
+    }
+    let mut excess = 1.0_f64;
+    for pass in passes.iter().filter(|pass| !pass.holds()) {
+        excess = excess
+            .max(pass.deviation / pass.tolerance)
+            .max(pass.angle / pass.angular_tolerance);
+    }
+    if excess > 1.0 {
+        options.tolerance *= 0.9 / excess.min(10.0);
+    }
+    let over = certificate.worst_limit();
+    if over > 1.0 {
+        let limits = &mut options.limits;
+        for limit in [
+            &mut limits.angular_speed,
+            &mut limits.angular_acceleration,
+            &mut limits.angular_jerk,
+        ] {
+            *limit *= 0.99 / over.min(4.0);
+        }
+        for limit in [
+            &mut limits.speed,
+            &mut limits.acceleration,
+            &mut limits.jerk,
+        ] {
+            *limit *= 0.99 / over.min(4.0);
+        }
+    }
+}
+
+/// Slows a motion down by a factor; its way stays.
+fn stretch(spans: &mut [Span], factor: f64) {
+    for span in spans {
+        span.start *= factor;
+        span.duration *= factor;
+        let mut scale = 1.0;
+        for k in 0..5 {
+            span.point[k] /= scale;
+            for turn in &mut span.turns {
+                turn.angle[k] /= scale;
+            }
+            scale *= factor;
+        }
+    }
+}

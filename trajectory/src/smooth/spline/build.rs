@@ -1,0 +1,456 @@
+//! From poses to the spline problem and back to spans.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use super::basis::{self, START};
+use super::problem::{Group, Point, Problem};
+use super::solve::{Effort, solve};
+use super::start;
+use crate::ToolPoint;
+use crate::line::body_turn;
+use crate::smooth::options::SmoothOptions;
+use crate::smooth::span::{Span, Turn};
+
+/// The inner tolerance: sampling at rounding must not read it as exceeded.
+const INSIDE: f64 = 0.9999;
+
+/// Share of the corridor that the samples use, since the curve between two
+/// samples may lie a little outside of them.
+const CORRIDOR: f64 = 0.99;
+
+/// Share of the angular caps; the rest is for turns about changing axes.
+const ANGULAR: f64 = 0.985;
+
+/// A start in motion: state and knot spacing of the motion it continues.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moving {
+    pub(crate) state: ToolPoint,
+    pub(crate) spacing: f64,
+}
+
+/// What is asked of the spline.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Request<'a> {
+    /// The way; with `moving` the first is the pose passed last.
+    pub(crate) poses: &'a [Isometry3<f64>],
+    pub(crate) options: &'a SmoothOptions,
+    /// State at the start; `None` at rest in the first pose.
+    pub(crate) moving: Option<&'a Moving>,
+    pub(crate) effort: Effort,
+    /// True: the orientation is part of the optimum. False: it follows the
+    /// progress of the controlled point, which is faster to plan.
+    pub(crate) coupled: bool,
+}
+
+impl Request<'_> {
+    /// Whether the way moves the controlled point, and whether it turns.
+    pub(crate) fn moves(&self) -> [bool; 2] {
+        let begin = self.moving.map_or(self.poses[0], |m| m.state.pose);
+        let far =
+            |p: &Isometry3<f64>| (p.translation.vector - begin.translation.vector).norm() > 1e-12;
+        let turned = |p: &Isometry3<f64>| body_turn(&begin.rotation, &p.rotation).norm() > 1e-12;
+        let fast = |k: fn(&ToolPoint) -> f64| self.moving.is_some_and(|m| k(&m.state) > 1e-9);
+        [
+            self.poses.iter().any(far) || fast(|s| s.linear[0].norm()),
+            self.poses.iter().any(turned) || fast(|s| s.angular[0].norm()),
+        ]
+    }
+
+    /// True when each leg that turns also moves, so that the orientation can
+    /// follow the progress.
+    pub(crate) fn can_follow(&self) -> bool {
+        self.poses.windows(2).all(|pair| {
+            let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
+            way > self.options.tolerance.min(1e-3)
+                || body_turn(&pair[0].rotation, &pair[1].rotation).norm() < 1e-12
+        })
+    }
+}
+
+/// Time-optimal spline from the first pose to the last through balls around
+/// those between. `None` when no feasible spline was found.
+pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
+    let vectors = unroll(request.poses);
+    let task = Task {
+        request,
+        poses: request.poses,
+        vectors,
+        options: request.options,
+        moving: request.moving,
+    };
+    match request.moves() {
+        [true, false] => task.run::<3, 15>([true, false]),
+        [true, true] if !request.coupled => task.run::<3, 15>([true, false]),
+        [false, true] => task.run::<3, 15>([false, true]),
+        [true, true] => task.run::<6, 30>([true, true]),
+        [false, false] => None,
+    }
+}
+
+/// Rotation vectors of the poses, unrolled: each leg's turn is the difference
+/// of its ends.
+fn unroll(poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
+    let mut vector = Vector3::zeros();
+    let mut result = vec![vector];
+    for pair in poses.windows(2) {
+        vector += body_turn(&pair[0].rotation, &pair[1].rotation);
+        result.push(vector);
+    }
+    result
+}
+
+struct Task<'a> {
+    request: &'a Request<'a>,
+    poses: &'a [Isometry3<f64>],
+    vectors: Vec<Vector3<f64>>,
+    options: &'a SmoothOptions,
+    moving: Option<&'a Moving>,
+}
+
+impl Task<'_> {
+    /// Coordinates of a position and a rotation vector: those in use.
+    fn pack<const D: usize>(
+        &self,
+        used: [bool; 2],
+        p: &Vector3<f64>,
+        r: &Vector3<f64>,
+    ) -> [f64; D] {
+        let mut result = [0.0; D];
+        let parts = [(used[0], p), (used[1], r)];
+        for (slot, (_, part)) in parts.iter().filter(|(used, _)| *used).enumerate() {
+            for d in 0..3 {
+                result[3 * slot + d] = part[d];
+            }
+        }
+        result
+    }
+
+    fn groups(&self, used: [bool; 2]) -> [Group; 2] {
+        let limits = &self.options.limits;
+        let turn = self.options.angular_tolerance();
+        let place = Group {
+            caps: [limits.speed, limits.acceleration, limits.jerk],
+            radius: INSIDE * self.options.tolerance.min(self.options.corridor()),
+            width: CORRIDOR * self.options.corridor(),
+        };
+        let bound = self.turn_bound();
+        let caps = [
+            limits.angular_speed.min(bound * limits.speed),
+            limits.angular_acceleration.min(bound * limits.acceleration),
+            limits.angular_jerk.min(bound * limits.jerk),
+        ];
+        let turn = Group {
+            caps: caps.map(|c| c * ANGULAR),
+            radius: INSIDE * turn,
+            width: turn,
+        };
+        if used[0] {
+            [place, turn]
+        } else {
+            [turn, place]
+        }
+    }
+
+    /// Turn per way (rad/m) that no part of the motion needs to exceed by much:
+    /// keeps the orientation calm where angular limits are far away. Infinite
+    /// where a leg turns without moving.
+    fn turn_bound(&self) -> f64 {
+        let mut most = 0.0_f64;
+        for (pair, turn) in self.poses.windows(2).zip(self.vectors.windows(2)) {
+            let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
+            let angle = (turn[1] - turn[0]).norm();
+            if angle > 1e-9 {
+                most = most.max(angle / way.max(1e-300));
+            }
+        }
+        2.0 * most.max(1e-3)
+    }
+
+    fn run<const D: usize, const B: usize>(&self, used: [bool; 2]) -> Option<Vec<Span>> {
+        let vertices = self.poses.iter().zip(&self.vectors);
+        let vertices: Vec<[f64; D]> = vertices
+            .map(|(pose, turn)| self.pack(used, &pose.translation.vector, turn))
+            .collect();
+        let mut begin = [vertices[0], [0.0; D], [0.0; D], [0.0; D]];
+        if let Some(moving) = self.moving {
+            let virtual_turn = virtual_start(moving, moving.spacing);
+            let offset = body_turn(&self.poses[0].rotation, &moving.state.pose.rotation);
+            let state = &moving.state;
+            begin[0] = self.pack(
+                used,
+                &state.pose.translation.vector,
+                &(offset + virtual_turn[0]),
+            );
+            for k in 0..3 {
+                begin[k + 1] = self.pack(used, &state.linear[k], &virtual_turn[k + 1]);
+            }
+        }
+        let mut problem = Problem {
+            groups: self.groups(used),
+            vertices,
+            start: begin,
+            scale: 1.0,
+        };
+        let spacing = self.moving.map(|m| m.spacing);
+        let mut point = start::first(&mut problem, self.moving.is_some(), spacing);
+        solve::<D, B>(&problem, &mut point, self.request.effort)?;
+        Some(self.spans(&problem, &point, used))
+    }
+
+    /// Spans of a solution.
+    fn spans<const D: usize>(
+        &self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        used: [bool; 2],
+    ) -> Vec<Span> {
+        let h = problem.spacing(point.z);
+        let rotations = match (used, self.request.moves()[1]) {
+            ([_, true], _) => self.rotations(problem, point, D - 3, h),
+            (_, true) => self.following(problem, point, h),
+            _ => Vec::new(),
+        };
+        let fixed = self.poses[0];
+        (0..point.spans())
+            .map(|k| {
+                let mut place = [
+                    fixed.translation.vector,
+                    Vector3::zeros(),
+                    Vector3::zeros(),
+                    Vector3::zeros(),
+                    Vector3::zeros(),
+                ];
+                if used[0] {
+                    for d in 0..3 {
+                        let control = [0, 1, 2, 3, 4].map(|i| point.control[k + i][d]);
+                        for (c, value) in place.iter_mut().zip(basis::power(&control, h)) {
+                            c[d] = value;
+                        }
+                    }
+                }
+                let (base, turns) = match rotations.get(k..k + 5) {
+                    Some(control) => (control[0], turns(control, h)),
+                    None => (fixed.rotation, Vec::new()),
+                };
+                Span {
+                    start: h * k as f64,
+                    duration: h,
+                    point: place,
+                    base,
+                    turns,
+                }
+            })
+            .collect()
+    }
+
+    /// Control orientations: the control points rolled out from the start, with
+    /// the small drift against the poses spread over the way.
+    ///
+    /// Rolling a polygon of rotation vectors keeps every angular rate; cutting
+    /// corners of it changes where it leads, by the square of the tolerance.
+    fn rotations<const D: usize>(
+        &self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        first: usize,
+        h: f64,
+    ) -> Vec<UnitQuaternion<f64>> {
+        let knots = point.control.len();
+        let vector = |k: usize| {
+            let c = &point.control[k];
+            Vector3::new(c[first], c[first + 1], c[first + 2])
+        };
+        let mut result = match self.moving {
+            Some(moving) => start_rotations(moving, h),
+            None => [self.poses[0].rotation; 4],
+        }
+        .to_vec();
+        for k in 4..knots {
+            let step = UnitQuaternion::from_scaled_axis(vector(k) - vector(k - 1));
+            result.push(result[k - 1] * step);
+        }
+        let mut from = 3;
+        let mut anchors = anchors(problem, point);
+        anchors.push((knots - 4, self.poses.len() - 1));
+        for (to, leg) in anchors {
+            let target = if to == knots - 4 {
+                self.poses[self.poses.len() - 1].rotation
+            } else {
+                self.on_leg(&vector(to), leg)
+            };
+            correct(&mut result, from, to, &target);
+            from = to;
+        }
+        for rotation in result.iter_mut().skip(knots - 4) {
+            *rotation = self.poses[self.poses.len() - 1].rotation;
+        }
+        result
+    }
+
+    /// Control orientations that follow the progress of the control points
+    /// along the way.
+    fn following<const D: usize>(
+        &self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        h: f64,
+    ) -> Vec<UnitQuaternion<f64>> {
+        let (mut leg, end) = (1, self.poses.len() - 1);
+        let mut result = Vec::with_capacity(point.control.len());
+        for (k, c) in point.control.iter().enumerate() {
+            let time = k as f64 - 1.5;
+            while leg < end && point.passes[leg - 1] <= time {
+                leg += 1;
+            }
+            let (at, share) = problem.nearest(&[c[0], c[1], c[2]], leg, 0);
+            let turn = (self.vectors[at] - self.vectors[at - 1]) * share;
+            result.push(self.poses[at - 1].rotation * UnitQuaternion::from_scaled_axis(turn));
+        }
+        let Some(moving) = self.moving else {
+            return result;
+        };
+        // The start's own orientations differ by next to nothing: fade it out.
+        let begin = start_rotations(moving, h);
+        let drift = body_turn(&result[3], &begin[3]);
+        for (k, rotation) in result.iter_mut().enumerate() {
+            let x = (k.max(3) - 3) as f64 / 12.0_f64.min(point.control.len() as f64 - 8.0).max(1.0);
+            let left = (1.0 - x).max(0.0).powi(3);
+            *rotation *= UnitQuaternion::from_scaled_axis(drift * left);
+        }
+        result[..4].copy_from_slice(&begin);
+        result
+    }
+
+    /// Orientation of a rotation vector near a leg.
+    fn on_leg(&self, vector: &Vector3<f64>, leg: usize) -> UnitQuaternion<f64> {
+        let way = self.vectors[leg] - self.vectors[leg - 1];
+        let off = vector - self.vectors[leg - 1];
+        let square = way.norm_squared();
+        let share = if square > 0.0 {
+            (off.dot(&way) / square).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        self.poses[leg - 1].rotation
+            * UnitQuaternion::from_scaled_axis(way * share)
+            * UnitQuaternion::from_scaled_axis(off - way * share)
+    }
+}
+
+/// Control points in the middle of a leg, with the leg, at least six apart.
+fn anchors<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Vec<(usize, usize)> {
+    let knots = point.control.len();
+    let mut result = Vec::new();
+    let mut last = 3;
+    for leg in 1..problem.vertices.len() {
+        let since = if leg == 1 { 0.0 } else { point.passes[leg - 2] };
+        let until = point
+            .passes
+            .get(leg - 1)
+            .copied()
+            .unwrap_or(point.spans() as f64);
+        let middle = (0.5 * (since + until) + 1.5).round().max(0.0) as usize;
+        if middle >= last + 6 && middle + 10 <= knots {
+            result.push((middle, leg));
+            last = middle;
+        }
+    }
+    result
+}
+
+/// Turns the control orientations after `from` so that the one at `to` becomes
+/// `target`, smoothly; those after `to` follow.
+fn correct(
+    rotations: &mut [UnitQuaternion<f64>],
+    from: usize,
+    to: usize,
+    target: &UnitQuaternion<f64>,
+) {
+    let drift = body_turn(&rotations[to], target);
+    let was = rotations[to];
+    for k in from + 1..=to {
+        let x = (k - from) as f64 / (to - from) as f64;
+        let share = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
+        rotations[k] *= UnitQuaternion::from_scaled_axis(drift * share);
+    }
+    let follow = rotations[to] * was.inverse();
+    for rotation in rotations.iter_mut().skip(to + 1) {
+        // Products of many unit quaternions drift in length.
+        *rotation = UnitQuaternion::new_normalize((follow * *rotation).into_inner());
+    }
+}
+
+/// The four factors of a span ruled by five control orientations: the
+/// cumulative form of the basis.
+///
+/// # Source
+/// M.-J. Kim, M.-S. Kim, S. Y. Shin, "A general construction scheme for unit
+/// quaternion curves with simple high order derivatives", SIGGRAPH 1995.
+fn turns(control: &[UnitQuaternion<f64>], h: f64) -> Vec<Turn> {
+    let mut result = Vec::with_capacity(4);
+    for j in 1..5 {
+        let axis = body_turn(&control[j - 1], &control[j]);
+        let mut sums = [0.0; 5];
+        sums[j..].fill(1.0);
+        result.push(Turn {
+            axis,
+            angle: basis::power(&sums, h),
+        });
+    }
+    result
+}
+
+/// Position, velocity, acceleration and jerk of the rolled-out rotation vector
+/// (axes of the tool) whose spline starts with exactly the given motion.
+///
+/// Products of turns are not sums of vectors; the difference is of second
+/// order in the turn over one knot, so correcting it repeatedly converges.
+fn virtual_start(moving: &Moving, h: f64) -> [Vector3<f64>; 4] {
+    let state = &moving.state;
+    let back = state.pose.rotation.inverse();
+    let [w, a, j] = state.angular.map(|x| back * x);
+    let mut result = [Vector3::zeros(), w, a, j - w.cross(&a)];
+    if w.norm() + a.norm() + j.norm() < 1e-15 {
+        return result;
+    }
+    for _ in 0..40 {
+        let control = roll(&state.pose.rotation, &result, h);
+        let span = Span {
+            start: 0.0,
+            duration: h,
+            point: [Vector3::zeros(); 5],
+            base: control[0],
+            turns: turns(
+                &[control[0], control[1], control[2], control[3], control[3]],
+                h,
+            ),
+        };
+        let got = span.at(0.0);
+        result[0] += body_turn(&got.pose.rotation, &state.pose.rotation);
+        for k in 0..3 {
+            result[k + 1] += back * (state.angular[k] - got.angular[k]);
+        }
+    }
+    result
+}
+
+/// The four control orientations of a start in motion at knot spacing `h`.
+fn start_rotations(moving: &Moving, h: f64) -> [UnitQuaternion<f64>; 4] {
+    roll(&moving.state.pose.rotation, &virtual_start(moving, h), h)
+}
+
+/// Control orientations of a rolled-out motion.
+fn roll(
+    base: &UnitQuaternion<f64>,
+    motion: &[Vector3<f64>; 4],
+    h: f64,
+) -> [UnitQuaternion<f64>; 4] {
+    let vector = START.map(|w| {
+        motion[0] + (motion[1] * w[0] + (motion[2] * w[1] + motion[3] * (w[2] * h)) * h) * h
+    });
+    let mut result = [*base * UnitQuaternion::from_scaled_axis(vector[0]); 4];
+    for k in 1..4 {
+        result[k] = result[k - 1] * UnitQuaternion::from_scaled_axis(vector[k] - vector[k - 1]);
+    }
+    result
+}

@@ -1,0 +1,19 @@
+//! The time-optimal spline: uniform quartic, continuous up to the jerk.
+//!
+//! # Source
+//! Limits as hulls of differences: C. de Boor, "A Practical Guide to Splines",
+//! 1978. The substitution `z = (h / scale)^3`, under which minimum time over
+//! uniform splines is convex, and its barrier method are this project's own;
+//! see docs/decisions/0050-smooth-spline.md.
+
+mod band;
+mod basis;
+mod build;
+mod newton;
+mod problem;
+mod project;
+mod solve;
+mod start;
+
+pub(crate) use build::{Moving, Request, plan};
+pub(crate) use solve::Effort;

@@ -1,0 +1,335 @@
+//! Barrier value, gradient and Hessian of an iterate, and the Newton step.
+
+use super::band::Band;
+use super::basis::{FIRST, SECOND, THIRD, weights};
+use super::problem::{Point, Problem, Room, part, sample_weights, square};
+
+/// Gradient and Hessian of the barrier: a band for the control points, one
+/// border column for `z`. `B = 5 D` diagonals.
+pub(crate) struct System<const D: usize, const B: usize> {
+    band: Band<B>,
+    /// Gradient and border, side by side.
+    sides: Vec<[f64; 2]>,
+    gradient_z: f64,
+    hessian_z: f64,
+}
+
+/// A direction in control points and `z`, and the fall of the barrier along it.
+pub(crate) struct Step {
+    pub(crate) control: Vec<f64>,
+    pub(crate) z: f64,
+    /// Square of the Newton decrement.
+    pub(crate) decrement: f64,
+}
+
+/// Product of slacks with rare logarithms.
+struct Slacks {
+    product: f64,
+    sum: f64,
+}
+
+impl Slacks {
+    /// False when the slack is not positive.
+    fn take(&mut self, slack: f64) -> bool {
+        if !(slack > 0.0) {
+            return false;
+        }
+        self.product *= slack;
+        if !(1e-200..1e200).contains(&self.product) {
+            self.sum += self.product.ln();
+            self.product = 1.0;
+        }
+        true
+    }
+}
+
+/// Value of the barrier with weight `t` on `z`; `None` outside of its domain.
+pub(crate) fn value<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+    room: &Room,
+    t: f64,
+) -> Option<f64> {
+    let mut slacks = Slacks {
+        product: 1.0,
+        sum: 0.0,
+    };
+    for g in 0..Problem::<D>::GROUPS {
+        let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room)[0].powi(2));
+        let units = [1, 2, 3].map(|k| 1.0 / problem.cap(g, k, 1.0, room)[0].powi(2));
+        let last = point.control.len() - 1;
+        for k in 0..last {
+            let mut ok = slacks.take((caps[0] - square(&point.sum(k, &FIRST, g))) * units[0]);
+            if k + 2 <= last {
+                ok &= slacks.take((caps[1] - square(&point.sum(k, &SECOND, g))) * units[1]);
+            }
+            if k + 3 <= last {
+                ok &= slacks.take((caps[2] - square(&point.sum(k, &THIRD, g))) * units[2]);
+            }
+            if !ok {
+                return None;
+            }
+        }
+        let unit = 1.0 / problem.groups[g].radius.powi(2);
+        for i in 0..point.passes.len() {
+            let miss = super::project::miss(problem, point, i, g);
+            if !slacks.take((room.balls[g][i].powi(2) - miss * miss) * unit) {
+                return None;
+            }
+        }
+        if problem.groups[g].width.is_finite() {
+            let unit = 1.0 / problem.groups[g].width.powi(2);
+            for k in 0..point.samples() {
+                let away = problem.offset(&point.sample(k, g), room.legs[k], g).0;
+                if !slacks.take((room.widths[g][k].powi(2) - square(&away)) * unit) {
+                    return None;
+                }
+            }
+        }
+    }
+    Some(t * point.z - slacks.sum - slacks.product.ln())
+}
+
+impl<const D: usize, const B: usize> System<D, B> {
+    /// Room for an iterate of `knots` control points.
+    pub(crate) fn new(knots: usize) -> Self {
+        let size = D * knots.saturating_sub(8);
+        Self {
+            band: Band::zeros(size),
+            sides: vec![[0.0; 2]; size],
+            gradient_z: 0.0,
+            hessian_z: 0.0,
+        }
+    }
+
+    /// The Newton step of the barrier with weight `t` on `z`.
+    pub(crate) fn step(
+        &mut self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        room: &Room,
+        t: f64,
+    ) -> Option<Step> {
+        self.band.clear();
+        self.sides.fill([0.0; 2]);
+        (self.gradient_z, self.hessian_z) = (t, 0.0);
+        for g in 0..Problem::<D>::GROUPS {
+            self.limits(problem, point, room, g);
+            if problem.groups[g].width.is_finite() {
+                self.corridor(problem, point, room, g);
+            }
+        }
+        self.balls(problem, point, room);
+        self.solve()
+    }
+
+    fn solve(&mut self) -> Option<Step> {
+        if !self.band.factor() {
+            return None;
+        }
+        let before: Vec<[f64; 2]> = self.sides.clone();
+        self.band.solve(&mut self.sides);
+        let (mut cross, mut bent) = (0.0, 0.0);
+        for (old, new) in before.iter().zip(&self.sides) {
+            cross += old[1] * new[0];
+            bent += old[1] * new[1];
+        }
+        let pivot = self.hessian_z - bent;
+        if !(pivot > 0.0) {
+            return None;
+        }
+        let z = -(self.gradient_z - cross) / pivot;
+        let mut slope = self.gradient_z * z;
+        let mut control = Vec::with_capacity(self.sides.len());
+        for (old, new) in before.iter().zip(&self.sides) {
+            let step = -new[0] - new[1] * z;
+            slope += old[0] * step;
+            control.push(step);
+        }
+        (slope < 0.0 && slope.is_finite()).then_some(Step {
+            control,
+            z,
+            decrement: -slope,
+        })
+    }
+
+    /// Speed, acceleration and jerk of one group.
+    fn limits(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
+        let pinned = problem.pinned(point.z);
+        let last = point.control.len() - 1;
+        let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room));
+        for k in 0..last {
+            self.norm(point, &pinned, (k, &FIRST, g), &caps[0]);
+            if k + 2 <= last {
+                self.norm(point, &pinned, (k, &SECOND, g), &caps[1]);
+            }
+            if k + 3 <= last {
+                self.norm(point, &pinned, (k, &THIRD, g), &caps[2]);
+            }
+        }
+    }
+
+    /// One term `-log(R(z)^2 - |y|^2)`, `y` a difference of control points.
+    fn norm<const M: usize>(
+        &mut self,
+        point: &Point<D>,
+        pinned: &[[[f64; D]; 2]; 4],
+        (first, w, g): (usize, &[f64; M], usize),
+        [r, r1, r2]: &[f64; 3],
+    ) {
+        let y = point.sum(first, w, g);
+        let slack = 1.0 / (r * r - square(&y));
+        let gradient = y.map(|x| 2.0 * x * slack);
+        let hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+        let cross = -4.0 * r * r1 * slack * slack;
+        let mut border = y.map(|x| x * cross);
+        self.gradient_z -= 2.0 * r * r1 * slack;
+        self.hessian_z += -2.0 * (r1 * r1 + r * r2) * slack + (2.0 * r * r1 * slack).powi(2);
+        if first < 4 {
+            // The pinned control points move with z.
+            let mut slide = [0.0; 3];
+            for (weight, pin) in w.iter().zip(&pinned[first..]) {
+                for d in 0..3 {
+                    slide[d] += weight * pin[1][3 * g + d];
+                }
+            }
+            for d in 0..3 {
+                let bent: f64 = (0..3).map(|e| hessian[d][e] * slide[e]).sum();
+                self.gradient_z += gradient[d] * slide[d];
+                self.hessian_z += slide[d] * (2.0 * border[d] + bent);
+                border[d] += bent;
+            }
+        }
+        self.add((first, w, g), &gradient, &border, &hessian);
+    }
+
+    /// Corridor samples of one group.
+    fn corridor(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
+        for k in 0..point.samples() {
+            let (y, slide) = problem.offset(&point.sample(k, g), room.legs[k], g);
+            let width = room.widths[g][k];
+            let slack = 1.0 / (width * width - square(&y));
+            let gradient = y.map(|x| 2.0 * x * slack);
+            let mut hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+            for a in 0..3 {
+                for b in 0..3 {
+                    hessian[a][b] -= 2.0 * slack * slide[a] * slide[b];
+                }
+            }
+            let (first, w) = sample_weights(k);
+            self.add((first, w, g), &gradient, &[0.0; 3], &hessian);
+        }
+    }
+
+    /// Adds a term in the weighted sum of consecutive control points.
+    fn add<const M: usize>(
+        &mut self,
+        (first, w, g): (usize, &[f64; M], usize),
+        gradient: &[f64; 3],
+        border: &[f64; 3],
+        hessian: &[[f64; 3]; 3],
+    ) {
+        let free = self.sides.len() / D;
+        for i in 0..M {
+            if first + i < 4 || first + i - 4 >= free || w[i] == 0.0 {
+                continue;
+            }
+            let row = (first + i - 4) * D + 3 * g;
+            for d in 0..3 {
+                self.sides[row + d][0] += w[i] * gradient[d];
+                self.sides[row + d][1] += w[i] * border[d];
+            }
+            for j in 0..=i {
+                if first + j < 4 {
+                    continue;
+                }
+                let (back, both) = ((i - j) * D, w[i] * w[j]);
+                let columns = &mut self.band.columns[row - back..row - back + 3];
+                for (b, column) in columns.iter_mut().enumerate() {
+                    for a in (if i == j { b } else { 0 })..3 {
+                        column[back + a - b] += both * hessian[a][b];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Balls, each at its closest approach: the passing time is eliminated, so
+    /// the direction of motion carries no curvature.
+    fn balls(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room) {
+        for (i, goal) in problem.inner().iter().enumerate() {
+            let (span, share) = point.locate(point.passes[i]);
+            let w = weights(share);
+            let [p, v, a] = point.at(point.passes[i]);
+            let (mut gradient, mut hessian) = ([0.0; D], [[0.0; D]; D]);
+            let mut damping = 0.0;
+            for g in 0..Problem::<D>::GROUPS {
+                let y = [0, 1, 2].map(|d| p[3 * g + d] - goal[3 * g + d]);
+                let slack = 1.0 / (room.balls[g][i].powi(2) - square(&y));
+                let block = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+                damping += 2.0 * slack * (square(&y) * square(&part(&a, g))).sqrt();
+                for d in 0..3 {
+                    gradient[3 * g + d] = 2.0 * slack * y[d];
+                    hessian[3 * g + d][3 * g..3 * g + 3].copy_from_slice(&block[d]);
+                }
+            }
+            let mut bent = [0.0; D];
+            for d in 0..D {
+                bent[d] = (0..D).map(|e| hessian[d][e] * v[e]).sum();
+            }
+            let stiff: f64 = (0..D).map(|d| bent[d] * v[d]).sum::<f64>() + damping;
+            if stiff > 0.0 {
+                for d in 0..D {
+                    for e in 0..D {
+                        hessian[d][e] -= bent[d] * bent[e] / stiff;
+                    }
+                }
+            }
+            self.add_ball(span, &w[0], &gradient, &hessian);
+        }
+    }
+
+    /// Adds a term that couples all coordinates.
+    fn add_ball(
+        &mut self,
+        first: usize,
+        w: &[f64; 5],
+        gradient: &[f64; D],
+        hessian: &[[f64; D]; D],
+    ) {
+        let free = self.sides.len() / D;
+        for i in 0..5 {
+            if first + i < 4 || first + i - 4 >= free {
+                continue;
+            }
+            let row = (first + i - 4) * D;
+            for d in 0..D {
+                self.sides[row + d][0] += w[i] * gradient[d];
+            }
+            for j in 0..=i {
+                if first + j < 4 {
+                    continue;
+                }
+                let (back, both) = ((i - j) * D, w[i] * w[j]);
+                let columns = &mut self.band.columns[row - back..row - back + D];
+                for (b, column) in columns.iter_mut().enumerate() {
+                    for a in (if i == j { b } else { 0 })..D {
+                        column[back + a - b] += both * hessian[a][b];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// `diagonal I + scale y y^T`.
+fn outer(y: &[f64; 3], diagonal: f64, scale: f64) -> [[f64; 3]; 3] {
+    let mut result = [[0.0; 3]; 3];
+    for a in 0..3 {
+        for b in 0..3 {
+            result[a][b] = scale * y[a] * y[b];
+        }
+        result[a][a] += diagonal;
+    }
+    result
+}

@@ -1,0 +1,191 @@
+//! Passing times: the closest approach to each ball, in order; and how much
+//! room an iterate needs.
+
+use super::basis::{FIRST, SECOND, THIRD};
+use super::problem::{Point, Problem, Room, part, square};
+
+/// Iterates are held this far inside the widened bounds.
+const WIDEN: f64 = 1.03;
+
+/// Moves every passing time to the closest approach near by, in order.
+///
+/// With one group that is the least distance; with rotation it is the least
+/// barrier of both balls, so that the time carries no slope of the barrier.
+pub(crate) fn project<const D: usize>(
+    problem: &Problem<D>,
+    point: &mut Point<D>,
+    room: Option<&Room>,
+    rounds: usize,
+) {
+    let end = point.spans() as f64;
+    let scales = [0, 1].map(|g: usize| 1.0 / (problem.groups[g].radius * problem.groups[g].radius));
+    let mut before = 0.0;
+    for i in 0..point.passes.len() {
+        let goal = &problem.inner()[i];
+        let mut time = point.passes[i];
+        for _ in 0..rounds {
+            let [p, v, a] = point.at(time);
+            let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
+            for g in 0..Problem::<D>::GROUPS {
+                let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
+                for d in 3 * g..3 * g + 3 {
+                    let y = p[d] - goal[d];
+                    away += y * y;
+                    along += y * v[d];
+                    bent += y * a[d];
+                    speed += v[d] * v[d];
+                }
+                let slack = room.map_or(0.0, |room| room.balls[g][i].powi(2) - away);
+                let inside = D > 3 && slack > 0.0;
+                let scale = if inside { 1.0 / slack } else { scales[g] };
+                slope += scale * along;
+                bend += scale * bent;
+                fall += scale * speed;
+                if inside {
+                    fall += 2.0 * (scale * along).powi(2);
+                }
+            }
+            let curvature = if bend > -0.5 * fall {
+                fall + bend
+            } else {
+                0.5 * fall
+            };
+            if curvature <= 0.0 {
+                break;
+            }
+            let step = (slope / curvature).clamp(-0.7, 0.7);
+            time = (time - step).clamp(before, end);
+            if step.abs() < 1e-7 {
+                break;
+            }
+        }
+        point.passes[i] = time.max(before);
+        before = point.passes[i];
+    }
+}
+
+/// Distance of the iterate from the centre of ball `i`, in group `g`.
+pub(crate) fn miss<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+    i: usize,
+    g: usize,
+) -> f64 {
+    let [p, ..] = point.at(point.passes[i]);
+    let (p, goal) = (part(&p, g), part(&problem.inner()[i], g));
+    square(&[p[0] - goal[0], p[1] - goal[1], p[2] - goal[2]]).sqrt()
+}
+
+/// Greatest ratio of the differences of order 1 to 3 to their bounds, by group.
+pub(crate) fn ratios<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[f64; 3]; 2] {
+    let mut worst = [[0.0_f64; 3]; 2];
+    let (last, h) = (point.control.len() - 1, problem.spacing(point.z));
+    for g in 0..Problem::<D>::GROUPS {
+        for k in 0..last {
+            worst[g][0] = worst[g][0].max(square(&point.sum(k, &FIRST, g)));
+            if k + 2 <= last {
+                worst[g][1] = worst[g][1].max(square(&point.sum(k, &SECOND, g)));
+            }
+            if k + 3 <= last {
+                worst[g][2] = worst[g][2].max(square(&point.sum(k, &THIRD, g)));
+            }
+        }
+        for k in 0..3 {
+            worst[g][k] = worst[g][k].sqrt() / (problem.groups[g].caps[k] * h.powi(k as i32 + 1));
+        }
+    }
+    worst
+}
+
+impl Room {
+    /// Room for an iterate about which nothing is known yet.
+    pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
+        let mut room = Self {
+            caps: [[f64::INFINITY; 3]; 2],
+            balls: [0, 1].map(|_| vec![f64::INFINITY; point.passes.len()]),
+            widths: [0, 1].map(|_| vec![f64::INFINITY; point.samples()]),
+            legs: vec![0; point.samples()],
+        };
+        room.tighten(problem, point);
+        room
+    }
+
+    /// Shrinks every widened bound to what the iterate needs, and assigns the
+    /// corridor samples to their legs. True when nothing is widened any more.
+    pub(crate) fn tighten<const D: usize>(
+        &mut self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+    ) -> bool {
+        let mut tight = true;
+        for (g, ratios) in ratios(problem, point)
+            .iter()
+            .enumerate()
+            .take(Problem::<D>::GROUPS)
+        {
+            tight &= self.tighten_caps(ratios, g);
+            let radius = problem.groups[g].radius;
+            for i in 0..point.passes.len() {
+                let need = (WIDEN * miss(problem, point, i, g)).max(radius);
+                self.balls[g][i] = self.balls[g][i].min(need);
+                tight &= self.balls[g][i] <= radius;
+            }
+        }
+        if problem.groups[0].width.is_finite() || problem.groups[1].width.is_finite() {
+            tight &= self.tighten_widths(problem, point);
+        }
+        tight
+    }
+
+    fn tighten_caps(&mut self, ratios: &[f64; 3], g: usize) -> bool {
+        let mut tight = true;
+        for k in 0..3 {
+            self.caps[g][k] = self.caps[g][k].min((WIDEN * ratios[k]).max(1.0));
+            tight &= self.caps[g][k] <= 1.0;
+        }
+        tight
+    }
+
+    fn tighten_widths<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>) -> bool {
+        let (mut tight, mut next) = (true, 0);
+        for k in 0..point.samples() {
+            let time = 0.5 * k as f64;
+            while next < point.passes.len() && point.passes[next] <= time {
+                next += 1;
+            }
+            let wanted = next + 1;
+            let fits = |leg: usize, factor: f64| {
+                (0..Problem::<D>::GROUPS)
+                    .all(|g| away(problem, point, k, g, leg) < factor * problem.groups[g].width)
+            };
+            // A sample that changes legs while its point is outside the new
+            // one keeps the old leg until it fits.
+            if self.legs[k] == 0
+                || (self.legs[k] != wanted && (fits(wanted, 0.98) || !fits(self.legs[k], 1.0)))
+            {
+                self.legs[k] = wanted;
+                for g in 0..Problem::<D>::GROUPS {
+                    self.widths[g][k] = f64::INFINITY;
+                }
+            }
+            for g in 0..Problem::<D>::GROUPS {
+                let need = WIDEN * away(problem, point, k, g, self.legs[k]);
+                let width = problem.groups[g].width;
+                self.widths[g][k] = self.widths[g][k].min(need.max(width));
+                tight &= self.widths[g][k] <= width;
+            }
+        }
+        tight
+    }
+}
+
+/// Distance of corridor sample `k` from the way near a leg, in group `g`.
+fn away<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+    k: usize,
+    g: usize,
+    leg: usize,
+) -> f64 {
+    square(&problem.offset(&point.sample(k, g), leg, g).0).sqrt()
+}

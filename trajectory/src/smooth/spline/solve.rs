@@ -1,0 +1,132 @@
+//! The interior point iteration: anytime, every iterate after the first
+//! feasible one is a motion.
+
+use super::newton::{self, System};
+use super::problem::{Point, Problem, Room};
+use super::project::project;
+
+/// How far and how long the iteration goes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Most Newton steps.
+    pub(crate) steps: usize,
+    /// Relative gap of `z` at which to end; the time is off by a third of it.
+    pub(crate) gap: f64,
+}
+
+/// Growth of the weight on `z` at each centre.
+const GROWTH: f64 = 8.0;
+
+/// Steps between two narrowings of widened bounds: the steps between take the
+/// iterate well inside, so that each narrowing is a large one.
+const PATIENCE: usize = 4;
+
+/// Back-tracking factor of the line search.
+const BACK: f64 = 0.6;
+
+/// Improves an iterate to the optimum within `effort`; the number of steps, or
+/// `None` when no feasible iterate was found.
+///
+/// # Source
+/// S. Boyd, L. Vandenberghe, "Convex Optimization", 2004, 11.3 (barrier
+/// method); the bounds of a still infeasible iterate are widened to contain it
+/// and follow it inwards.
+pub(crate) fn solve<const D: usize, const B: usize>(
+    problem: &Problem<D>,
+    point: &mut Point<D>,
+    effort: Effort,
+) -> Option<usize> {
+    let mut system = System::<D, B>::new(point.control.len());
+    problem.pin(point);
+    project(problem, point, None, 20);
+    slow_down(problem, point);
+    let mut room = Room::new(problem, point);
+    let parameter = problem.parameter(point);
+    let mut weight = parameter / (2.0 * point.z);
+    let (mut tight, mut since) = (room.tighten(problem, point), 0);
+    for count in 0..effort.steps {
+        since += 1;
+        if tight || since > PATIENCE {
+            tight = room.tighten(problem, point);
+            since = 0;
+        }
+        let Some(step) = system.step(problem, point, &room, weight) else {
+            return tight.then_some(count);
+        };
+        let moved = search(problem, point, &room, weight, &step);
+        let centred = step.decrement < 3.0;
+        if !moved || centred {
+            if tight && parameter / weight <= effort.gap * point.z {
+                return Some(count);
+            }
+            if !tight {
+                let stuck = since == 0 && !moved;
+                if stuck {
+                    return None;
+                }
+                since = PATIENCE;
+            } else {
+                weight *= GROWTH;
+                weight = weight.min(1.01 * parameter / (effort.gap * point.z));
+            }
+        }
+    }
+    tight.then_some(effort.steps)
+}
+
+/// Raises `z` until speed, acceleration and jerk hold with room to spare. A
+/// start in motion fixes the first control points, so there time is left alone.
+fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
+    if problem.start[1..].iter().flatten().any(|x| *x != 0.0) {
+        return;
+    }
+    let mut need = 0.0_f64;
+    for ratios in super::project::ratios(problem, point) {
+        let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
+        need = need
+            .max(speed.powi(3))
+            .max(acceleration.powf(1.5))
+            .max(jerk);
+    }
+    point.z *= need.max(1e-9);
+}
+
+/// Moves the iterate along the step as far as the barrier falls; false when it
+/// does not fall at all.
+fn search<const D: usize>(
+    problem: &Problem<D>,
+    point: &mut Point<D>,
+    room: &Room,
+    weight: f64,
+    step: &newton::Step,
+) -> bool {
+    let Some(here) = newton::value(problem, point, room, weight) else {
+        return false;
+    };
+    let mut share: f64 = if step.z < 0.0 {
+        (-0.9 * point.z / step.z).min(1.0)
+    } else {
+        1.0
+    };
+    let mut trial = point.clone();
+    for _ in 0..40 {
+        trial.z = point.z + share * step.z;
+        let free = trial.control.iter_mut().zip(&point.control).skip(4);
+        for ((to, from), delta) in free.zip(step.control.chunks_exact(D)) {
+            for d in 0..D {
+                to[d] = from[d] + share * delta[d];
+            }
+        }
+        problem.pin(&mut trial);
+        trial.passes.copy_from_slice(&point.passes);
+        project(problem, &mut trial, Some(room), 3);
+        if let Some(there) = newton::value(problem, &trial, room, weight)
+            && there < here - 0.01 * share * step.decrement
+        {
+            *point = trial;
+            return true;
+        }
+        share *= BACK;
+    }
+    false
+}

@@ -1,0 +1,302 @@
+//! First iterate: control points on the polyline, at the places where a cheap
+//! look-ahead over junction speeds would have the tool.
+
+use super::problem::{Point, Problem, square};
+
+/// Share of the acceleration that the look-ahead uses along the legs.
+const SHARE: f64 = 0.6;
+
+/// Knot intervals in one time `A / J`.
+const KNOTS_PER_RAMP: f64 = 5.0;
+
+/// Least and most spans of one spline.
+const FEWEST: f64 = 12.0;
+const MOST: f64 = 700.0;
+
+/// A leg measured in time at full speed: progress runs at rate 1 there.
+struct Leg<const D: usize> {
+    length: f64,
+    /// Velocity at rate 1.
+    direction: [f64; D],
+    /// Greatest change of the rate, 1/s.
+    acceleration: f64,
+}
+
+/// Progress over time: constant change of rate between the records.
+struct Schedule {
+    /// Time, progress, rate and change of rate at the start of each stretch.
+    records: Vec<[f64; 4]>,
+    /// Junctions at which the rate dips.
+    dips: usize,
+    duration: f64,
+}
+
+impl Schedule {
+    fn at(&self, time: f64) -> f64 {
+        let next = self.records.partition_point(|r| r[0] <= time);
+        let [t, s, rate, change] = self.records[next.saturating_sub(1)];
+        let dt = time - t;
+        if next == 0 {
+            s + rate * dt
+        } else {
+            s + (rate + 0.5 * change * dt) * dt
+        }
+    }
+
+    /// Progress averaged over `width` around `time`.
+    fn smooth(&self, time: f64, width: f64) -> f64 {
+        let parts = 8;
+        let step = width / f64::from(parts);
+        let first = time - 0.5 * width + 0.5 * step;
+        (0..parts)
+            .map(|i| self.at(first + step * f64::from(i)))
+            .sum::<f64>()
+            / f64::from(parts)
+    }
+}
+
+/// First iterate of a problem whose `scale` it also sets; `moving` tells that
+/// the start is not at rest, `spacing` is the wanted knot spacing if any.
+pub(crate) fn first<const D: usize>(
+    problem: &mut Problem<D>,
+    moving: bool,
+    spacing: Option<f64>,
+) -> Point<D> {
+    let legs = legs(problem);
+    let ramp = (0..Problem::<D>::GROUPS)
+        .map(|g| problem.groups[g].caps[1] / problem.groups[g].caps[2])
+        .fold(0.0, f64::max);
+    let coarse = spacing.unwrap_or(ramp / KNOTS_PER_RAMP);
+    let start = begin(problem, &legs);
+    let mut rates = junctions(problem, &legs, coarse);
+    rates[0] = start[1];
+    look_ahead(&legs, &mut rates);
+    let schedule = schedule(&legs, &rates, start);
+    let smoothing = ramp.min(0.5 * schedule.duration / (schedule.dips + 1) as f64);
+    let total = schedule.duration + smoothing;
+    let finest = total / (8 * (schedule.dips + 1)) as f64;
+    let h = match spacing {
+        Some(h) => h,
+        None => coarse.min(finest).min(total / FEWEST).max(total / MOST),
+    };
+    let spans = (total / h).ceil().clamp(FEWEST, MOST) as usize + 3;
+    problem.scale = if moving {
+        h
+    } else {
+        total / (spans - 3) as f64
+    };
+    let lead = if moving {
+        0.0
+    } else {
+        0.5 * smoothing + 1.5 * problem.scale
+    };
+    place(problem, &legs, &schedule, [spans as f64, lead, smoothing])
+}
+
+fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
+    let mut legs = Vec::with_capacity(problem.vertices.len());
+    for pair in problem.vertices.windows(2) {
+        let mut way = [0.0; D];
+        for d in 0..D {
+            way[d] = pair[1][d] - pair[0][d];
+        }
+        let norms = norms(&way);
+        let groups = &problem.groups;
+        let length = (0..D / 3)
+            .map(|g| norms[g] / groups[g].caps[0])
+            .fold(1e-12, f64::max);
+        let acceleration = (0..D / 3)
+            .map(|g| {
+                let unit = norms[g] / length;
+                let jerk = (groups[g].caps[2].powi(2) * norms[g]).cbrt();
+                groups[g].caps[1].min(jerk) / unit.max(1e-12)
+            })
+            .fold(f64::INFINITY, f64::min);
+        legs.push(Leg {
+            length,
+            direction: way.map(|x| x / length),
+            acceleration,
+        });
+    }
+    legs
+}
+
+/// Norm of each group.
+fn norms<const D: usize>(x: &[f64; D]) -> [f64; 2] {
+    let mut result = [0.0; 2];
+    for (g, part) in x.chunks_exact(3).enumerate().take(2) {
+        result[g] = square(&[part[0], part[1], part[2]]).sqrt();
+    }
+    result
+}
+
+/// Progress and rate of the start on the first leg.
+fn begin<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>]) -> [f64; 2] {
+    let (mut along, mut rate, mut unit) = (0.0, 0.0, 0.0);
+    for d in 0..D {
+        let cap = problem.groups[d / 3].caps[0].powi(2);
+        along += legs[0].direction[d] * (problem.start[0][d] - problem.vertices[0][d]) / cap;
+        rate += problem.start[1][d] * problem.start[1][d] / cap;
+        unit += legs[0].direction[d] * legs[0].direction[d] / cap;
+    }
+    [
+        (along / unit.max(1e-300)).clamp(0.0, legs[0].length),
+        rate.sqrt().min(1.0),
+    ]
+}
+
+/// Rate at each vertex that its ball lets pass; 0 at the end.
+///
+/// A corner of velocity jump `m v` inside a ball of radius `tol` costs what an
+/// acceleration ramp of the same jump costs; where the way bends so gently that
+/// the sagitta is below the tolerance, the curvature counts instead.
+fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64) -> Vec<f64> {
+    let mut rates = vec![0.0; legs.len() + 1];
+    for i in 1..legs.len() {
+        let (before, after) = (&legs[i - 1], &legs[i]);
+        let mut jump = [0.0; D];
+        for d in 0..D {
+            jump[d] = after.direction[d] - before.direction[d];
+        }
+        let mean = 0.5 * (before.length + after.length);
+        let mut rate: f64 = 1.0;
+        for (g, m) in norms(&jump).iter().enumerate().take(D / 3) {
+            if *m < 1e-9 * problem.groups[g].caps[0] {
+                continue;
+            }
+            let [_, a, j] = problem.groups[g].caps;
+            let tol = problem.groups[g].radius;
+            let corner = ((16.0 * tol * a).sqrt() / m)
+                .min(j * (96.0 * tol / j).powf(2.0 / 3.0) / (4.0 * m))
+                .min(2.3 * tol / (h * m));
+            let bend = 0.8 * (a * mean / m).sqrt().min((j * mean * mean / m).cbrt());
+            rate = rate.min(if m * mean < 8.0 * tol {
+                corner.max(bend)
+            } else {
+                corner
+            });
+        }
+        rates[i] = rate;
+    }
+    rates
+}
+
+/// Forward and backward passes: neighbouring rates differ by no more than the
+/// leg between allows.
+fn look_ahead<const D: usize>(legs: &[Leg<D>], rates: &mut [f64]) {
+    let reach = |rate: f64, leg: &Leg<D>| {
+        (rate * rate + 2.0 * SHARE * leg.acceleration * leg.length).sqrt()
+    };
+    for (i, leg) in legs.iter().enumerate() {
+        rates[i + 1] = rates[i + 1].min(reach(rates[i], leg));
+    }
+    for (i, leg) in legs.iter().enumerate().rev() {
+        rates[i] = rates[i].min(reach(rates[i + 1], leg));
+    }
+}
+
+fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], [skip, _]: [f64; 2]) -> Schedule {
+    let mut result = Schedule {
+        records: Vec::with_capacity(3 * legs.len()),
+        dips: 0,
+        duration: 0.0,
+    };
+    let (mut time, mut s) = (0.0, skip);
+    for (i, leg) in legs.iter().enumerate() {
+        let length = leg.length - if i == 0 { skip } else { 0.0 };
+        let a = SHARE * leg.acceleration;
+        let (v0, v1) = (rates[i], rates[i + 1]);
+        let top = (0.5 * (v0 * v0 + v1 * v1) + a * length)
+            .sqrt()
+            .min(1.0)
+            .max(v0)
+            .max(v1);
+        let ways = [
+            (top * top - v0 * v0) / (2.0 * a),
+            0.0,
+            (top * top - v1 * v1) / (2.0 * a),
+        ];
+        let flat = (length - ways[0] - ways[2]).max(0.0);
+        let times = [(top - v0) / a, flat / top.max(1e-12), (top - v1) / a];
+        for ((dt, rate), change) in times.iter().zip([v0, top, top]).zip([a, 0.0, -a]) {
+            if *dt > 0.0 {
+                result.records.push([time, s, rate, change]);
+                time += dt;
+                s += (rate + 0.5 * change * dt) * dt;
+            }
+        }
+        if i > 0 && v0 < 0.7 * top {
+            result.dips += 1;
+        }
+    }
+    let end: f64 = legs.iter().map(|leg| leg.length).sum();
+    result.records.push([time, end, 0.0, 0.0]);
+    result.duration = time;
+    result
+}
+
+/// Control points at the smoothed progress; `[spans, lead, smoothing]`.
+fn place<const D: usize>(
+    problem: &Problem<D>,
+    legs: &[Leg<D>],
+    schedule: &Schedule,
+    [spans, lead, smoothing]: [f64; 3],
+) -> Point<D> {
+    let knots = spans as usize + 4;
+    let h = problem.scale;
+    let progress = |k: usize| schedule.smooth((k as f64 - 1.5) * h - lead, smoothing);
+    let mut ends = vec![0.0];
+    for leg in legs {
+        ends.push(ends[ends.len() - 1] + leg.length);
+    }
+    let mut control = Vec::with_capacity(knots);
+    for k in 0..knots {
+        let s = progress(k);
+        let at = ends.partition_point(|end| *end <= s).clamp(1, legs.len());
+        let share = s - ends[at - 1];
+        let mut c = problem.vertices[at - 1];
+        for d in 0..D {
+            c[d] += share * legs[at - 1].direction[d];
+        }
+        control.push(c);
+    }
+    let mut point = Point {
+        control,
+        z: 1.0,
+        passes: Vec::with_capacity(ends.len()),
+    };
+    let mut k = 0;
+    for end in &ends[1..ends.len() - 1] {
+        while k + 1 < knots && progress(k + 1) < *end {
+            k += 1;
+        }
+        let (low, high) = (progress(k), progress(k + 1));
+        let share = if high > low {
+            ((end - low) / (high - low)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        point
+            .passes
+            .push((k as f64 + share - 1.5).clamp(0.0, spans));
+    }
+    blend_in(problem, &mut point);
+    for c in point.control.iter_mut().rev().take(4) {
+        *c = problem.vertices[problem.vertices.len() - 1];
+    }
+    point
+}
+
+/// Lets the offset between the start's own control points and the polyline
+/// fade out over a dozen control points.
+fn blend_in<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
+    let planned = point.control[3];
+    problem.pin(point);
+    let fade = 12.0_f64.min(point.control.len() as f64 / 2.0);
+    for k in 4..point.control.len() {
+        let left = (1.0 - (k as f64 - 3.0) / fade).max(0.0);
+        for d in 0..D {
+            point.control[k][d] += (point.control[3][d] - planned[d]) * left * left;
+        }
+    }
+}

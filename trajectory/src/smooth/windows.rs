@@ -1,0 +1,293 @@
+//! Long lists, window by window, so that motion can start after the first.
+
+use std::collections::VecDeque;
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use super::certificate::certify;
+use super::choose::{Motion, from_motion, from_rest};
+use super::exact_stop;
+use super::options::{SmoothError, SmoothOptions};
+use super::pass::passes;
+use super::plan::{Method, SmoothPlan};
+use super::span::Span;
+use super::spline::Moving;
+use crate::line::body_turn;
+
+/// Longest part of a leg in one go, in time at full speed, s.
+const LONGEST: f64 = 1.0;
+
+/// Least and most of a window, in braking times.
+const LEAST_BRAKES: f64 = 8.0;
+const MOST_BRAKES: f64 = 30.0;
+
+/// Part of a window's end that is planned again, in braking times.
+const AGAIN_BRAKES: f64 = 2.0;
+
+/// Most poses of one window.
+const MOST_POSES: usize = 400;
+
+/// Plans a list of poses window by window, with look-ahead.
+///
+/// Each window ends at rest, so what is planned is always safe to start. Most
+/// of a window is then committed; the next one continues from that state of
+/// motion, so that joins keep speed. The cost grows linearly with the list.
+///
+/// ```
+/// use nalgebra::Isometry3;
+/// use trajectory::{ToolLimits, smooth::{SmoothOptions, Windows}};
+/// let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
+/// let poses: Vec<_> = (0..100)
+///     .map(|i| Isometry3::translation(0.01 * f64::from(i), 0.01 * f64::from(i % 2), 0.0))
+///     .collect();
+/// let mut windows = Windows::new(&poses, &SmoothOptions::new(0.001, limits))?;
+/// assert!(windows.advance()); // motion may start now
+/// assert!(windows.committed() > 0.0);
+/// let plan = windows.finish();
+/// assert!(plan.certificate().holds());
+/// # Ok::<(), trajectory::smooth::SmoothError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Windows {
+    /// The poses as given.
+    given: Vec<Isometry3<f64>>,
+    /// Poses without repeats, long legs divided.
+    poses: Vec<Isometry3<f64>>,
+    options: SmoothOptions,
+    /// What is committed, from the start on.
+    done: Motion,
+    /// The rest of the last window, from the end of `done`, to rest in
+    /// `poses[end]`.
+    tail: Motion,
+    /// Pose passed last at the end of `done`.
+    passed: usize,
+    /// Last pose of the last window.
+    end: usize,
+}
+
+impl Windows {
+    /// Prepares a list of poses, the first of which is the start; plans
+    /// nothing yet.
+    ///
+    /// # Errors
+    /// [`SmoothError`] when a number of the input is unusable.
+    pub fn new(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<Self, SmoothError> {
+        options.check(poses)?;
+        let options = options.finite();
+        let empty = Motion {
+            spans: Vec::new(),
+            parts: Vec::new(),
+        };
+        Ok(Self {
+            poses: divided(poses, &options),
+            given: poses.to_vec(),
+            options,
+            done: empty.clone(),
+            tail: empty,
+            passed: 0,
+            end: 0,
+        })
+    }
+
+    /// Plans the next window; false when the whole list is planned.
+    pub fn advance(&mut self) -> bool {
+        if self.end + 1 >= self.poses.len() {
+            let tail = std::mem::replace(
+                &mut self.tail,
+                Motion {
+                    spans: Vec::new(),
+                    parts: Vec::new(),
+                },
+            );
+            self.done.append(tail);
+            return false;
+        }
+        let end = self.window(if self.tail.spans.is_empty() {
+            self.end
+        } else {
+            self.passed
+        });
+        self.tail = self.plan(end);
+        self.end = end;
+        if end + 1 < self.poses.len() {
+            self.commit();
+        } else {
+            let tail = std::mem::replace(
+                &mut self.tail,
+                Motion {
+                    spans: Vec::new(),
+                    parts: Vec::new(),
+                },
+            );
+            self.done.append(tail);
+        }
+        true
+    }
+
+    /// Time (s) up to which the motion is final and may be executed; the rest
+    /// of the planned part, which ends at rest, may still be improved.
+    #[must_use]
+    pub fn committed(&self) -> f64 {
+        self.done.duration()
+    }
+
+    /// Plans what is left and certifies the whole.
+    #[must_use]
+    pub fn finish(mut self) -> SmoothPlan {
+        while self.advance() {}
+        let stop = exact_stop::plan(&self.given, &self.options.limits);
+        let exact_stop = stop.last().map_or(0.0, Span::end);
+        let whole = certify(&self.done.spans, &self.given, &self.options);
+        if whole.0.holds() && self.done.duration() <= exact_stop * (1.0 + 1e-12) {
+            return SmoothPlan::new(&self.given, self.done, whole, exact_stop);
+        }
+        let parts = if stop.is_empty() {
+            Vec::new()
+        } else {
+            vec![(Method::ExactStop, stop.len())]
+        };
+        let whole = certify(&stop, &self.given, &self.options);
+        SmoothPlan::new(
+            &self.given,
+            Motion { spans: stop, parts },
+            whole,
+            exact_stop,
+        )
+    }
+
+    /// Braking time from full speed, s.
+    fn brake(&self) -> f64 {
+        let limits = &self.options.limits;
+        limits.speed / limits.acceleration + limits.acceleration / limits.jerk
+    }
+
+    /// Last pose of a window that begins at pose `from`.
+    fn window(&self, from: usize) -> usize {
+        let (mut end, mut time) = (from, 0.0);
+        let most = MOST_BRAKES * self.brake();
+        while end + 1 < self.poses.len() && end - from < MOST_POSES {
+            let enough =
+                end - from >= self.options.window.max(2) && time >= LEAST_BRAKES * self.brake();
+            if end - from >= 3 && (enough || time >= most) {
+                break;
+            }
+            time += full_speed(&self.poses[end], &self.poses[end + 1], &self.options);
+            end += 1;
+        }
+        // A short rest of the list joins this window.
+        if self.poses.len() - 1 - end <= self.options.window / 4 {
+            self.poses.len() - 1
+        } else {
+            end
+        }
+    }
+
+    /// Motion from the end of `done` to rest in pose `end`.
+    fn plan(&self, end: usize) -> Motion {
+        if self.tail.spans.is_empty() {
+            return from_rest(&self.poses[self.end..=end], &self.options);
+        }
+        let more = &self.poses[self.end..=end];
+        let stop = exact_stop::plan(more, &self.options.limits);
+        let most = self.tail.duration() + stop.last().map_or(0.0, Span::end);
+        let moving = self.tail.spans.first().map(|span| Moving {
+            state: span.at(0.0),
+            spacing: span.duration,
+        });
+        let ahead = moving.and_then(|moving| {
+            from_motion(&self.poses[self.passed..=end], &self.options, &moving, most)
+        });
+        ahead.unwrap_or_else(|| {
+            let mut motion = self.tail.clone();
+            motion.append(from_rest(more, &self.options));
+            motion
+        })
+    }
+
+    /// Moves the safe part of the tail to what is done.
+    fn commit(&mut self) {
+        let poses = &self.poses[self.passed..=self.end];
+        let latest = self.tail.duration() - AGAIN_BRAKES * self.brake();
+        let passes = passes(&self.tail.spans, poses, &self.options);
+        let smooth = self.tail.parts.len() == 1 && self.tail.parts[0].0 == Method::Spline;
+        let mut best = None;
+        for (i, pass) in passes.iter().enumerate().filter(|_| smooth) {
+            let next = passes
+                .get(i + 1)
+                .map_or(self.tail.duration(), |next| next.time);
+            let cut = self
+                .tail
+                .spans
+                .partition_point(|span| span.start < pass.time);
+            let start = self
+                .tail
+                .spans
+                .get(cut)
+                .map_or(f64::INFINITY, |span| span.start);
+            if start < next && start <= latest {
+                best = Some((cut, self.passed + pass.index));
+            }
+        }
+        let Some((cut, passed)) = best else {
+            let tail = std::mem::replace(
+                &mut self.tail,
+                Motion {
+                    spans: Vec::new(),
+                    parts: Vec::new(),
+                },
+            );
+            self.done.append(tail);
+            self.passed = self.end;
+            return;
+        };
+        let rest = self.tail.spans.split_off(cut);
+        let offset = rest.first().map_or(0.0, |span| span.start);
+        let rest: VecDeque<Span> = rest.into();
+        let rest = rest.into_iter().map(|mut span| {
+            span.start -= offset;
+            span
+        });
+        let rest: Vec<Span> = rest.collect();
+        let parts = vec![(Method::Spline, rest.len())];
+        let mut head = std::mem::replace(&mut self.tail, Motion { spans: rest, parts });
+        head.parts = vec![(Method::Spline, head.spans.len())];
+        self.done.append(head);
+        self.passed = passed;
+    }
+}
+
+/// Time of a leg at full speed, s.
+fn full_speed(from: &Isometry3<f64>, to: &Isometry3<f64>, options: &SmoothOptions) -> f64 {
+    let way = (to.translation.vector - from.translation.vector).norm();
+    let turn = body_turn(&from.rotation, &to.rotation).norm();
+    (way / options.limits.speed).max(turn / options.limits.angular_speed)
+}
+
+/// Poses without repeats; legs longer than [`LONGEST`] are divided, as one
+/// spline cannot be both long and fine.
+fn divided(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f64>> {
+    let mut result = vec![poses[0]];
+    let limits = &options.limits;
+    let longest = LONGEST.max(20.0 * limits.acceleration / limits.jerk);
+    for pose in &poses[1..] {
+        let from = result[result.len() - 1];
+        if crate::line::Line::new(from, *pose).is_still() {
+            continue;
+        }
+        let parts = (full_speed(&from, pose, options) / longest)
+            .ceil()
+            .clamp(1.0, 1e4);
+        let (way, turn) = (
+            pose.translation.vector - from.translation.vector,
+            body_turn(&from.rotation, &pose.rotation),
+        );
+        for i in 1..parts as usize {
+            let share = i as f64 / parts;
+            let place = from.translation.vector + way * share;
+            let rotation = from.rotation * UnitQuaternion::from_scaled_axis(turn * share);
+            result.push(Isometry3::from_parts(place.into(), rotation));
+        }
+        result.push(*pose);
+    }
+    result
+}
