@@ -114,6 +114,7 @@ pub(crate) struct Joint {
     pub(crate) units: Units,
     pub(crate) brake: Brake,
     pause: f64,
+    smooth: bool,
     /// The normalised start before and after braking.
     pub(crate) start: Point,
     pub(crate) launch: Point,
@@ -126,6 +127,7 @@ impl Default for Joint {
             units: Units::new(1.0, 1.0, 1.0),
             brake: Brake::default(),
             pause: 0.0,
+            smooth: true,
             start: Point::default(),
             launch: Point::default(),
             task: Task::Idle,
@@ -187,6 +189,7 @@ impl Joint {
             units,
             brake,
             pause,
+            smooth: bounds.smooth,
             start,
             launch,
             task,
@@ -197,6 +200,11 @@ impl Joint {
     pub(crate) fn scaled(mut self, share: f64) -> Self {
         self.units = self.units.scaled(share);
         self
+    }
+
+    /// Whether jerk is limited.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.smooth
     }
 
     /// How long (s) it takes to get back inside the limits.

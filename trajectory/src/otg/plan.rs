@@ -144,6 +144,9 @@ fn assemble<const N: usize>(
             ],
         };
         finish(&mut track, options.enabled[joint], options.interface[joint]);
+        if !joints[joint].is_smooth() {
+            track.end[2] = 0.0;
+        }
         track
     });
     let duration = durations.iter().copied().fold(0.0, f64::max);

@@ -12,17 +12,21 @@ mod certificate;
 mod grid;
 mod interior;
 mod lanes;
+mod law;
 mod options;
 mod pieces;
 mod problem;
 mod reach;
+mod samples;
 mod survey;
 mod tighten;
 mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
+pub use law::{Law, LawProblem};
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
+pub use samples::RandomPaths;
 
 use grid::{Bounded, Grid};
 use survey::Survey;

@@ -10,7 +10,7 @@ use super::problem::Problem;
 use crate::{Path, TimingError};
 
 /// Newton steps after which the best law so far is taken.
-const MOST_STEPS: usize = 60;
+pub(super) const MOST_STEPS: usize = 60;
 /// Newton steps after rows were tightened.
 const FEW_STEPS: usize = 12;
 /// Times that rows are tightened.
