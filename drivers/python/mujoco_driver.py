@@ -33,13 +33,12 @@ class Physics(Robot):
         self.velocity = (limits + [3.14] * n)[:n]
         self.acceleration, self.jerk = [10.0] * n, [100.0] * n
         self.frequency = frequency
-        self.mass = numpy.zeros((n, n))
         self.gripper = messages.TOOL_OPEN
         self.viewer = None
         if viewer:
-            import mujoco.viewer
+            from mujoco import viewer as window
 
-            self.viewer = mujoco.viewer.launch_passive(self.model, self.data)
+            self.viewer = window.launch_passive(self.model, self.data)
 
     def measure(self):
         return self.data.qpos.tolist(), self.data.qvel.tolist()
@@ -48,15 +47,14 @@ class Physics(Robot):
         model, data, w = self.model, self.data, self.frequency
         w = min(w, 0.4 / period)
         model.opt.timestep = period
-        wanted = (
+        data.qacc[:] = (
             numpy.asarray(acceleration)
             + 2 * w * (numpy.asarray(velocity) - data.qvel)
             + w * w * (numpy.asarray(position) - data.qpos)
         )
-        mujoco.mj_fullM(model, self.mass, data.qM)
-        data.qfrc_applied[:] = self.mass @ wanted + data.qfrc_bias - data.qfrc_passive
+        mujoco.mj_inverse(model, data)
+        data.qfrc_applied[:] = data.qfrc_inverse
         mujoco.mj_step(model, data)
-        mujoco.mj_forward(model, data)
         if self.viewer is not None:
             self.viewer.sync()
 

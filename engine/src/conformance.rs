@@ -56,74 +56,52 @@ pub fn test_driver(arm: &Arm, joints: usize) -> Result<Vec<Clause>, IpcError> {
     let hello = Hello::new(joints, PERIOD, WATCHDOG, Clock::Wall);
     let ack = link.greet(&hello, Duration::from_secs(3))?;
     let mut player = Player::new(link, hello, ack);
-    let mut clauses = Vec::new();
-    let mut judge = |name, seen: Seen| {
-        let (verdict, seen) = match seen {
-            Ok(seen) if seen.starts_with("no ") => (Verdict::Skip, seen),
-            Ok(seen) => (Verdict::Pass, seen),
-            Err(seen) => (Verdict::Fail, seen),
-        };
-        clauses.push(Clause {
-            name,
-            verdict,
-            seen,
-        });
-    };
-    judge(
+    let mut clauses = vec![judge(
         "handshake",
         Ok(format!("session {:#x}", player.ack.session)),
-    );
-    judge(
-        "wrong protocol is refused",
-        player.refuses(|hello| hello.protocol += 1),
-    );
-    judge(
-        "wrong layout is refused",
-        player.refuses(|hello| hello.schema ^= 1),
-    );
-    judge(
-        "wrong joint count is refused",
-        player.refuses(|hello| hello.joints += 1),
-    );
-    judge(
-        "wrong period is refused",
-        player.refuses(|hello| hello.period_ns = 1),
-    );
-    judge("states come at the rate", player.reopen(Player::rate));
-    judge(
-        "a setpoint of another session is ignored",
-        player.reopen(Player::foreign),
-    );
-    judge("becomes active by holding", player.reopen(Player::holds));
-    judge("follows a motion", player.reopen(Player::follows));
-    judge("the gripper answers", player.reopen(Player::gripper));
-    judge(
-        "silence trips the watchdog and latches",
-        player.reopen(Player::silence),
-    );
-    judge(
-        "a new session begins where the arm is",
-        player.reopen(Player::holds),
-    );
-    judge(
-        "a jump is not followed and latches",
-        player.reopen(|p| p.spoil(|s| s.position[0] += 0.4)),
-    );
-    let nan = |setpoint: &mut Setpoint| setpoint.position[0] = f64::NAN;
-    judge(
-        "a number that is not finite latches",
-        player.reopen(|p| p.spoil(nan)),
-    );
-    let stop = |setpoint: &mut Setpoint| setpoint.flags |= SetpointFlags::STOP_REQUEST;
-    judge(
-        "a stop request stops and latches",
-        player.reopen(|p| p.spoil(stop)),
-    );
-    judge(
-        "goodbye ends the session without a fault",
-        player.reopen(Player::goodbye),
-    );
+    )];
+    let requests: [(&'static str, fn(&mut Hello)); 4] = [
+        ("wrong protocol is refused", |hello| hello.protocol += 1),
+        ("wrong layout is refused", |hello| hello.schema ^= 1),
+        ("wrong joint count is refused", |hello| hello.joints += 1),
+        ("wrong period is refused", |hello| hello.period_ns = 1),
+    ];
+    clauses.extend(requests.map(|(name, change)| judge(name, player.refuses(change))));
+    let sessions: [(&'static str, fn(&mut Player) -> Seen); 11] = [
+        ("states come at the rate", Player::rate),
+        ("a setpoint of another session is ignored", Player::foreign),
+        ("becomes active by holding", Player::holds),
+        ("follows a motion", Player::follows),
+        ("the gripper answers", Player::gripper),
+        ("silence trips the watchdog and latches", Player::silence),
+        ("a new session begins where the arm is", Player::holds),
+        ("a jump is not followed and latches", |player| {
+            player.spoil(|s| s.position[0] += 0.4)
+        }),
+        ("a number that is not finite latches", |player| {
+            player.spoil(|s| s.position[0] = f64::NAN)
+        }),
+        ("a stop request stops and latches", |player| {
+            player.spoil(|setpoint| setpoint.flags |= SetpointFlags::STOP_REQUEST)
+        }),
+        ("goodbye ends the session without a fault", Player::goodbye),
+    ];
+    clauses.extend(sessions.map(|(name, clause)| judge(name, player.reopen(clause))));
     Ok(clauses)
+}
+
+/// What was seen, as a verdict.
+fn judge(name: &'static str, seen: Seen) -> Clause {
+    let (verdict, seen) = match seen {
+        Ok(seen) if seen.starts_with("no ") => (Verdict::Skip, seen),
+        Ok(seen) => (Verdict::Pass, seen),
+        Err(seen) => (Verdict::Fail, seen),
+    };
+    Clause {
+        name,
+        verdict,
+        seen,
+    }
 }
 
 /// An engine that does what a test wants.

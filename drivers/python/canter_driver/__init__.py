@@ -288,7 +288,7 @@ def run(arm, robot, stop=lambda: False):
     link, driver = Link(arm), Driver(robot)
     turns = 0
     while not stop():
-        if not driver.lock_step or turns % 256 == 0:
+        if not driver.lock_step or turns % 256 == 255:
             answer_greeting(link, driver)
         if driver.lock_step:
             turns = lock_step(link, driver, turns + 1)
