@@ -48,6 +48,11 @@ impl Axis {
         }
     }
 
+    /// Start, end, bounds and distance.
+    pub(crate) fn parts(&self) -> (End, End, Bounds, f64) {
+        (self.start, self.end, self.bounds, self.distance)
+    }
+
     /// Whether the joint can arrive after exactly `time`, seen at a glance: `None` if a closer
     /// look is needed.
     fn glance(&self, time: f64) -> Option<bool> {

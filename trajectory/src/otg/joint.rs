@@ -2,6 +2,7 @@
 
 use super::axis::Axis;
 use super::brake::Brake;
+use super::direct::direct;
 use super::limits::Limits;
 use super::options::Interface;
 use super::pace::Pace;
@@ -234,6 +235,14 @@ impl Joint {
             Task::Idle => Course::default(),
             Task::Reach(axis) => axis.course(time),
             Task::Pace(pace) => pace.course(time),
+        }
+    }
+
+    /// The profile of `duration` (s) that strays least, if there is one of that shape.
+    pub(crate) fn direct_course(&self, duration: f64) -> Option<Course> {
+        match &self.task {
+            Task::Reach(axis) => direct(axis, duration / self.units.time - self.pause),
+            Task::Idle | Task::Pace(_) => None,
         }
     }
 

@@ -5,6 +5,7 @@ mod axis;
 mod bench;
 mod brake;
 mod check;
+mod direct;
 mod error;
 mod extent;
 mod joint;

@@ -34,13 +34,13 @@ pub(crate) fn plan<const N: usize>(
             Joint::default()
         }
     });
-    let motion = if options.synchronisation == Synchronisation::None {
+    let mut motion = if options.synchronisation == Synchronisation::None {
         apart(&joints, start, target, options)?
     } else {
         let duration = common_duration(&joints, options)?;
         assemble(&joints, start, target, options, &[duration; N])
     };
-    check::positions(&motion, limits, options)?;
+    check::keep_positions(&mut motion, limits, options)?;
     Ok(motion)
 }
 

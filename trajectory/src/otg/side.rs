@@ -50,6 +50,15 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
+    /// The same bounds for the motion run backward: what rises falls.
+    pub(crate) fn reversed(self) -> Self {
+        Self {
+            rise: self.fall,
+            fall: self.rise,
+            ..self
+        }
+    }
+
     /// The same bounds seen in a mirror.
     pub(crate) fn mirrored(self) -> Self {
         Self {
@@ -95,7 +104,7 @@ pub(crate) struct Extremal {
 }
 
 /// Time and height of the acceleration pulse that changes the velocity by `change` >= 0.
-fn pulse(change: f64, bound: f64) -> (f64, f64) {
+pub(crate) fn pulse(change: f64, bound: f64) -> (f64, f64) {
     if change <= bound * bound {
         let height = change.max(0.0).sqrt();
         (2.0 * height, height)

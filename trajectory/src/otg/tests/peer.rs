@@ -71,18 +71,30 @@ fn agree<const N: usize>(seed: u64, ends: Ends, kind: Kind, count: usize) -> usi
     refused
 }
 
-/// 1e5 problems over all kinds and ends.
-#[test]
-fn agrees_with_peer_in_all_modes() {
+/// `scale` times 1e5 problems over all kinds and ends.
+fn agrees_in_all_modes(seed: u64, scale: usize) {
     for (index, kind) in KINDS.into_iter().enumerate() {
-        let seed = 100 + index as u64;
-        let refused = agree::<1>(seed, Ends::Moving, kind, 5_000)
-            + agree::<3>(seed, Ends::Moving, kind, 4_000)
-            + agree::<3>(seed, Ends::Stopping, kind, 2_000)
-            + agree::<7>(seed, Ends::Resting, kind, 1_500);
+        let seed = seed + index as u64;
+        let refused = agree::<1>(seed, Ends::Moving, kind, 5_000 * scale)
+            + agree::<3>(seed, Ends::Moving, kind, 4_000 * scale)
+            + agree::<3>(seed, Ends::Stopping, kind, 2_000 * scale)
+            + agree::<7>(seed, Ends::Resting, kind, 1_500 * scale);
+        println!("{kind:?}: the peer refused {refused} of {}", 12_500 * scale);
         assert!(
-            refused < 250,
+            refused < 250 * scale,
             "{kind:?}: nothing to compare with in {refused} cases"
         );
     }
+}
+
+#[test]
+fn agrees_with_peer_in_all_modes() {
+    agrees_in_all_modes(100, 1);
+}
+
+/// The nightly size: 1e7 problems.
+#[test]
+#[ignore = "takes minutes"]
+fn agrees_with_peer_in_all_modes_at_length() {
+    agrees_in_all_modes(1000, 100);
 }

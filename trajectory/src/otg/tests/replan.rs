@@ -89,3 +89,13 @@ fn own_states_never_fail_nor_slow_down() {
     assert_eq!(plain.failed, 0, "{plain:?}");
     assert!(plain.slower * 10_000 <= plain.plans, "{plain:?}");
 }
+
+/// The nightly size: 1e7 plans of either way.
+#[test]
+#[ignore = "takes minutes"]
+fn own_states_never_fail_nor_slow_down_at_length() {
+    let (plain, kept) = all(90);
+    assert_eq!((kept.failed, kept.slower), (0, 0), "{kept:?}");
+    assert_eq!(plain.failed, 0, "{plain:?}");
+    assert!(plain.slower * 10_000 <= plain.plans, "{plain:?}");
+}
