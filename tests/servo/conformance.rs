@@ -8,7 +8,9 @@ use system_tests::servo_arm::{JOINTS, driver_options};
 
 #[test]
 fn the_simulated_driver_conforms() {
-    let arm: ipc::Arm = format!("conform-{}/sim", std::process::id()).parse().unwrap();
+    let arm: ipc::Arm = format!("conform-{}/sim", std::process::id())
+        .parse()
+        .unwrap();
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let options = driver_options(arm.clone());
@@ -27,7 +29,9 @@ fn the_simulated_driver_conforms() {
 /// A driver that is too slow to follow and has no gripper is seen.
 #[test]
 fn a_lazy_driver_is_seen() {
-    let arm: ipc::Arm = format!("conform-{}/lazy", std::process::id()).parse().unwrap();
+    let arm: ipc::Arm = format!("conform-{}/lazy", std::process::id())
+        .parse()
+        .unwrap();
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let mut options = driver_options(arm.clone());
@@ -37,7 +41,10 @@ fn a_lazy_driver_is_seen() {
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
         let clauses = test_driver(&arm, JOINTS).unwrap();
         let verdict = |name: &str| {
-            clauses.iter().find(|clause| clause.name == name).map(|clause| clause.verdict)
+            clauses
+                .iter()
+                .find(|clause| clause.name == name)
+                .map(|clause| clause.verdict)
         };
         assert_eq!(verdict("follows a motion"), Some(Verdict::Fail));
         assert_eq!(verdict("the gripper answers"), Some(Verdict::Skip));

@@ -6,6 +6,7 @@ mod abort;
 mod check;
 mod completions;
 mod driver;
+mod engine;
 mod fk;
 mod ik;
 mod man;
@@ -16,7 +17,9 @@ mod recover;
 mod resume;
 mod robots;
 mod run;
+mod send;
 mod shutdown;
+mod status;
 mod stop;
 
 use clap::Subcommand;
@@ -31,6 +34,7 @@ pub(crate) enum Command {
     Check(check::Check),
     Completions(completions::Completions),
     Driver(driver::Driver),
+    Engine(engine::Engine),
     Fk(fk::Fk),
     Ik(ik::Ik),
     Man(man::Man),
@@ -41,7 +45,9 @@ pub(crate) enum Command {
     Resume(resume::Resume),
     Robots(robots::Robots),
     Run(run::Run),
+    Send(send::Send),
     Shutdown(shutdown::Shutdown),
+    Status(status::Status),
     Stop(stop::Stop),
 }
 
@@ -53,6 +59,7 @@ impl Command {
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Driver(command) => command.run(),
+            Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
             Self::Man(command) => command.run(),
@@ -63,7 +70,9 @@ impl Command {
             Self::Resume(command) => command.run(),
             Self::Robots(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
+            Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
         }
     }
