@@ -83,6 +83,9 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, moving: bool) -> P
     } else {
         total / (spans - 3) as f64
     };
+    if moving {
+        calm(problem);
+    }
     // A spacing that was lowered needs more spans for the same time.
     let spans = if moving {
         ((total / problem.scale).ceil() as usize + 3).min(2 * MOST as usize)
