@@ -13,7 +13,7 @@ use super::spline::{self, Effort, Moving, Request};
 /// Effort of one spline: a time within 0.1 % of the optimum.
 const EFFORT: Effort = Effort {
     steps: 90,
-    search: 55,
+    search: 72,
     gap: 3e-3,
 };
 

@@ -22,10 +22,6 @@ const MOST_BRAKES: f64 = 16.0;
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
 
-/// Stretch before that part in which the calmest place to join is looked for,
-/// in braking times.
-const LATE_BRAKES: f64 = 4.0;
-
 /// Share of the speed limit used by windows that others follow: the hull of a
 /// start in motion on a bend is a little faster than the motion.
 const JOIN_SPEED: f64 = 0.998;
@@ -215,37 +211,28 @@ impl Windows {
         })
     }
 
-    /// How far from calm cruising a span begins: there a join costs nothing.
-    fn unrest(&self, span: &Span) -> f64 {
-        let [_, _, acceleration, jerk] = span.motion(0.0);
-        let limits = &self.options.limits;
-        4.0 * (acceleration.norm() / limits.acceleration + jerk.norm() / limits.jerk)
-    }
-
     /// Moves the safe part of the tail to what is done.
     fn commit(&mut self) {
         let poses = &self.poses[self.passed..=self.end];
         let latest = self.tail.duration() - AGAIN_BRAKES * self.brake();
-        let earliest = (latest - LATE_BRAKES * self.brake()).max(0.5 * latest);
         let passes = passes(&self.tail.spans, poses, &self.options);
         let smooth = self.tail.parts.len() == 1 && self.tail.parts[0].0 == Method::Spline;
-        let (mut best, mut least) = (None, f64::INFINITY);
+        let mut best = None;
         for (i, pass) in passes.iter().enumerate().filter(|_| smooth) {
             let next = passes
                 .get(i + 1)
                 .map_or(self.tail.duration(), |next| next.time);
-            let first = self
+            let cut = self
                 .tail
                 .spans
                 .partition_point(|span| span.start < pass.time);
-            let cuts = self.tail.spans.iter().enumerate().skip(first);
-            for (cut, span) in
-                cuts.take_while(|(_, span)| span.start < next && span.start <= latest)
-            {
-                let unrest = self.unrest(span) + (latest - span.start) / self.brake();
-                if span.start >= earliest && unrest < least {
-                    (best, least) = (Some((cut, self.passed + pass.index)), unrest);
-                }
+            let start = self
+                .tail
+                .spans
+                .get(cut)
+                .map_or(f64::INFINITY, |span| span.start);
+            if start < next && start <= latest {
+                best = Some((cut, self.passed + pass.index));
             }
         }
         let Some((cut, passed)) = best else {
