@@ -9,6 +9,7 @@
 //! variable.
 
 pub mod command_error;
+pub mod conformance;
 pub mod controller;
 mod dof;
 pub mod dry_run;
