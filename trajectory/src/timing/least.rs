@@ -62,7 +62,7 @@ mod tests {
     fn textbook_durations() {
         let limits = [2.0, 10.0, 100.0];
         assert!((least_time(1.0, limits) - 0.8).abs() < 1e-12);
-        assert!((least_time(0.1, limits) - (0.1 + 0.05_f64.sqrt())).abs() < 1e-12);
+        assert!((least_time(0.4, limits) - (0.1 + 0.17_f64.sqrt())).abs() < 1e-12);
         assert!((least_time(1e-3, limits) - (32e-5_f64).cbrt()).abs() < 1e-12);
         assert!((least_time(1.0, [2.0, f64::INFINITY, f64::INFINITY]) - 0.5).abs() < 1e-9);
         assert!((least_time(1.0, [1e9, 4.0, f64::INFINITY]) - 1.0).abs() < 1e-9);
