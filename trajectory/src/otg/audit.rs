@@ -12,7 +12,7 @@ use super::state::State;
 /// accelerations, A/J for times (J the jerk limit), hence A²/J for velocities and A³/J² for
 /// positions; V, V/A where jerk is not limited. Positions are further divided by
 /// `1 + |start| + |target| + fastest · duration` in those units, velocities by `1 + fastest`, since
-/// numbers of that size are all that floating point resolves. Steps of the acceleration are less
+/// numbers of that size are all that floating point resolves. Steps and excess of the acceleration are less
 /// what four roundings of a time as long as the move amount to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
@@ -144,7 +144,10 @@ impl Audit {
             raise(&mut self.velocity, over / scale.velocity);
             let over = (a.max(b) - limits.acceleration_max[joint])
                 .max(limits.acceleration_min[joint] - a.min(b));
-            raise(&mut self.acceleration, over / scale.acceleration);
+            raise(
+                &mut self.acceleration,
+                (over - scale.rounding) / scale.acceleration,
+            );
         }
     }
 }
@@ -193,7 +196,11 @@ impl Scale {
             position: acceleration * time * time + way,
             velocity: acceleration * time + fastest,
             acceleration,
-            rounding: if second { 0.0 } else { 4.0 * f64::EPSILON * motion.duration() * jerk },
+            rounding: if second {
+                0.0
+            } else {
+                4.0 * f64::EPSILON * motion.duration() * jerk
+            },
             braking: motion.braking(joint),
             positions: motion.reaches_position(joint),
             accelerations: !second,
