@@ -9,6 +9,7 @@
 //! variable.
 
 pub mod command_error;
+pub mod conformance;
 pub mod controller;
 mod dof;
 pub mod dry_run;
@@ -17,6 +18,7 @@ pub mod modal;
 pub mod planner;
 pub mod queue;
 pub mod robot;
+pub mod server;
 pub mod session;
 pub mod task;
 pub mod tooling;
