@@ -11,6 +11,7 @@
 //! It is a library with one function so that the system tests run the same code as a process of
 //! their own; the binary `canter` is three lines.
 
+mod arm_motion;
 mod commands;
 mod exit;
 mod failure;
@@ -20,6 +21,7 @@ mod output;
 mod plot;
 mod robot;
 mod table;
+mod world_file;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;

@@ -5,7 +5,10 @@
 mod completions;
 mod fk;
 mod man;
+mod plan_check;
+mod plan_run;
 mod robots;
+mod world;
 
 use clap::Subcommand;
 
@@ -17,6 +20,9 @@ use crate::failure::Failure;
 pub(crate) enum Command {
     Fk(fk::Fk),
     Robots(robots::Robots),
+    World(world::World),
+    PlanCheck(plan_check::PlanCheck),
+    PlanRun(plan_run::PlanRun),
     Completions(completions::Completions),
     Man(man::Man),
 }
@@ -27,6 +33,9 @@ impl Command {
         match self {
             Self::Fk(command) => command.run(),
             Self::Robots(command) => command.run(),
+            Self::World(command) => command.run(),
+            Self::PlanCheck(command) => command.run(),
+            Self::PlanRun(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Man(command) => command.run(),
         }
