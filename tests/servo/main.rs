@@ -3,4 +3,5 @@
 
 mod lock_step;
 mod processes;
+mod virtual_time;
 mod wall_clock;

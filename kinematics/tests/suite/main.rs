@@ -3,5 +3,7 @@
 mod arms;
 mod chain;
 mod follow;
+mod fuzz;
+mod hard;
 mod ik;
 mod urdf;

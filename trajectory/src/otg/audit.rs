@@ -32,18 +32,21 @@ pub struct Audit {
 impl Audit {
     /// The largest of all numbers.
     pub fn worst(&self) -> f64 {
-        [
+        let mut worst = self.start;
+        for value in [
             self.end,
             self.joins,
             self.velocity,
             self.acceleration,
             self.jerk,
-        ]
-        .into_iter()
-        .fold(self.start, f64::max)
+        ] {
+            raise(&mut worst, value);
+        }
+        worst
     }
 
-    /// Checks `motion` against what was asked for. Limits are not checked while a joint brakes
+    /// Checks `motion` against what was asked for. Limits are not checked after a joint's
+    /// arrival, nor while it brakes
     /// because its start breaks them, and a velocity that is still beyond its limit then (because the
     /// opposite limit leaves no other way) only must not grow; positions that were not asked for count as reached.
     pub fn of<const N: usize>(
@@ -56,9 +59,10 @@ impl Audit {
         let mut audit = Self::default();
         for joint in 0..N {
             let scale = Scale::of(joint, limits, start, motion);
-            audit.ends(joint, &scale, &pieces, (start, target));
-            audit.pieces(joint, &scale, &pieces, limits);
-            audit.joins(joint, &scale, &pieces);
+            let pieces = until(&pieces, motion.arrival(joint).unwrap_or(0.0));
+            audit.ends(joint, &scale, pieces, (start, target));
+            audit.pieces(joint, &scale, pieces, limits);
+            audit.joins(joint, &scale, pieces);
         }
         audit
     }
@@ -206,6 +210,17 @@ impl Scale {
     }
 }
 
+/// The pieces up to `arrival` (s).
+fn until<const N: usize>(pieces: &[Piece<N>], arrival: f64) -> &[Piece<N>] {
+    let mut time = 0.0;
+    let count = pieces.iter().take_while(|piece| {
+        let middle = time + 0.5 * piece.duration;
+        time += piece.duration;
+        middle < arrival
+    });
+    &pieces[..count.count()]
+}
+
 /// Position, velocity and acceleration of a joint at `t` (s) in a piece.
 fn at<const N: usize>(piece: &Piece<N>, joint: usize, t: f64) -> [f64; 3] {
     let [p, v, a, j] = [0, 1, 2, 3].map(|power: usize| piece.coefficients[power][joint]);
@@ -217,8 +232,8 @@ fn at<const N: usize>(piece: &Piece<N>, joint: usize, t: f64) -> [f64; 3] {
 }
 
 fn raise(worst: &mut f64, value: f64) {
-    // A comparison that also lets a number that is none through.
-    if !(value <= *worst) {
+    // What is not a number is the worst of all, and stays.
+    if value.is_nan() || value > *worst {
         *worst = value;
     }
 }

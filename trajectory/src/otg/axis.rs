@@ -3,6 +3,10 @@
 use super::side::{Bounds, End, Extremal, Side};
 use super::strand::{Course, Strand};
 
+/// Relative residual of positions and velocities that counts as rounding: a start that was sampled
+/// from a motion of our own must find that motion again.
+const SLACK: f64 = 3e-13;
+
 /// The normalised problem of one joint: from `start` to `end`, which are `distance` apart.
 ///
 /// For a duration `T` the displacements that can be reached are exactly the interval between the
@@ -37,11 +41,16 @@ impl Axis {
             end,
             bounds,
             distance,
-            slack: noise + 1e-14 * (1.0 + distance.abs()),
+            slack: 64.0 * noise + SLACK * (1.0 + distance.abs()),
             up: Side::new(start, end, bounds),
             down: Side::new(start.mirrored(), end.mirrored(), bounds.mirrored()),
             resting: still(start) && still(end),
         }
+    }
+
+    /// Start, end, bounds and distance.
+    pub(crate) fn parts(&self) -> (End, End, Bounds, f64) {
+        (self.start, self.end, self.bounds, self.distance)
     }
 
     /// Whether the joint can arrive after exactly `time`, seen at a glance: `None` if a closer
@@ -206,12 +215,27 @@ pub(crate) fn velocity_windows(start: End, end: End, bounds: Bounds) -> Windows 
     let shortest = (af - a0).abs();
     let change = end.velocity - start.velocity;
     let half = 0.5 * (a0 * a0 + af * af);
-    let (up_first, up_next) = pulse_windows(change + half, bounds.rise, a0, af);
-    let (down_first, down_next) = pulse_windows(half - change, bounds.fall, -a0, -af);
+    let rounding = 0.1 * SLACK * (1.0 + start.velocity.abs() + end.velocity.abs());
+    // A start on the last phase: nothing is to be added to the straight way.
+    let snap = |square: f64, highest: f64| {
+        let straight = highest * highest;
+        if (square - straight).abs() <= rounding {
+            straight
+        } else {
+            square
+        }
+    };
+    let up = snap(change + half, a0.max(af));
+    let down = snap(half - change, (-a0).max(-af));
+    let (up_first, up_next) = pulse_windows(up, bounds.rise, a0, af);
+    let (down_first, down_next) = pulse_windows(down, bounds.fall, -a0, -af);
     let (up_next, down_next) = (up_next.max(shortest), down_next.max(shortest));
+    let window = |from: f64, last: f64| {
+        (from <= last + 1e-14 * (1.0 + last)).then_some((from, last.max(from)))
+    };
     let early = match (up_first, down_first) {
-        (Some(last), _) if down_next <= last => Some((down_next, last)),
-        (_, Some(last)) if up_next <= last => Some((up_next, last)),
+        (Some(last), _) => window(down_next, last),
+        (_, Some(last)) => window(up_next, last),
         _ => None,
     };
     Windows {

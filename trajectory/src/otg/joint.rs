@@ -2,6 +2,7 @@
 
 use super::axis::Axis;
 use super::brake::Brake;
+use super::direct::direct;
 use super::limits::Limits;
 use super::options::Interface;
 use super::pace::Pace;
@@ -114,6 +115,7 @@ pub(crate) struct Joint {
     pub(crate) units: Units,
     pub(crate) brake: Brake,
     pause: f64,
+    smooth: bool,
     /// The normalised start before and after braking.
     pub(crate) start: Point,
     pub(crate) launch: Point,
@@ -126,6 +128,7 @@ impl Default for Joint {
             units: Units::new(1.0, 1.0, 1.0),
             brake: Brake::default(),
             pause: 0.0,
+            smooth: true,
             start: Point::default(),
             launch: Point::default(),
             task: Task::Idle,
@@ -187,6 +190,7 @@ impl Joint {
             units,
             brake,
             pause,
+            smooth: bounds.smooth,
             start,
             launch,
             task,
@@ -197,6 +201,11 @@ impl Joint {
     pub(crate) fn scaled(mut self, share: f64) -> Self {
         self.units = self.units.scaled(share);
         self
+    }
+
+    /// Whether jerk is limited.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.smooth
     }
 
     /// How long (s) it takes to get back inside the limits.
@@ -226,6 +235,14 @@ impl Joint {
             Task::Idle => Course::default(),
             Task::Reach(axis) => axis.course(time),
             Task::Pace(pace) => pace.course(time),
+        }
+    }
+
+    /// The profile of `duration` (s) that strays least, if there is one of that shape.
+    pub(crate) fn direct_course(&self, duration: f64) -> Option<Course> {
+        match &self.task {
+            Task::Reach(axis) => direct(axis, duration / self.units.time - self.pause),
+            Task::Idle | Task::Pace(_) => None,
         }
     }
 

@@ -2,8 +2,10 @@
 
 mod audit;
 mod axis;
+mod bench;
 mod brake;
 mod check;
+mod direct;
 mod error;
 mod extent;
 mod joint;
@@ -14,16 +16,19 @@ mod options;
 mod pace;
 mod plan;
 mod problems;
+mod running;
 mod side;
 mod state;
 mod strand;
 
 pub use audit::Audit;
+pub use bench::{Row, bench};
 pub use error::OtgError;
 pub use limits::Limits;
 pub use motion::Motion;
 pub use options::{Interface, Options, Synchronisation};
 pub use problems::{Ends, Problem, Problems};
+pub use running::Running;
 pub use state::State;
 
 /// Plans moves from state to state.

@@ -150,7 +150,7 @@ impl<const N: usize> Motion<N> {
             times.push(track.duration);
         }
         times.sort_by(f64::total_cmp);
-        let close = 1e-13 * self.duration;
+        let close = 4.0 * f64::EPSILON * self.duration;
         times.dedup_by(|later, earlier| *later - *earlier <= close);
         times.retain(|time| *time < self.duration - close);
         times.push(self.duration);

@@ -34,13 +34,13 @@ pub(crate) fn plan<const N: usize>(
             Joint::default()
         }
     });
-    let motion = if options.synchronisation == Synchronisation::None {
+    let mut motion = if options.synchronisation == Synchronisation::None {
         apart(&joints, start, target, options)?
     } else {
         let duration = common_duration(&joints, options)?;
         assemble(&joints, start, target, options, &[duration; N])
     };
-    check::positions(&motion, limits, options)?;
+    check::keep_positions(&mut motion, limits, options)?;
     Ok(motion)
 }
 
@@ -144,6 +144,9 @@ fn assemble<const N: usize>(
             ],
         };
         finish(&mut track, options.enabled[joint], options.interface[joint]);
+        if !joints[joint].is_smooth() {
+            track.end[2] = 0.0;
+        }
         track
     });
     let duration = durations.iter().copied().fold(0.0, f64::max);

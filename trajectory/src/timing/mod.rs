@@ -12,17 +12,22 @@ mod certificate;
 mod grid;
 mod interior;
 mod lanes;
+mod law;
+mod moving;
 mod options;
 mod pieces;
 mod problem;
 mod reach;
+mod samples;
 mod survey;
 mod tighten;
 mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
+pub use law::{Law, LawProblem};
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
+pub use samples::RandomPaths;
 
 use grid::{Bounded, Grid};
 use survey::Survey;
@@ -64,7 +69,13 @@ pub fn time_path<const N: usize>(
     let grid = Grid::new(&survey, path.knots(), path.end(), options);
     let draft = tighten::best(bounded, &grid)?;
     let tighten::Draft { pieces, audit, .. } = draft;
-    let stretch = audit.stretch() * (1.0 + 1e-12);
+    // A moving start fixes the law there, so it cannot be stretched: it holds as it is.
+    let moving = matches!(options.start, Boundary::Moving { .. });
+    let stretch = if moving {
+        1.0
+    } else {
+        audit.stretch() * (1.0 + 1e-12)
+    };
     let trajectory = Trajectory::new(pieces.joint).stretched(stretch);
     let law = Trajectory::new(pieces.law).stretched(stretch);
     let certificate = TimeCertificate {
@@ -75,6 +86,11 @@ pub fn time_path<const N: usize>(
         fit_error: pieces.fit_error,
         tool_margin: audit.tool_margin,
         stretch,
+        given: if moving {
+            trajectory.pieces()[0].duration
+        } else {
+            0.0
+        },
         cells: grid.nodes.len() - 1,
         iterations: draft.iterations,
     };
