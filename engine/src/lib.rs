@@ -19,6 +19,7 @@ pub mod modal;
 pub mod planner;
 pub mod queue;
 pub mod robot;
+pub mod server;
 pub mod session;
 pub mod task;
 pub mod tooling;
