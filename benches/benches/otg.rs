@@ -5,7 +5,12 @@
 //! least of all passes for that input, without the cost of reading the clock. Ruckig's crate copies
 //! the input into C++ vectors on each call; what that costs is measured with an input that is
 //! refused at once and taken off Ruckig's times.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a benchmark prints"
+)]
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -22,7 +27,10 @@ fn main() {
     let count = if quick { BLOCK } else { COUNT };
     let clock = clock_cost();
     println!("{count} inputs, least of {PASSES} passes, us; clock {clock:.3} us taken off");
-    println!("{:<16}{:>10}{:>10}{:>10}{:>10}", "case", "planner", "mean", "p99", "max");
+    println!(
+        "{:<16}{:>10}{:>10}{:>10}{:>10}",
+        "case", "planner", "mean", "p99", "max"
+    );
     let mut ratios = Vec::new();
     case::<3>("3dof", Ends::Moving, (count, clock), &mut ratios);
     case::<6>("6dof", Ends::Moving, (count, clock), &mut ratios);
@@ -36,7 +44,9 @@ fn main() {
 
 /// What reading the clock twice costs (us).
 fn clock_cost() -> f64 {
-    (0..100_000).map(|_| timed(|| ())).fold(f64::INFINITY, f64::min)
+    (0..100_000)
+        .map(|_| timed(|| ()))
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> f64 {
@@ -87,7 +97,12 @@ fn case<const N: usize>(
         for begin in (0..count).step_by(BLOCK) {
             let block = begin..(begin + BLOCK).min(count);
             for i in block.clone() {
-                let Problem { start, target, limits, options } = &problems[i];
+                let Problem {
+                    start,
+                    target,
+                    limits,
+                    options,
+                } = &problems[i];
                 ours.note(i, timed(|| Otg::plan(start, target, limits, options)));
             }
             for i in block.clone() {

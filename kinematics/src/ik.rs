@@ -13,6 +13,7 @@ mod turns;
 
 pub use goal::Goal;
 pub(crate) use goal::{LENGTH, Miss};
+pub(crate) use numeric::restart;
 pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
 pub(crate) use six::Line;
 

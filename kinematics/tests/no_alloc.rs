@@ -1,4 +1,5 @@
 //! Kinematics never touches the heap: counted by an allocator that counts.
+#![allow(clippy::unwrap_used, reason = "a test may fail this way")]
 #![allow(unsafe_code, reason = "a counting allocator has to be one")]
 
 use kinematics::{Solver, urdf};

@@ -66,7 +66,7 @@ fn fill<const N: usize>(
         at
     };
     let cell = |q0: &SVector<f64, N>, u: f64, column: usize| {
-        let q = task.newton(q0, u, still, &value(column), SURPRISE)?;
+        let q = task.newton((q0, SURPRISE), u, still, &value(column))?;
         Some(Cell {
             q,
             cost: cost(task, &q),

@@ -139,17 +139,17 @@ impl<const N: usize> Task<'_, N> {
 
     /// Joint positions at `u`, near those predicted from the last point.
     fn settle(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<SVector<f64, N>> {
-        self.newton(&predict(last, u), u, spare, &spare.at(u), SURPRISE)
+        self.newton((&predict(last, u), SURPRISE), u, spare, &spare.at(u))
     }
 
-    /// Joint positions at `u` with given values of the spare functions, near `predicted`.
+    /// Joint positions at `u` with given values of the spare functions, within
+    /// `surprise` of `predicted`.
     pub(super) fn newton(
         &self,
-        predicted: &SVector<f64, N>,
+        (predicted, surprise): (&SVector<f64, N>, f64),
         u: f64,
         spare: &Spare<N>,
         at: &[f64; 2],
-        surprise: f64,
     ) -> Option<SVector<f64, N>> {
         let target = Goal::Pose((self.tool)(u).pose);
         let mut q = *predicted;

@@ -7,12 +7,14 @@
 
 mod audit;
 mod band;
+mod bench;
 mod bound;
 mod certificate;
 mod grid;
 mod interior;
 mod lanes;
 mod law;
+mod least;
 mod moving;
 mod options;
 mod pieces;
@@ -23,6 +25,7 @@ mod survey;
 mod tighten;
 mod warp;
 
+pub use bench::{Row, bench};
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub use law::{Law, LawProblem};
 pub use options::{Boundary, TimingOptions};
@@ -82,7 +85,7 @@ pub fn time_path<const N: usize>(
         peaks: audit.peaks(stretch),
         active: audit.active(stretch),
         duration: trajectory.duration(),
-        lower_bound: survey.bound,
+        lower_bound: survey.bound.max(least::chord_bound(bounded)),
         fit_error: pieces.fit_error,
         tool_margin: audit.tool_margin,
         stretch,
