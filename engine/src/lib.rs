@@ -9,14 +9,17 @@
 //! variable.
 
 pub mod command_error;
+pub mod conformance;
 pub mod controller;
 mod dof;
+pub mod doctor;
 pub mod dry_run;
 pub mod executor;
 pub mod modal;
 pub mod planner;
 pub mod queue;
 pub mod robot;
+pub mod server;
 pub mod session;
 pub mod task;
 pub mod tooling;

@@ -162,7 +162,7 @@ pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64
         let shifted = a.fma(angles[i], std::f64::consts::FRAC_2_PI, MAGIC);
         let turns = shifted - MAGIC;
         let quadrant = shifted.to_bits();
-        let mut x = a.fma(-turns, 1.570_796_251_296_997_1, angles[i]);
+        let mut x = a.fma(-turns, 1.570_796_251_296_997, angles[i]);
         x = a.fma(-turns, 7.549_789_415_861_596e-8, x);
         x = a.fma(-turns, 5.390_302_858_158_119e-15, x);
         let z = x * x;
@@ -171,7 +171,7 @@ pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64
         let (s, c) = if swap { (c, s) } else { (s, c) };
         sin[i] = f64::from_bits(s.to_bits() ^ ((quadrant & 2) << 62));
         cos[i] = f64::from_bits(c.to_bits() ^ ((quadrant.wrapping_add(1) & 2) << 62));
-        far |= !(angles[i].abs() <= FAR);
+        far |= angles[i].abs() > FAR || angles[i].is_nan();
     }
     if far {
         for i in 0..N {
@@ -189,8 +189,8 @@ fn sin_cos_core<A: Arith>(a: A, x: f64, z: f64) -> (f64, f64) {
     s = a.fma(s, z, -1.984_126_982_958_954e-4);
     s = a.fma(s, z, 8.333_333_333_322_118e-3);
     s = a.fma(s, z, -1.666_666_666_666_663e-1);
-    let mut c = a.fma(-1.135_853_652_138_768_2e-11, z, 2.087_570_084_197_473_2e-9);
-    c = a.fma(c, z, -2.755_731_417_929_673_9e-7);
+    let mut c = a.fma(-1.135_853_652_138_768_2e-11, z, 2.087_570_084_197_473e-9);
+    c = a.fma(c, z, -2.755_731_417_929_674e-7);
     c = a.fma(c, z, 2.480_158_728_885_170_5e-5);
     c = a.fma(c, z, -1.388_888_888_887_305_6e-3);
     c = a.fma(c, z, 4.166_666_666_666_659e-2);

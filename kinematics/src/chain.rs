@@ -320,7 +320,7 @@ impl<const N: usize> Chain<N> {
         let (points, axes, tool) = self.frames(a, q);
         let mut j = SMatrix::zeros();
         for i in 0..N {
-            let (v, w) = self.column(a, i, points[i], axes[i], &tool);
+            let (v, w) = self.column(a, i, (points[i], axes[i]), &tool);
             let column = [v.0[0], v.0[1], v.0[2], w.0[0], w.0[1], w.0[2]];
             for (row, value) in column.into_iter().enumerate() {
                 j[(row, i)] = value;
@@ -339,7 +339,7 @@ impl<const N: usize> Chain<N> {
         let (points, axes, tool) = self.frames(a, q);
         let mut rows = [[0.0; 8]; 6];
         for i in 0..N {
-            let (v, w) = self.column(a, i, points[i], axes[i], &tool);
+            let (v, w) = self.column(a, i, (points[i], axes[i]), &tool);
             for r in 0..3 {
                 rows[r][i] = v.0[r];
                 rows[3 + r][i] = w.0[r];
@@ -350,7 +350,7 @@ impl<const N: usize> Chain<N> {
 
     /// Linear and angular part of a column of the Jacobian.
     #[inline(always)]
-    fn column<A: Arith>(&self, a: A, i: usize, point: V4, axis: V4, tool: &Frame) -> (V4, V4) {
+    fn column<A: Arith>(&self, a: A, i: usize, (point, axis): (V4, V4), tool: &Frame) -> (V4, V4) {
         if !self.all_turn && self.prismatic[i] {
             return (axis, V4::ZERO);
         }

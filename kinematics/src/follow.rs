@@ -7,6 +7,7 @@
 //! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
 //! as near a singular pose, where joints turn fast over a short way.
 
+mod course;
 mod differential;
 mod error;
 mod linear;

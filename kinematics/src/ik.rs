@@ -5,6 +5,7 @@ mod closed;
 mod goal;
 mod lanes;
 mod numeric;
+mod polish;
 mod report;
 mod six;
 mod swivel;
@@ -12,6 +13,7 @@ mod turns;
 
 pub use goal::Goal;
 pub(crate) use goal::{LENGTH, Miss};
+pub(crate) use numeric::restart;
 pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
 pub(crate) use six::Line;
 
@@ -37,7 +39,8 @@ const SEARCH: u32 = 120;
 /// # let text = include_str!("../../robots/irb120/robot.urdf");
 /// # use kinematics::{Solver, urdf};
 /// let solver = Solver::new(urdf::read(text, None)?.chain::<6>()?);
-/// let pose = nalgebra::Isometry3::translation(0.3, 0.1, 0.4);
+/// let down = nalgebra::Vector3::y() * std::f64::consts::PI;
+/// let pose = nalgebra::Isometry3::new(nalgebra::Vector3::new(0.3, 0.1, 0.3), down);
 /// let solution = solver.solve(&pose)?;
 /// assert!((solver.chain().forward(&solution.q).translation.vector - pose.translation.vector).norm() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -213,9 +216,12 @@ impl<const N: usize> Solver<N> {
             if best.reached {
                 return Ok(self.solution(&best, seed));
             }
-            let next = self.descend(&target, &numeric::restart(&self.chain, index), self.stop);
+            let next = self.restarted(&target, index);
             if next.reached || score(&next) < score(&best) {
                 best = next;
+            }
+            if index == PATIENCE && !best.reached && !self.place_reached(goal, &best.q) {
+                break;
             }
         }
         if best.reached {
@@ -335,32 +341,6 @@ impl<const N: usize> Solver<N> {
         Some(q)
     }
 
-    /// Brings a near branch onto the pose; `None` where it does not get there.
-    #[cold]
-    fn polished(
-        &self,
-        pose: &Isometry3<f64>,
-        q: &SVector<f64, N>,
-        seed: &SVector<f64, N>,
-    ) -> Option<SVector<f64, N>> {
-        let target = Goal::Pose(*pose).target();
-        let landing = self.descend(
-            &target,
-            q,
-            Stop {
-                limits: false,
-                steps: 12,
-                ..self.stop
-            },
-        );
-        // A branch that has to go far was none.
-        if !landing.reached || turns::distance(&self.chain, &landing.q, q) > 0.5 {
-            return None;
-        }
-        let q = turns::nearest(&self.chain, &landing.q, seed);
-        self.chain.within_limits(&q, 0.0).then_some(q)
-    }
-
     fn branches_at(
         &self,
         closed: &Closed,
@@ -368,23 +348,19 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         parameter: f64,
     ) -> Branches<N> {
+        if !closed.exact() {
+            return self.near_branches(closed, pose, seed, parameter);
+        }
         let raw = self.raw(closed, pose, parameter, seed);
         let mut found = Branches::new();
         for id in 0..8_u8 {
             let place = (usize::from(id / 4), usize::from(id % 4));
-            let Some(mut q) = self.branch(closed, &raw, place, seed) else {
-                continue;
-            };
-            if !closed.exact() {
-                let Some(polished) = self.polished(pose, &q, seed) else {
-                    continue;
-                };
-                q = polished;
+            if let Some(q) = self.branch(closed, &raw, place, seed) {
+                found.push(Solution {
+                    q,
+                    branch: Some(id),
+                });
             }
-            found.push(Solution {
-                q,
-                branch: Some(id),
-            });
         }
         found
     }

@@ -12,12 +12,14 @@
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
 //! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
 //! | [`measure`] | manipulability, singular values, condition number |
+//! | [`reach`] | how far the arm reaches |
 
 mod arith;
 pub mod chain;
 pub mod follow;
 pub mod ik;
 pub mod measure;
+pub mod reach;
 pub mod urdf;
 
 pub use chain::Chain;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Control, Event, Executor, Recorded, ToolOrder};
+use engine::executor::{Event, Executor, Recorded, ToolOrder};
 use ipc::{Clock, GRIPPER, ToolAction};
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed, planned};
 
@@ -15,8 +15,8 @@ struct Run {
     seconds: f64,
 }
 
-/// Commands 0 to `commands`, a gripper order after the first, `disturb` called with each sample.
-fn run(name: &str, commands: u32, disturb: impl Fn(u64) -> Option<Control>) -> Run {
+/// Commands 0 to `commands`, a gripper order after the first.
+fn run(name: &str, commands: u32) -> Run {
     let arm: ipc::Arm = format!("servo-{}/{name}", std::process::id())
         .parse()
         .unwrap();
@@ -27,7 +27,6 @@ fn run(name: &str, commands: u32, disturb: impl Fn(u64) -> Option<Control>) -> R
         let config = executor_config(arm, Clock::LockStep);
         let start = Instant::now();
         let (executor, mut feeder, mut monitor) = Executor::start(config).unwrap();
-        let remote = executor.remote();
         for index in 0..commands {
             assert!(feed(&mut feeder, index));
             if index == 0 {
@@ -44,9 +43,6 @@ fn run(name: &str, commands: u32, disturb: impl Fn(u64) -> Option<Control>) -> R
         let patience = Instant::now();
         loop {
             while let Some(sample) = monitor.sample() {
-                if let Some(control) = disturb(sample.tick) {
-                    remote.control(control);
-                }
                 samples.push(sample);
             }
             while let Some(event) = monitor.event() {
@@ -100,7 +96,7 @@ fn bits(run: &Run, commands: u32) -> Vec<u64> {
 /// the driver follows closely.
 #[test]
 fn the_samples_are_the_plans() {
-    let run = run("plan", 6, |_| None);
+    let run = run("plan", 6);
     let mut started = [None; 6];
     for event in &run.events {
         if let Event::Started { command, tick } = event
@@ -149,43 +145,8 @@ fn the_samples_are_the_plans() {
 /// The same program gives the same bytes, however the processes were scheduled.
 #[test]
 fn two_runs_are_byte_identical() {
-    let first = bits(&run("twice-a", 4, |_| None), 4);
-    let second = bits(&run("twice-b", 4, |_| None), 4);
+    let first = bits(&run("twice-a", 4), 4);
+    let second = bits(&run("twice-b", 4), 4);
     assert!(first.len() > 3800 * 3 * JOINTS);
     assert!(first == second, "two runs differ");
-}
-
-/// A pause, an override and a fast stop on the way change the time, never the way; the limits
-/// hold for what was published.
-#[test]
-fn the_operator_changes_time_only() {
-    let run = run("operator", 6, |tick| match tick {
-        300 => Some(Control::Pause),
-        1200 => Some(Control::Resume),
-        1700 => Some(Control::Override(0.3)),
-        3000 => Some(Control::Stop { fast: true }),
-        4000 => Some(Control::Resume),
-        5500 => Some(Control::Override(1.0)),
-        _ => None,
-    });
-    for sample in &run.samples {
-        if sample.command < 6 {
-            let plan = planned(sample.command, sample.path_time);
-            assert!((sample.setpoint.position - plan).amax() < 1e-9);
-        }
-    }
-    let limits = system_tests::servo_arm::limits();
-    for four in run.samples.windows(4) {
-        let p = |index: usize| four[index].setpoint.position;
-        let third = (p(3) - p(0) + (p(1) - p(2)) * 3.0) / 1e-9;
-        let second = (p(3) - p(2) * 2.0 + p(1)) / 1e-6;
-        assert!(third.amax() <= limits.jerk[0] * (1.0 + 1e-6) + 1e-5);
-        assert!(second.amax() <= limits.acceleration[0] * (1.0 + 1e-6) + 1e-8);
-    }
-    let stopped = run
-        .events
-        .iter()
-        .filter(|event| matches!(event, Event::Stopped { .. }))
-        .count();
-    assert_eq!(stopped, 2);
 }

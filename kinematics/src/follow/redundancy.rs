@@ -3,8 +3,10 @@
 //! The spare motion is fixed by linear functions of the joints, `c . q = r(u)`, where
 //! `c` is the direction in which the arm can move at the start without moving its
 //! tool, and `r` a polynomial of `u`. Thus it has exact derivatives, and nothing drifts.
+//! With two spare joints the second one stands still.
 
 use super::FollowPoint;
+use super::course;
 use super::error::FollowError;
 use super::trace::Task;
 use nalgebra::{SMatrix, SVector};
@@ -17,8 +19,8 @@ pub(super) type Course = [f64; 6];
 pub(super) struct Spare<const N: usize> {
     directions: [SVector<f64, N>; 2],
     courses: [Course; 2],
-    from: f64,
-    span: f64,
+    pub(super) from: f64,
+    pub(super) span: f64,
     u: f64,
 }
 
@@ -68,7 +70,13 @@ impl<const N: usize> Spare<N> {
     }
 }
 
-/// Follows with the spare motion standing still.
+/// Distance from a limit, rad or m, that counts as well inside.
+const ROOM: f64 = 0.1;
+/// Smallest singular value that counts as well away from singular poses.
+const NIMBLE: f64 = 0.05;
+
+/// Follows with the spare motion standing still if that goes well, else along the
+/// course that a search over the whole path finds.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -84,7 +92,43 @@ pub(super) fn resolve<const N: usize>(
         span: to - from,
         u: from,
     };
-    task.trace(start, &still)
+    let first = task.trace(start, &still);
+    let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
+    let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
+    // Standing no worse than at the start is as well as can be asked for.
+    if first.is_ok() && best >= 1.0 {
+        return first;
+    }
+    let mut answer = first;
+    for course in course::search(task, start, &still) {
+        let mut moving = still;
+        moving.courses[0] = course;
+        if let Ok(points) = task.trace(start, &moving) {
+            let found = quality(&points);
+            if found > best {
+                (best, answer) = (found, Ok(points));
+            }
+            if best >= 1.0 {
+                break;
+            }
+        }
+    }
+    answer
+}
+
+/// How well a path stays inside limits and away from singular poses: 1 is well, or
+/// no worse than where it starts.
+fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
+    let chain = task.solver.chain();
+    let one = |point: &FollowPoint<N>| {
+        let room = (0..N).fold(f64::INFINITY, |room, i| {
+            let q = point.q[0][i];
+            room.min(chain.upper()[i] - q).min(q - chain.lower()[i])
+        });
+        (room / ROOM).min(point.smallest / NIMBLE)
+    };
+    let start = points.first().map_or(1.0, one).clamp(1e-6, 1.0);
+    points.iter().map(one).fold(f64::INFINITY, f64::min) / start
 }
 
 /// Directions in which the joints can move without moving the tool: `N - 6` of them,

@@ -139,10 +139,20 @@ impl<const N: usize> Task<'_, N> {
 
     /// Joint positions at `u`, near those predicted from the last point.
     fn settle(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<SVector<f64, N>> {
+        self.newton((&predict(last, u), SURPRISE), u, spare, &spare.at(u))
+    }
+
+    /// Joint positions at `u` with given values of the spare functions, within
+    /// `surprise` of `predicted`.
+    pub(super) fn newton(
+        &self,
+        (predicted, surprise): (&SVector<f64, N>, f64),
+        u: f64,
+        spare: &Spare<N>,
+        at: &[f64; 2],
+    ) -> Option<SVector<f64, N>> {
         let target = Goal::Pose((self.tool)(u).pose);
-        let predicted = predict(last, u);
-        let at = spare.at(u);
-        let mut q = predicted;
+        let mut q = *predicted;
         let mut reached = f64::INFINITY;
         for _ in 0..12 {
             let (miss, jacobian) = self.solver.miss_at(&target, &q);
@@ -162,7 +172,7 @@ impl<const N: usize> Task<'_, N> {
             reached = error;
             let x = linear::solve::<N>(&rows, &b, &[0.0; 8]);
             q += SVector::from_fn(|i, _| x[i]);
-            if (q - predicted).amax() > SURPRISE {
+            if (q - *predicted).amax() > surprise {
                 return None;
             }
         }
@@ -232,7 +242,7 @@ impl<const N: usize> Task<'_, N> {
 }
 
 /// Smallest singular value of a Jacobian, lengths in units of [`LENGTH`].
-fn smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
+pub(super) fn smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
     jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
     measure::singular_values(&jacobian)[6 - N.min(6)]
 }

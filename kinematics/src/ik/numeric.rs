@@ -97,7 +97,7 @@ impl<const N: usize> Op for Descent<'_, N> {
             if stop.limits {
                 freeze(chain, &seed, &gradient, &mut rows);
             }
-            let damping = a.fma(0.03, square, 1e-9);
+            let damping = a.fma(0.03, square, 1e-12);
             let step = solve_damped::<A, N>(a, &rows, gradient, damping);
             advance(chain, &mut seed, &step, stop.limits);
         }

@@ -175,7 +175,7 @@ impl Six {
                     Placing::Parallel => self.place_parallel(a, wrist, w, &hold),
                     Placing::Meeting(meet) => self.place_meeting(a, (wrist, w), meet, &hold),
                 };
-                self.wrist(a, &g, arm, real, &hold)
+                self.wrist(a, &g, (arm, real), &hold)
             }
             Shape::Parallels(meet, signs) => self.parallels(a, &g, (meet, signs), &hold),
         };
@@ -208,21 +208,20 @@ impl Six {
             self.slack,
         );
         let y = away.turned(a, one.h, back.angle).plus(one.p);
-        let (q2, q3, real) = self.elbow(a, [1, 2], (wrist, y), SECOND, [hold[1], hold[2]]);
+        let (q2, q3, real) = self.elbow(a, (wrist, y), SECOND, [hold[1], hold[2]]);
         ([back.angle.back(), q2, q3], both(back.real, real))
     }
 
-    /// Turns about two parallel axes that bring the point `from` to `to`.
+    /// Turns about axes 2 and 3, which are parallel, that bring the point `from` to `to`.
     #[inline(always)]
     fn elbow<A: Arith>(
         &self,
         a: A,
-        axes: [usize; 2],
         (from, to): ([f64; 3], Vec4),
         sign: F4,
         hold: [Angle; 2],
     ) -> (Angle, Angle, B4) {
-        let (two, three) = (self.lines[axes[0]], self.lines[axes[1]]);
+        let (two, three) = (self.lines[1], self.lines[2]);
         let (reach, upper) = (minus(from, three.p), minus(two.p, three.p));
         let away = to.minus(two.p);
         // |turned(reach) - upper| = |to - p2|, all seen along the axes.
@@ -273,8 +272,7 @@ impl Six {
         &self,
         a: A,
         g: &Product,
-        arm: [Angle; 3],
-        real: B4,
+        (arm, real): ([Angle; 3], B4),
         hold: &[Angle; 6],
     ) -> Angles {
         let [one, two, three, four, five, six] = self.lines;
@@ -342,7 +340,7 @@ impl Six {
         let out = Vec4::splat(minus(meet, four.p)).turned(a, two.h, sum);
         let to = y.less(out);
         let half = |sign: f64| {
-            let (q2, q3, ok) = self.elbow(a, [1, 2], (four.p, to), splat(sign), [hold[1], hold[2]]);
+            let (q2, q3, ok) = self.elbow(a, (four.p, to), splat(sign), [hold[1], hold[2]]);
             let q4 = sum
                 .plus(a, q2.back())
                 .plus(a, q3.times(-signs[0]))

@@ -89,8 +89,6 @@ impl Swivel {
         let (sin, cos) = arith::sin_cos(a, *hold);
         let held: [Angle; 7] = std::array::from_fn(|i| Angle::splat(sin[i], cos[i]));
         let h = |i: usize| self.lines[i].h;
-        let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-        let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
         let (elbow, away) = (self.lines[3].p, minus(g.point(self.wrist), self.shoulder));
         let (reach, upper) = (minus(self.wrist, elbow), minus(self.shoulder, elbow));
         let d = 0.5 * (square(reach) + square(upper) - square(away));
@@ -150,6 +148,16 @@ impl Swivel {
             real: [ok_first, ok_second],
         }
     }
+}
+
+#[inline(always)]
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn square(v: [f64; 3]) -> f64 {
+    v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 }
 
 /// A rotation whose first two columns are two directions at right angles.

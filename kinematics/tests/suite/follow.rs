@@ -179,3 +179,48 @@ fn a_wrist_singularity_is_passed() {
             .all(|point| point.q[0][3].abs() < 1e-6 && point.q[1].amax() < 2.0)
     );
 }
+
+/// Smallest distance of a joint path from the limits.
+fn room<const N: usize>(solver: &Solver<N>, points: &[kinematics::FollowPoint<N>]) -> f64 {
+    let chain = solver.chain();
+    points
+        .iter()
+        .flat_map(|p| {
+            (0..N).map(|i| (chain.upper()[i] - p.q[0][i]).min(p.q[0][i] - chain.lower()[i]))
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// A turn of the flange that the last joints alone cannot make: the spare joint helps.
+#[test]
+fn spare_motion_keeps_inside_the_limits() {
+    let solver = Solver::new(arms::chain::<7>("panda"));
+    let start = SVector::from([0.0, -0.6, 0.0, -2.2, 0.0, 1.6, 2.2]);
+    let pose = solver.chain().forward(&start);
+    // Joint 7 has 0.69 rad left, the flange turns by more about its own axis.
+    let axis = Unit::new_normalize(pose.rotation * Vector3::z());
+    let spin = |u: f64| TwistPoint {
+        pose: Isometry3::from_parts(
+            pose.translation,
+            UnitQuaternion::from_axis_angle(&axis, 0.85 * u) * pose.rotation,
+        ),
+        linear: [Vector3::zeros(); 3],
+        angular: [axis.into_inner() * 0.85, Vector3::zeros(), Vector3::zeros()],
+    };
+    let grid: Vec<f64> = (0..=50).map(|i| f64::from(i) / 50.0).collect();
+    let points = follow(&solver, &spin, &grid, &start, &FollowOptions::default()).unwrap();
+    assert!(
+        room(&solver, &points) > 0.0,
+        "room {}",
+        room(&solver, &points)
+    );
+    for point in &points {
+        let (position, rotation) = error(&solver.chain().forward(&point.q[0]), &spin(point.u).pose);
+        assert!(position < 1e-10 && rotation < 1e-9);
+    }
+    let moved = points.last().unwrap().q[0] - start;
+    assert!(
+        moved.fixed_rows::<6>(0).amax() > 0.05,
+        "the arm had to move: {moved}"
+    );
+}

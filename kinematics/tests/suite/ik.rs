@@ -160,3 +160,16 @@ fn partial_goals_are_reached() {
         }
     }
 }
+
+/// The example of the README, as it stands there.
+#[test]
+fn readme_example_runs() {
+    let model = kinematics::urdf::read(&arms::text("ur5e"), None).unwrap();
+    let solver = kinematics::Solver::new(model.chain::<6>().unwrap());
+    let pose = solver
+        .chain()
+        .forward(&nalgebra::vector![0.1, -1.2, 1.4, -1.8, -1.5, 0.3]);
+    let all = solver.solve_all(&pose);
+    let near = solver.nearest(&pose, &all[0].q).unwrap();
+    assert_eq!(near.q, all[0].q);
+}

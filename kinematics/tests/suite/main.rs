@@ -1,7 +1,10 @@
 //! Laws and oracles of the crate `kinematics`, one binary.
+#![allow(clippy::unwrap_used, reason = "a test may fail this way")]
 
 mod arms;
 mod chain;
 mod follow;
+mod fuzz;
+mod hard;
 mod ik;
 mod urdf;

@@ -2,13 +2,14 @@
 //!
 //! `servo-peer driver ARM LOG` runs the simulated driver; `servo-peer engine ARM` drives it to
 //! and fro for ever and prints a line for each event; a line `recover` on its standard input asks
-//! for a new session.
+//! for a new session. `servo-peer paced ARM COMMANDS` drives that many commands in step with any
+//! driver and says how fast that was.
 
 use std::io::{BufRead, Write, stdin, stdout};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use engine::executor::{Event, Executor, Feeder};
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed};
@@ -18,7 +19,8 @@ fn main() -> ExitCode {
     let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["driver", arm, log] => driver(arm, log),
         ["engine", arm] => engine(arm),
-        _ => Err("usage: servo-peer driver ARM LOG | engine ARM".into()),
+        ["paced", arm, commands] => paced(arm, commands),
+        _ => Err("usage: servo-peer driver ARM LOG | engine ARM | paced ARM COMMANDS".into()),
     };
     if let Err(error) = result {
         eprintln!("{error}");
@@ -50,7 +52,7 @@ fn engine(arm: &str) -> Outcome {
         }
     });
     say("ready");
-    let mut next = 0;
+    let mut next = return_home(&mut feeder, &executor, 0);
     loop {
         while let Some(event) = monitor.event() {
             say(&format!("{event:?}"));
@@ -63,6 +65,39 @@ fn engine(arm: &str) -> Outcome {
             next += 1;
         }
         thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn paced(arm: &str, commands: &str) -> Outcome {
+    let last: u32 = commands.parse()?;
+    let mut config = executor_config(arm.parse()?, ipc::Clock::LockStep);
+    config.record = true;
+    let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
+    let start = Instant::now();
+    let mut next = return_home(&mut feeder, &executor, 0);
+    let mut worst = 0.0_f64;
+    loop {
+        while let Some(sample) = monitor.sample() {
+            for (measured, setpoint) in sample.measured.iter().zip(&sample.setpoint.position) {
+                worst = worst.max((measured - setpoint).abs());
+            }
+        }
+        while let Some(event) = monitor.event() {
+            match event {
+                Event::Finished { command, .. } if command >= last => {
+                    let ticks = executor.remote().counters().ticks;
+                    let speed = ticks as f64 * 0.001 / start.elapsed().as_secs_f64();
+                    say(&format!("{ticks} periods, {speed:.1} times real time, error {worst:e}"));
+                    return Ok(());
+                }
+                Event::Faulted { fault, .. } => return Err(fault.to_string().into()),
+                _ => {}
+            }
+        }
+        while next <= last && feeder.room() > 4000 && feed(&mut feeder, next) {
+            next += 1;
+        }
+        thread::sleep(Duration::from_micros(200));
     }
 }
 

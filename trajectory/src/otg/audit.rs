@@ -12,7 +12,8 @@ use super::state::State;
 /// accelerations, A/J for times (J the jerk limit), hence A²/J for velocities and A³/J² for
 /// positions; V, V/A where jerk is not limited. Positions are further divided by
 /// `1 + |start| + |target| + fastest · duration` in those units, velocities by `1 + fastest`, since
-/// numbers of that size are all that floating point resolves.
+/// numbers of that size are all that floating point resolves. Steps and excess of the acceleration are less
+/// what four roundings of a time as long as the move amount to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
     /// Largest difference between the first piece and the start.
@@ -32,18 +33,21 @@ pub struct Audit {
 impl Audit {
     /// The largest of all numbers.
     pub fn worst(&self) -> f64 {
-        [
+        let mut worst = self.start;
+        for value in [
             self.end,
             self.joins,
             self.velocity,
             self.acceleration,
             self.jerk,
-        ]
-        .into_iter()
-        .fold(self.start, f64::max)
+        ] {
+            raise(&mut worst, value);
+        }
+        worst
     }
 
-    /// Checks `motion` against what was asked for. Limits are not checked while a joint brakes
+    /// Checks `motion` against what was asked for. Limits are not checked after a joint's
+    /// arrival, nor while it brakes
     /// because its start breaks them, and a velocity that is still beyond its limit then (because the
     /// opposite limit leaves no other way) only must not grow; positions that were not asked for count as reached.
     pub fn of<const N: usize>(
@@ -56,9 +60,10 @@ impl Audit {
         let mut audit = Self::default();
         for joint in 0..N {
             let scale = Scale::of(joint, limits, start, motion);
-            audit.ends(joint, &scale, &pieces, (start, target));
-            audit.pieces(joint, &scale, &pieces, limits);
-            audit.joins(joint, &scale, &pieces);
+            let pieces = until(&pieces, motion.arrival(joint).unwrap_or(0.0));
+            audit.ends(joint, &scale, pieces, (start, target));
+            audit.pieces(joint, &scale, pieces, limits);
+            audit.joins(joint, &scale, pieces);
         }
         audit
     }
@@ -139,7 +144,10 @@ impl Audit {
             raise(&mut self.velocity, over / scale.velocity);
             let over = (a.max(b) - limits.acceleration_max[joint])
                 .max(limits.acceleration_min[joint] - a.min(b));
-            raise(&mut self.acceleration, over / scale.acceleration);
+            raise(
+                &mut self.acceleration,
+                (over - scale.rounding) / scale.acceleration,
+            );
         }
     }
 }
@@ -149,6 +157,8 @@ struct Scale {
     position: f64,
     velocity: f64,
     acceleration: f64,
+    /// What rounding of a time of the size of the duration does to the acceleration.
+    rounding: f64,
     braking: f64,
     positions: bool,
     accelerations: bool,
@@ -186,6 +196,11 @@ impl Scale {
             position: acceleration * time * time + way,
             velocity: acceleration * time + fastest,
             acceleration,
+            rounding: if second {
+                0.0
+            } else {
+                4.0 * f64::EPSILON * motion.duration() * jerk
+            },
             braking: motion.braking(joint),
             positions: motion.reaches_position(joint),
             accelerations: !second,
@@ -195,7 +210,8 @@ impl Scale {
     fn difference(&self, left: [f64; 3], right: [f64; 3]) -> f64 {
         let position = (left[0] - right[0]).abs() / self.position;
         let velocity = (left[1] - right[1]).abs() / self.velocity;
-        let acceleration = (left[2] - right[2]).abs() / self.acceleration;
+        let step = (left[2] - right[2]).abs() - self.rounding;
+        let acceleration = step.max(0.0) / self.acceleration;
         let position = if self.positions { position } else { 0.0 };
         let acceleration = if self.accelerations {
             acceleration
@@ -204,6 +220,17 @@ impl Scale {
         };
         position.max(velocity).max(acceleration)
     }
+}
+
+/// The pieces up to `arrival` (s).
+fn until<const N: usize>(pieces: &[Piece<N>], arrival: f64) -> &[Piece<N>] {
+    let mut time = 0.0;
+    let count = pieces.iter().take_while(|piece| {
+        let middle = time + 0.5 * piece.duration;
+        time += piece.duration;
+        middle < arrival
+    });
+    &pieces[..count.count()]
 }
 
 /// Position, velocity and acceleration of a joint at `t` (s) in a piece.
@@ -217,8 +244,8 @@ fn at<const N: usize>(piece: &Piece<N>, joint: usize, t: f64) -> [f64; 3] {
 }
 
 fn raise(worst: &mut f64, value: f64) {
-    // A comparison that also lets a number that is none through.
-    if !(value <= *worst) {
+    // What is not a number is the worst of all, and stays.
+    if value.is_nan() || value > *worst {
         *worst = value;
     }
 }

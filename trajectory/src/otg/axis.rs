@@ -3,6 +3,10 @@
 use super::side::{Bounds, End, Extremal, Side};
 use super::strand::{Course, Strand};
 
+/// Relative residual of positions and velocities that counts as rounding: a start that was sampled
+/// from a motion of our own must find that motion again.
+const SLACK: f64 = 3e-13;
+
 /// The normalised problem of one joint: from `start` to `end`, which are `distance` apart.
 ///
 /// For a duration `T` the displacements that can be reached are exactly the interval between the
@@ -37,11 +41,16 @@ impl Axis {
             end,
             bounds,
             distance,
-            slack: noise + 1e-14 * (1.0 + distance.abs()),
+            slack: 64.0 * noise + SLACK * (1.0 + distance.abs()),
             up: Side::new(start, end, bounds),
             down: Side::new(start.mirrored(), end.mirrored(), bounds.mirrored()),
             resting: still(start) && still(end),
         }
+    }
+
+    /// Start, end, bounds and distance.
+    pub(crate) fn parts(&self) -> (End, End, Bounds, f64) {
+        (self.start, self.end, self.bounds, self.distance)
     }
 
     /// Whether the joint can arrive after exactly `time`, seen at a glance: `None` if a closer
@@ -68,7 +77,7 @@ impl Axis {
             self.bounds.top
         };
         let ramps = if self.bounds.smooth {
-            (32.0 * way).cbrt()
+            rough_cube_root(32.0 * way)
         } else {
             0.0
         };
@@ -195,6 +204,11 @@ impl Axis {
     }
 }
 
+/// The cube root to a few percent, for the price of a division: a third of the exponent.
+fn rough_cube_root(value: f64) -> f64 {
+    f64::from_bits(value.to_bits() / 3 + 0x2a9f_7893_0000_0000)
+}
+
 /// Durations after which the velocity and acceleration of `end` can be reached from `start`
 /// within acceleration and jerk bounds, whatever the position.
 ///
@@ -206,12 +220,27 @@ pub(crate) fn velocity_windows(start: End, end: End, bounds: Bounds) -> Windows 
     let shortest = (af - a0).abs();
     let change = end.velocity - start.velocity;
     let half = 0.5 * (a0 * a0 + af * af);
-    let (up_first, up_next) = pulse_windows(change + half, bounds.rise, a0, af);
-    let (down_first, down_next) = pulse_windows(half - change, bounds.fall, -a0, -af);
+    let rounding = 0.1 * SLACK * (1.0 + start.velocity.abs() + end.velocity.abs());
+    // A start on the last phase: nothing is to be added to the straight way.
+    let snap = |square: f64, highest: f64| {
+        let straight = highest * highest;
+        if (square - straight).abs() <= rounding {
+            straight
+        } else {
+            square
+        }
+    };
+    let up = snap(change + half, a0.max(af));
+    let down = snap(half - change, (-a0).max(-af));
+    let (up_first, up_next) = pulse_windows(up, bounds.rise, a0, af);
+    let (down_first, down_next) = pulse_windows(down, bounds.fall, -a0, -af);
     let (up_next, down_next) = (up_next.max(shortest), down_next.max(shortest));
+    let window = |from: f64, last: f64| {
+        (from <= last + 1e-14 * (1.0 + last)).then_some((from, last.max(from)))
+    };
     let early = match (up_first, down_first) {
-        (Some(last), _) if down_next <= last => Some((down_next, last)),
-        (_, Some(last)) if up_next <= last => Some((up_next, last)),
+        (Some(last), _) => window(down_next, last),
+        (_, Some(last)) => window(up_next, last),
         _ => None,
     };
     Windows {
@@ -248,34 +277,41 @@ fn first_above(side: &Side, target: (f64, f64), from: f64, last: f64) -> Option<
     if here.distance >= goal - slack - side.noise(&here) {
         return Some(from);
     }
+    let below = (from, here.distance - goal);
+    let until = |time: f64, distance: f64| root(side, goal, below, (time, distance - goal));
     if !here.crossing
         && here.slope > 0.0
         && let Some(top) = hump(side, from, last)
-        && side.at(top).distance >= goal
     {
-        return Some(root(side, goal, from, top));
+        let distance = side.at(top).distance;
+        if distance >= goal {
+            return Some(until(top, distance));
+        }
     }
     if last.is_finite() {
-        return (side.at(last).distance >= goal).then(|| root(side, goal, from, last));
+        let distance = side.at(last).distance;
+        return (distance >= goal).then(|| until(last, distance));
     }
     let cruise = side.cruise_time();
     if !cruise.is_finite() {
-        return unbounded_root(side, goal, from);
+        return unbounded_root(side, goal, below);
     }
     let end = cruise.max(from);
-    let missing = goal - side.at(end).distance;
-    if missing >= 0.0 {
-        return Some(end + missing / side.top());
+    let distance = side.at(end).distance;
+    if distance <= goal {
+        return Some(end + (goal - distance) / side.top());
     }
-    Some(root(side, goal, from, end))
+    Some(until(end, distance))
 }
 
 /// The root where velocity has no bound: double the time until it is enclosed.
-fn unbounded_root(side: &Side, goal: f64, from: f64) -> Option<f64> {
-    let mut step = 1.0 + from;
+fn unbounded_root(side: &Side, goal: f64, below: (f64, f64)) -> Option<f64> {
+    let mut step = 1.0 + below.0;
     for _ in 0..1100 {
-        if side.at(from + step).distance >= goal {
-            return Some(root(side, goal, from, from + step));
+        let time = below.0 + step;
+        let error = side.at(time).distance - goal;
+        if error >= 0.0 {
+            return Some(root(side, goal, below, (time, error)));
         }
         step *= 2.0;
     }
@@ -299,17 +335,14 @@ fn hump(side: &Side, from: f64, last: f64) -> Option<f64> {
     Some(low)
 }
 
-/// The time between `low` (not far enough) and `high` (far enough) at which `goal` is reached.
-fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
-    let (mut low, mut high) = (low, high);
-    let below = goal - side.at(low).distance;
-    let width = side.at(high).distance - goal + below;
-    let share = if width > 0.0 {
-        (below / width).clamp(0.0, 1.0)
-    } else {
-        1.0
-    };
-    let mut time = low + (high - low) * share.cbrt();
+/// The time between `below` (not far enough) and `above` (far enough) at which `goal` is reached;
+/// both are a time and the distance beyond the goal there.
+fn root(side: &Side, goal: f64, below: (f64, f64), above: (f64, f64)) -> f64 {
+    let (mut low, mut high) = (below.0, above.0);
+    let width = above.1 - below.1;
+    // Without limits but jerk, distance grows with the cube of time.
+    let share = if width > 0.0 { -below.1 / width } else { 1.0 };
+    let mut time = (low + (high - low) * rough_cube_root(share.max(0.0))).min(high);
     for _ in 0..100 {
         let here = side.at(time);
         let error = here.distance - goal;
@@ -319,20 +352,19 @@ fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
             low = time;
         }
         let step = error / here.slope;
-        let newton = time - step;
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if step.abs() <= 2.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
+        if step.abs() <= 4.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
             return if error >= 0.0 || step.abs() <= 4.0 * f64::EPSILON * time {
                 time
             } else {
                 high
             };
         }
-        time = next;
+        let newton = time - step;
+        time = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
     }
     high
 }

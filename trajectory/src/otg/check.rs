@@ -1,8 +1,9 @@
 //! What must hold before and after planning.
 
 use super::error::OtgError;
+use super::joint::Joint;
 use super::limits::Limits;
-use super::motion::Motion;
+use super::motion::{Motion, Track};
 use super::options::{Interface, Options};
 use super::state::State;
 
@@ -173,35 +174,58 @@ fn reachable<const N: usize>(
 }
 
 /// The whole move must stay inside the position limits, which are widened to hold the start.
-pub(crate) fn positions<const N: usize>(
-    motion: &Motion<N>,
+/// A joint that would leave them gets the profile of the same duration that strays least, made
+/// from its problem in `joints` (none for a move along a straight line, which is left as it is).
+pub(crate) fn keep_positions<const N: usize>(
+    motion: &mut Motion<N>,
+    joints: &[Joint],
     limits: &Limits<N>,
     options: &Options<N>,
 ) -> Result<(), OtgError> {
     for joint in 0..N {
-        let (lower, upper) = (limits.position_min[joint], limits.position_max[joint]);
-        let bounded = lower.is_finite() || upper.is_finite();
-        let asked = options.enabled[joint] && options.interface[joint] == Interface::Position;
-        if !bounded || !asked {
+        let range = (limits.position_min[joint], limits.position_max[joint]);
+        let bounded = range.0.is_finite() || range.1.is_finite();
+        if !bounded || !options.enabled[joint] || options.interface[joint] != Interface::Position {
             continue;
         }
-        let track = &motion.tracks[joint];
-        let (low, high) = track.extent();
-        let room = ROUNDING * (low.abs() + high.abs());
-        if high > upper.max(track.start[0]) + room {
-            return Err(OtgError::PositionLimit {
-                joint,
-                value: high,
-                limit: upper,
-            });
+        let track = &mut motion.tracks[joint];
+        let Some((value, limit)) = beyond(track, range) else {
+            continue;
+        };
+        let mut other = *track;
+        let course = joints
+            .get(joint)
+            .and_then(|j| j.direct_course(track.duration));
+        match course {
+            Some(course) => other.course = course,
+            None => {
+                return Err(OtgError::PositionLimit {
+                    joint,
+                    value,
+                    limit,
+                });
+            }
         }
-        if low < lower.min(track.start[0]) - room {
-            return Err(OtgError::PositionLimit {
-                joint,
-                value: low,
-                limit: lower,
-            });
+        match beyond(&other, range) {
+            None => *track = other,
+            Some((value, limit)) => {
+                return Err(OtgError::PositionLimit {
+                    joint,
+                    value,
+                    limit,
+                });
+            }
         }
     }
     Ok(())
+}
+
+/// The position farthest beyond a limit, and that limit.
+fn beyond(track: &Track, (lower, upper): (f64, f64)) -> Option<(f64, f64)> {
+    let (low, high) = track.extent();
+    let room = ROUNDING * (low.abs() + high.abs());
+    if high > upper.max(track.start[0]) + room {
+        return Some((high, upper));
+    }
+    (low < lower.min(track.start[0]) - room).then_some((low, lower))
 }

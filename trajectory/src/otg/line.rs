@@ -44,12 +44,12 @@ pub(crate) fn plan<const N: usize>(
         let share = direction[index];
         track.duration = duration;
         track.course = course;
-        track.joint = joint.scaled(share);
+        track.frame = joint.frame.scaled(share);
         if interface == Interface::Velocity && options.enabled[index] {
             track.end[0] = track.last_position();
         }
     }
-    check::positions(&motion, limits, options)?;
+    check::keep_positions(&mut motion, &[], limits, options)?;
     Ok(motion)
 }
 
@@ -135,9 +135,15 @@ fn collinear<const N: usize>(
     leader: usize,
     grain: f64,
 ) -> Result<(), OtgError> {
+    // A direction that was taken from positions is only as exact as they are.
+    let distance = vectors[0][leader].abs();
+    let blur = if distance > 0.0 {
+        ROUNDING + 4.0 * grain / distance
+    } else {
+        ROUNDING
+    };
     for (which, vector) in vectors.iter().enumerate() {
-        let largest = vector.abs().max();
-        let room = ROUNDING * largest + if which == 0 { grain } else { 0.0 };
+        let room = blur * vector.abs().max();
         for joint in 0..N {
             let deviation = (vector[joint] - vector[leader] * direction[joint]).abs();
             if deviation > room {
@@ -217,7 +223,8 @@ fn standing<const N: usize>(
             end[0] = begin[0];
         }
         Track {
-            joint: Joint::default(),
+            frame: Joint::default().frame,
+            placed: options.interface[joint] == Interface::Position,
             course: Course::default(),
             duration,
             start: begin,

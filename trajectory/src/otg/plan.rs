@@ -34,13 +34,13 @@ pub(crate) fn plan<const N: usize>(
             Joint::default()
         }
     });
-    let motion = if options.synchronisation == Synchronisation::None {
+    let mut motion = if options.synchronisation == Synchronisation::None {
         apart(&joints, start, target, options)?
     } else {
         let duration = common_duration(&joints, options)?;
         assemble(&joints, start, target, options, &[duration; N])
     };
-    check::positions(&motion, limits, options)?;
+    check::keep_positions(&mut motion, &joints, limits, options)?;
     Ok(motion)
 }
 
@@ -129,7 +129,8 @@ fn assemble<const N: usize>(
 ) -> Motion<N> {
     let tracks = std::array::from_fn(|joint| {
         let mut track = Track {
-            joint: joints[joint],
+            frame: joints[joint].frame,
+            placed: options.interface[joint] == Interface::Position,
             course: joints[joint].course(durations[joint]),
             duration: durations[joint],
             start: [
@@ -144,6 +145,9 @@ fn assemble<const N: usize>(
             ],
         };
         finish(&mut track, options.enabled[joint], options.interface[joint]);
+        if !joints[joint].smooth {
+            track.end[2] = 0.0;
+        }
         track
     });
     let duration = durations.iter().copied().fold(0.0, f64::max);

@@ -50,6 +50,15 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
+    /// The same bounds for the motion run backward: what rises falls.
+    pub(crate) fn reversed(self) -> Self {
+        Self {
+            rise: self.fall,
+            fall: self.rise,
+            ..self
+        }
+    }
+
     /// The same bounds seen in a mirror.
     pub(crate) fn mirrored(self) -> Self {
         Self {
@@ -95,7 +104,7 @@ pub(crate) struct Extremal {
 }
 
 /// Time and height of the acceleration pulse that changes the velocity by `change` >= 0.
-fn pulse(change: f64, bound: f64) -> (f64, f64) {
+pub(crate) fn pulse(change: f64, bound: f64) -> (f64, f64) {
     if change <= bound * bound {
         let height = change.max(0.0).sqrt();
         (2.0 * height, height)
@@ -185,7 +194,10 @@ impl Side {
     fn free_smooth(&self, span: f64) -> Free {
         let change = self.end - self.start;
         let half = 0.5 * span;
-        let ratio = if half > 0.0 { change / half } else { 0.0 };
+        if half <= 1e-14 {
+            return self.straight();
+        }
+        let ratio = change / half;
         let (high, low) = (0.5 * (half + ratio), 0.5 * (ratio - half));
         if high <= self.rise && low >= -self.fall {
             return Free {
@@ -198,6 +210,19 @@ impl Side {
             };
         }
         self.free_bounded(half, change, high > self.rise)
+    }
+
+    /// Nothing but jerk +1 from start to end.
+    fn straight(&self) -> Free {
+        let a0 = self.a0;
+        Free {
+            high: a0,
+            low: a0,
+            rising: 2.0 * a0,
+            falling: -2.0 * a0,
+            peak: self.start + a0 * a0,
+            crossing: false,
+        }
     }
 
     /// The same where an acceleration bound is reached; `upper` if the upper one may be.
@@ -347,21 +372,23 @@ impl Side {
                 0.0,
             ];
         }
-        let high = e.high.max(self.a0);
-        let low = e.low.min(self.af);
-        let (third, fifth) = if e.crossing {
+        // Rounding may put a pulse beyond an end; its two accelerations move together, so that
+        // the time between them stays.
+        let shift = (self.a0 - e.high).max(0.0) + (self.af - e.low).min(0.0);
+        let (high, low) = (e.high + shift, e.low + shift);
+        let (third, fifth) = if high >= 0.0 && low <= 0.0 {
             (high, -low)
         } else {
             (high - low, 0.0)
         };
         [
-            high - self.a0,
+            (high - self.a0).max(0.0),
             (e.rising - 2.0 * e.high).max(0.0),
             third.max(0.0),
             e.cruise,
             fifth.max(0.0),
             (e.falling + 2.0 * e.low).max(0.0),
-            self.af - low,
+            (self.af - low).max(0.0),
         ]
     }
 }

@@ -64,6 +64,15 @@ impl Strand {
         }
     }
 
+    /// Phases of jerk -1, 0 or +1.
+    pub(crate) fn phases(times: [f64; 7], signs: [i8; 7]) -> Self {
+        Self {
+            times,
+            signs,
+            levels: None,
+        }
+    }
+
     /// The first three phases with the given signs of the jerk.
     pub(crate) fn three(times: [f64; 3], signs: [i8; 3]) -> Self {
         let mut strand = Self::default();

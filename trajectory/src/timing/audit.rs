@@ -109,6 +109,23 @@ impl Audit {
         factor
     }
 
+    /// As [`Audit::stretch`], without the first piece.
+    pub(super) fn stretch_after_first(&self) -> f64 {
+        let mut factor = 0.0_f64;
+        for (i, limit) in self.limits.iter().enumerate() {
+            let most = self.column(i).skip(1).fold(0.0, f64::max);
+            factor = factor.max(root(most, order(*limit)));
+        }
+        factor
+    }
+
+    /// The limit that the first piece comes nearest to, and its ratio there.
+    pub(super) fn first(&self) -> (Option<Limit>, f64) {
+        let pairs = self.limits.iter().zip(&self.ratios);
+        let most = pairs.max_by(|a, b| a.1.total_cmp(b.1));
+        most.map_or((None, 0.0), |(limit, ratio)| (Some(*limit), *ratio))
+    }
+
     /// Each limit's peak once time is stretched by `factor`.
     pub(super) fn peaks(&self, factor: f64) -> Vec<LimitPeak> {
         let peak = |(i, limit): (usize, &Limit)| {

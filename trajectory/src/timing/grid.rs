@@ -85,6 +85,44 @@ impl<const N: usize> Local<N> {
     }
 }
 
+/// What has to be added to a smooth speed so that it begins like a given moving start; it fades
+/// within the time in which accelerations build up.
+#[derive(Clone, Copy, Debug)]
+struct LeadIn {
+    value: f64,
+    slope: f64,
+    fade: f64,
+}
+
+impl LeadIn {
+    fn new(start: Boundary, speed: impl Fn(f64) -> f64, fade: f64) -> Self {
+        let Boundary::Moving { rate, acceleration } = start else {
+            return Self {
+                value: 0.0,
+                slope: 0.0,
+                fade,
+            };
+        };
+        let step = 0.05 * fade;
+        let slope = acceleration - (speed(step) - speed(-step)) / (2.0 * step);
+        Self {
+            value: rate - speed(0.0),
+            slope,
+            fade,
+        }
+    }
+
+    fn at(&self, t: f64) -> f64 {
+        let x = t / self.fade;
+        let share = if x < 1.0 {
+            (1.0 - x).powi(3) * (1.0 + 3.0 * x)
+        } else {
+            0.0
+        };
+        (self.value + self.slope * t) * share
+    }
+}
+
 impl Grid {
     /// The grid for a path with these knots, from the survey's law made smooth.
     pub(super) fn new(survey: &Survey, knots: &[f64], end: f64, options: &TimingOptions) -> Self {
@@ -101,13 +139,14 @@ impl Grid {
         let spans = (cells / 2).max(12);
         let span = total / spans as f64;
         let floor = 1e-3 * end / fast;
-        let samples: Vec<f64> = (0..=spans)
-            .map(|i| {
-                let t = i as f64 * span - lead;
-                let (before, after) = (t - 0.5 * ramp, t + 0.5 * ramp);
-                ((survey.parameter(after) - survey.parameter(before)) / ramp).max(floor)
-            })
-            .collect();
+        let smooth =
+            |t: f64| (survey.parameter(t + 0.5 * ramp) - survey.parameter(t - 0.5 * ramp)) / ramp;
+        let lead_in = LeadIn::new(options.start, smooth, ramp);
+        let sample = |i: usize| {
+            let t = i as f64 * span - lead;
+            (smooth(t) + lead_in.at(t)).max(floor)
+        };
+        let samples: Vec<f64> = (0..=spans).map(sample).collect();
         let warp = Warp::new(&samples, span, end, (options.start, options.end));
         let warp = if warp.ascends() {
             warp

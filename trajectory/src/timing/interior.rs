@@ -365,7 +365,7 @@ impl<'a> Interior<'a> {
     }
 
     /// Whether every row of the law has a slack.
-    pub(super) fn feasible(&mut self) -> bool {
+    fn feasible(&mut self) -> bool {
         let (flat, steep) = self.evaluate();
         flat < 1.0 && steep < 1.0
     }
@@ -398,6 +398,28 @@ impl<'a> Interior<'a> {
             }
             sigma = (1.0 - best).powi(2).clamp(0.06, 0.7);
         }
+    }
+
+    /// Goes towards the middle of what is feasible, `steps` Newton steps, without regard to time.
+    pub(super) fn center(&mut self, steps: usize) {
+        let mu = 100.0 * self.problem.time(&self.x) / self.rows() as f64;
+        self.start_multipliers(mu);
+        for _ in 0..steps {
+            self.assemble(mu);
+            band::solve(&mut self.matrix, &mut self.step);
+            let reach = self.measure(mu);
+            if self.advance((0.9 / reach.primal).min(1.0)).is_none() {
+                break;
+            }
+            self.advance_multipliers((0.9 / reach.dual).min(1.0));
+            self.iterations += 1;
+        }
+    }
+
+    /// The largest ratio of any row to its limit.
+    pub(super) fn worst(&mut self) -> f64 {
+        let (flat, steep) = self.evaluate();
+        flat.max(steep).sqrt()
     }
 
     /// Multipliers in balance with the slacks.

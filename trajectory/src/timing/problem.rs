@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::lanes::Lane;
+use super::lanes::{LANE, Lane};
 
 /// A law `a(w) = (dw/dt)^2`, C1 and quadratic in each cell, is given by its first value, the middle
 /// Bézier point of each cell, and its last value. In a cell with `a`, `b = a'/2`, `c = a''/2` at
@@ -59,6 +59,28 @@ impl Problem {
     /// Number of cells.
     pub(super) fn cells(&self) -> usize {
         self.widths.len()
+    }
+
+    /// The problem with all limits of speed, acceleration and jerk `factor` times as wide.
+    pub(super) fn relaxed(&self, factor: f64) -> Self {
+        let mut wide = self.clone();
+        let narrow = 1.0 / factor;
+        let rows = wide.acceleration.iter_mut().flatten().flatten();
+        let rows = rows.chain(wide.jerk.iter_mut().flatten().flatten());
+        rows.for_each(|x| *x *= narrow);
+        let vectors = wide.norm_acceleration.iter_mut().flatten();
+        let vectors = vectors.chain(wide.norm_jerk.iter_mut().flatten());
+        vectors.for_each(|x| *x *= narrow);
+        wide.cap.iter_mut().for_each(|cap| *cap *= narrow * narrow);
+        wide
+    }
+
+    /// Takes away the rows of the first node that a given start state decides by itself.
+    pub(super) fn release_start(&mut self) {
+        let norms = self.norm_accelerations();
+        self.acceleration[..self.lanes].fill([[0.0; LANE]; 2]);
+        self.norm_acceleration[..norms].fill([Vector3::zeros(); 2]);
+        self.cap[0] = 1e-6;
     }
 
     /// Tool rows of acceleration at each location.

@@ -3,17 +3,20 @@
 use super::lanes::{LANE, Lane};
 
 /// A path on a grid with its limits, ready for [`ReachGrid::solve`]: `a = (du/dt)^2` and
-/// `b = d²u/dt²` have to meet `a <= cap` and `|p b + q a| <= 1` for each row `(p, q)`.
+/// `b = d²u/dt²` have to meet `a <= cap` and `|p b + q a| <= 1` for each row `(p, q)`, at both ends
+/// of each cell, over which `b` is constant.
 #[derive(Clone, Debug, Default)]
 pub struct ReachGrid {
     at: Vec<f64>,
     cap: Vec<f64>,
-    /// Lanes of rows a grid point has.
+    /// Groups of rows at a point; as many again follow for the next point, seen from this one.
     width: usize,
     /// `|1 / p|` of each row.
     reach: Vec<Lane>,
     /// `q / p` of each row.
     slope: Vec<Lane>,
+    /// The rows of the newest point.
+    newest: Vec<(f64, f64)>,
 }
 
 /// The lines that bound `b` at a given `a`: the least upper and the greatest lower one, each
@@ -21,6 +24,26 @@ pub struct ReachGrid {
 struct Envelope {
     high: (f64, f64),
     low: (f64, f64),
+}
+
+/// Slots for rows: `|1 / p|` and `q / p`.
+type Slots<'a> = (&'a mut [Lane], &'a mut [Lane]);
+
+/// Fills slots with rows; returns what rows without `p` leave of the cap.
+fn fill((reach, slope): Slots<'_>, rows: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let mut cap = f64::INFINITY;
+    let slots = reach.iter_mut().flatten().zip(slope.iter_mut().flatten());
+    for ((reach, slope), (p, q)) in slots.zip(rows) {
+        let inverse = 1.0 / p;
+        // A joint that hardly moves here bounds the speed by its curvature alone.
+        if inverse.abs() < 1e12 {
+            *reach = inverse.abs();
+            *slope = q * inverse;
+        } else if q != 0.0 {
+            cap = cap.min(1.0 / q.abs());
+        }
+    }
+    cap
 }
 
 impl ReachGrid {
@@ -35,42 +58,29 @@ impl ReachGrid {
     /// Adds the next point, at `u`, with the cap of `a` and rows `(p, q)`. Rows beyond the number
     /// given to [`ReachGrid::new`] are not taken.
     pub fn push(&mut self, u: f64, cap: f64, rows: impl Iterator<Item = (f64, f64)>) {
-        let first = self.reach.len();
-        self.reach.resize(first + self.width, [f64::MAX; LANE]);
-        self.slope.resize(first + self.width, [0.0; LANE]);
-        let mut cap = cap;
-        let lanes = self.reach[first..].iter_mut().zip(&mut self.slope[first..]);
-        let slots = lanes.flat_map(|(reach, slope)| reach.iter_mut().zip(slope));
-        for ((reach, slope), (p, q)) in slots.zip(rows) {
-            let inverse = 1.0 / p;
-            // A joint that hardly moves here bounds the speed by its curvature alone.
-            if inverse.abs() < 1e12 {
-                *reach = inverse.abs();
-                *slope = q * inverse;
-            } else if q != 0.0 {
-                cap = cap.min(1.0 / q.abs());
-            }
+        self.newest.clear();
+        self.newest.extend(rows);
+        let (width, first) = (self.width, self.reach.len());
+        if let Some(before) = self.at.last() {
+            // At the end of the cell before, a = a_before + 2 h b.
+            let h = u - before;
+            let seen = self.newest.iter().map(|(p, q)| (p + 2.0 * h * q, *q));
+            let slots = first - width..first;
+            fill(
+                (&mut self.reach[slots.clone()], &mut self.slope[slots]),
+                seen,
+            );
         }
+        self.reach.resize(first + 2 * width, [f64::MAX; LANE]);
+        self.slope.resize(first + 2 * width, [0.0; LANE]);
+        let slots = first..first + width;
+        let own = self.newest.iter().copied();
+        let left = fill(
+            (&mut self.reach[slots.clone()], &mut self.slope[slots]),
+            own,
+        );
         self.at.push(u);
-        self.cap.push(cap);
-    }
-
-    /// The grid with every second point only; the last stays.
-    pub fn halved(&self) -> Self {
-        let last = self.at.len().saturating_sub(1);
-        let mut half = Self {
-            width: self.width,
-            ..Self::default()
-        };
-        for k in (0..=last).filter(|k| k % 2 == 0 || *k == last) {
-            let rows = k * self.width..(k + 1) * self.width;
-            half.at.extend(self.at.get(k));
-            half.cap.extend(self.cap.get(k));
-            half.reach
-                .extend(self.reach.get(rows.clone()).unwrap_or_default());
-            half.slope.extend(self.slope.get(rows).unwrap_or_default());
-        }
-        half
+        self.cap.push(cap.min(left));
     }
 
     /// Parameter values of the points.
@@ -131,7 +141,7 @@ impl ReachGrid {
 
     /// The bounds of `b` at point `k` for `a`.
     fn envelope(&self, k: usize, a: f64) -> Envelope {
-        let rows = k * self.width..(k + 1) * self.width;
+        let rows = 2 * k * self.width..2 * (k + 1) * self.width;
         let mut high = ([f64::MAX; LANE], [f64::MAX; LANE], [0.0; LANE]);
         let mut low = ([f64::MIN; LANE], [f64::MIN; LANE], [0.0; LANE]);
         for (reach, slope) in self.reach[rows.clone()].iter().zip(&self.slope[rows]) {

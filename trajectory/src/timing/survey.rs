@@ -66,12 +66,12 @@ impl Survey {
         if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
             corners(path, &points)?;
         }
-        let grid = Rows {
+        let rows = Rows {
             joint,
             tool,
             rate_cap: options.rate_cap,
-        }
-        .grid(&at, &points);
+        };
+        let grid = rows.grid(&at, &points, 1);
         let first = first_value(options);
         let last = if options.end == Boundary::Rest {
             0.0
@@ -90,7 +90,10 @@ impl Survey {
         if !(total.is_finite() && total > 0.0 && a.iter().all(|a| *a < FREE)) {
             return Err(TimingError::Unbounded);
         }
-        let bound = bound(&grid, total, (first, last));
+        // The change that a grid of half the points makes tells how far off this one may be.
+        let coarse = rows.grid(&at, &points, 2);
+        let coarse = reach::duration(coarse.at(), &coarse.solve(first, last));
+        let bound = (total - 2.0 * (coarse - total).abs()).max(0.0);
         let ramp = ramp(joint, tool, &at, &a, &points);
         let times = clock(&at, &a);
         let rate = a.into_iter().map(f64::sqrt).collect();
@@ -122,13 +125,6 @@ fn clock(at: &[f64], a: &[f64]) -> Vec<f64> {
         times.push(time);
     }
     times
-}
-
-/// The duration less twice the change that a grid of half the points makes: an error bar.
-fn bound(grid: &ReachGrid, total: f64, (first, last): (f64, f64)) -> f64 {
-    let half = grid.halved();
-    let coarse = reach::duration(half.at(), &half.solve(first, last));
-    (total - 2.0 * (coarse - total).abs()).max(0.0)
 }
 
 /// Knots, places between them, and more of them near ends at rest.
@@ -225,8 +221,8 @@ struct Rows<'a, const N: usize> {
 }
 
 impl<const N: usize> Rows<'_, N> {
-    /// The grid at the places `at`.
-    fn grid(&self, at: &[f64], points: &[PathPoint<N>]) -> ReachGrid {
+    /// The grid at every `step`-th of the places `at`, and at the last.
+    fn grid(&self, at: &[f64], points: &[PathPoint<N>], step: usize) -> ReachGrid {
         let mut grid = ReachGrid::new(N + 6);
         let caps: Vec<f64> = points.iter().map(|point| self.cap(point)).collect();
         let most = caps
@@ -236,7 +232,8 @@ impl<const N: usize> Rows<'_, N> {
             .fold(0.0, f64::max);
         // Where the path stands still over its parameter nothing bounds the rate by itself.
         let most = if most > 0.0 { most } else { FREE };
-        for ((&u, point), cap) in at.iter().zip(points).zip(caps) {
+        let all = at.iter().zip(points).zip(caps).enumerate();
+        for (_, ((&u, point), cap)) in all.filter(|(i, _)| i % step == 0 || i + 1 == at.len()) {
             grid.push(u, cap.min(most), self.rows(point));
         }
         grid

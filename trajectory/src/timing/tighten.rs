@@ -10,7 +10,7 @@ use super::problem::Problem;
 use crate::{Path, TimingError};
 
 /// Newton steps after which the best law so far is taken.
-const MOST_STEPS: usize = 60;
+pub(super) const MOST_STEPS: usize = 60;
 /// Newton steps after rows were tightened.
 const FEW_STEPS: usize = 12;
 /// Times that rows are tightened.
@@ -24,13 +24,14 @@ pub(super) struct Draft<const N: usize> {
     pub(super) pieces: Pieces<N>,
     pub(super) audit: Audit,
     pub(super) iterations: usize,
-    x: Vec<f64>,
+    pub(super) cells: usize,
+    pub(super) x: Vec<f64>,
     duration: f64,
 }
 
 impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
-    fn new<P: Path<N>>(
+    pub(super) fn new<P: Path<N>>(
         bounded: Bounded<'_, P, N>,
         (grid, problem): (&Grid, &Problem),
         x: Vec<f64>,
@@ -44,6 +45,7 @@ impl<const N: usize> Draft<N> {
             pieces,
             audit,
             iterations,
+            cells: problem.cells(),
             x,
             duration,
         }
@@ -56,6 +58,9 @@ pub(super) fn best<P: Path<N>, const N: usize>(
     grid: &Grid,
 ) -> Result<Draft<N>, TimingError> {
     let mut problem = bounded.problem(grid);
+    if problem.moving {
+        return super::moving::best(bounded, grid, problem);
+    }
     let mut interior = Interior::new(&problem, vec![1.0; problem.cells() + 2]);
     interior.solve(bounded.options.gap, 0.3, MOST_STEPS);
     let (x, mut iterations) = (interior.x, interior.iterations);
@@ -65,7 +70,7 @@ pub(super) fn best<P: Path<N>, const N: usize>(
         if last.audit.stretch() < ENOUGH {
             break;
         }
-        tighten(&mut problem, &last);
+        tighten(&mut problem, &last, 1.0);
         let mut interior = Interior::new(&problem, last.x);
         interior.solve(bounded.options.gap, 0.02, FEW_STEPS);
         iterations += interior.iterations;
@@ -78,8 +83,8 @@ pub(super) fn best<P: Path<N>, const N: usize>(
     Ok(best)
 }
 
-/// Divides the limits that pieces exceed by their excess, in the cells of these pieces.
-fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>) {
+/// Divides the limits that pieces exceed by their excess and `more`, in the cells of these pieces.
+pub(super) fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>, more: f64) {
     let columns = draft.audit.limits.len().max(1);
     let count = columns * problem.cells();
     let mut excess = vec![1.0_f64; count];
@@ -97,7 +102,7 @@ fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>) {
             .zip(row)
             .filter(|(_, x)| **x > 1.0)
         {
-            scale(problem, (k, &tools), *limit, *excess);
+            scale(problem, (k, &tools), *limit, *excess * more);
         }
     }
 }

@@ -1,0 +1,179 @@
+"""The messages of the driver protocol, byte for byte as in docs/driver-protocol.md."""
+
+import ctypes
+from ctypes import c_double, c_uint8, c_uint32, c_uint64
+
+MAX_JOINTS = 16
+MAX_TOOLS = 2
+PROTOCOL = 1
+
+# Driver states, faults, verdicts, tool actions and statuses, clocks and setpoint flags by number.
+DISCONNECTED, SYNCED, ARMED, ACTIVE, STOPPING, FAULT = range(6)
+NO_FAULT, WATCHDOG, BAD_SETPOINT, OUT_OF_RANGE, STOP_REQUEST, HARDWARE = range(6)
+WELCOME, WRONG_PROTOCOL, WRONG_SCHEMA, WRONG_JOINTS = range(4)
+WRONG_MODEL, WRONG_PERIOD, WRONG_CLOCK, BUSY, NOT_READY = range(4, 9)
+NO_ACTION, OPEN, CLOSE = range(3)
+TOOL_UNKNOWN, TOOL_OPEN, TOOL_CLOSED, TOOL_MOVING, TOOL_FAILED = range(5)
+WALL, LOCK_STEP = range(2)
+FLAG_HOLD, FLAG_STOPPING, FLAG_STOP_REQUEST, FLAG_GOODBYE = 1, 2, 4, 8
+
+Joints = c_double * MAX_JOINTS
+
+
+class ToolCommand(ctypes.Structure):
+    """An order to one tool; a new `order` number is a new order."""
+
+    _fields_ = [
+        ("order", c_uint32),
+        ("action", c_uint32),
+        ("position", c_double),
+        ("velocity", c_double),
+        ("force", c_double),
+    ]
+
+
+class ToolFeedback(ctypes.Structure):
+    """How one tool is."""
+
+    _fields_ = [
+        ("order", c_uint32),
+        ("status", c_uint32),
+        ("position", c_double),
+        ("force", c_double),
+        ("reserved", c_uint64),
+    ]
+
+
+class Setpoint(ctypes.Structure):
+    """What the joints shall do, once in every period."""
+
+    _fields_ = [
+        ("protocol", c_uint32),
+        ("joints", c_uint32),
+        ("session", c_uint64),
+        ("sequence", c_uint64),
+        ("tick", c_uint64),
+        ("published_ns", c_uint64),
+        ("tick_ns", c_uint64),
+        ("period_ns", c_uint64),
+        ("watchdog_ns", c_uint64),
+        ("state_sequence", c_uint64),
+        ("command", c_uint32),
+        ("flags", c_uint32),
+        ("valid", c_uint32),
+        ("reserved_word", c_uint32),
+        ("path_time", c_double),
+        ("path_rate", c_double),
+        ("position", Joints),
+        ("velocity", Joints),
+        ("acceleration", Joints),
+        ("effort", Joints),
+        ("tools", ToolCommand * MAX_TOOLS),
+        ("digital_outputs", c_uint64),
+        ("reserved", c_uint64 * 10),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "canter.Setpoint.1"
+
+
+class State(ctypes.Structure):
+    """How the joints are, once in every period."""
+
+    _fields_ = [
+        ("protocol", c_uint32),
+        ("joints", c_uint32),
+        ("session", c_uint64),
+        ("sequence", c_uint64),
+        ("measured_ns", c_uint64),
+        ("published_ns", c_uint64),
+        ("setpoint_sequence", c_uint64),
+        ("setpoint_published_ns", c_uint64),
+        ("setpoint_received_ns", c_uint64),
+        ("driver_state", c_uint32),
+        ("fault", c_uint32),
+        ("fault_joint", c_uint32),
+        ("reserved_word", c_uint32),
+        ("missed", c_uint64),
+        ("position", Joints),
+        ("velocity", Joints),
+        ("effort", Joints),
+        ("tools", ToolFeedback * MAX_TOOLS),
+        ("digital_inputs", c_uint64),
+        ("hardware_ns", c_uint64),
+        ("reserved", c_uint64 * 11),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "canter.State.1"
+
+
+class Hello(ctypes.Structure):
+    """The engine's request for a session."""
+
+    _fields_ = [
+        ("protocol", c_uint32),
+        ("joints", c_uint32),
+        ("schema", c_uint64),
+        ("model", c_uint64),
+        ("period_ns", c_uint64),
+        ("watchdog_ns", c_uint64),
+        ("clock", c_uint32),
+        ("process", c_uint32),
+        ("name", c_uint8 * 64),
+        ("reserved", c_uint64 * 4),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "canter.Hello.1"
+
+
+class HelloAck(ctypes.Structure):
+    """The driver's answer."""
+
+    _fields_ = [
+        ("protocol", c_uint32),
+        ("joints", c_uint32),
+        ("verdict", c_uint32),
+        ("reserved_word", c_uint32),
+        ("schema", c_uint64),
+        ("session", c_uint64),
+        ("watchdog_ns", c_uint64),
+        ("position", Joints),
+        ("lower", Joints),
+        ("upper", Joints),
+        ("velocity", Joints),
+        ("name", c_uint8 * 64),
+        ("reason", c_uint8 * 128),
+        ("reserved", c_uint64 * 3),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "canter.HelloAck.1"
+
+
+def schema_checksum():
+    """The checksum of the layout as this file has it (FNV-1a over sizes and offsets)."""
+    numbers = [
+        PROTOCOL,
+        MAX_JOINTS,
+        MAX_TOOLS,
+        ctypes.sizeof(Setpoint),
+        Setpoint.position.offset,
+        Setpoint.tools.offset,
+        Setpoint.digital_outputs.offset,
+        ctypes.sizeof(State),
+        State.position.offset,
+        State.tools.offset,
+        State.digital_inputs.offset,
+        ctypes.sizeof(Hello),
+        ctypes.sizeof(HelloAck),
+    ]
+    value = 0xCBF29CE484222325
+    for number in numbers:
+        value = ((value ^ number) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
+    return value

@@ -1,0 +1,51 @@
+"""A driver for a robot of your own: fill in the four places marked HERE.
+
+Run it, then let Canter drive it:
+    python template.py cell/arm
+    canter run PROGRAM --robot ur5e --driver external --arm cell/arm
+"""
+
+import sys
+
+from canter_driver import Robot, messages, run
+
+
+class MyRobot(Robot):
+    """Six joints that are at once where they shall be."""
+
+    name = "my robot"
+    # HERE: the ranges (rad), speeds (rad/s), and what your own stop may use (rad/s2, rad/s3).
+    lower = [-6.28] * 6
+    upper = [6.28] * 6
+    velocity = [3.14] * 6
+    acceleration = [10.0] * 6
+    jerk = [100.0] * 6
+
+    def __init__(self):
+        self.position = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+        self.speed = [0.0] * 6
+        self.gripper = messages.TOOL_OPEN
+
+    def measure(self):
+        # HERE: ask the hardware where the joints are.
+        return self.position, self.speed
+
+    def move(self, position, velocity, acceleration, period):
+        # HERE: tell the hardware; use velocity and acceleration as feed-forward.
+        self.position, self.speed = list(position), list(velocity)
+
+    def tool(self, tool, action):
+        # HERE: begin to open or close; `tool_status` tells when it is done.
+        self.gripper = (
+            messages.TOOL_OPEN if action == messages.OPEN else messages.TOOL_CLOSED
+        )
+
+    def tool_status(self, tool):
+        return self.gripper if tool == 0 else messages.TOOL_UNKNOWN
+
+
+if __name__ == "__main__":
+    try:
+        run(sys.argv[1] if len(sys.argv) > 1 else "cell/arm", MyRobot())
+    except KeyboardInterrupt:
+        pass

@@ -1,0 +1,70 @@
+//! A bare exchange over iceoryx2, to see what the transport itself costs.
+
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{BackpressureStrategy, Node};
+
+use crate::node::{Shared, join, topic};
+use crate::{Arm, IpcError, Setpoint};
+
+/// As many bytes as a setpoint has, and nothing else.
+type Bytes = [u64; size_of::<Setpoint>() / 8];
+
+/// One end of a bare exchange of messages of a setpoint's size: no checks, no protocol. The
+/// yardstick of `canter doctor` and of the benches.
+#[derive(Debug)]
+pub struct Probe {
+    publisher: Publisher<Shared, Bytes, ()>,
+    subscriber: Subscriber<Shared, Bytes, ()>,
+    _node: Node<Shared>,
+}
+
+impl Probe {
+    /// Opens the end that asks, or the one that answers.
+    ///
+    /// # Errors
+    /// Everything that can go wrong with shared memory.
+    pub fn open(arm: &Arm, asks: bool) -> Result<Self, IpcError> {
+        let node = join(arm, "probe")?;
+        let (out, back) = if asks {
+            ("ping", "pong")
+        } else {
+            ("pong", "ping")
+        };
+        let fail = |cause: String| IpcError::Failed {
+            service: arm.to_string(),
+            operation: "opening the probe",
+            cause,
+        };
+        let publisher = topic::<Bytes>(&node, arm, out)?
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|cause| fail(format!("{cause:?}")))?;
+        let subscriber = topic::<Bytes>(&node, arm, back)?
+            .subscriber_builder()
+            .create()
+            .map_err(|cause| fail(format!("{cause:?}")))?;
+        Ok(Self {
+            publisher,
+            subscriber,
+            _node: node,
+        })
+    }
+
+    /// Sends a message that carries `number`.
+    pub fn send(&self, number: u64) -> bool {
+        let mut bytes: Bytes = [0; _];
+        bytes[0] = number;
+        self.publisher.send_copy(bytes).is_ok()
+    }
+
+    /// The number of the oldest message not read yet. Does not wait.
+    pub fn receive(&self) -> Option<u64> {
+        self.subscriber
+            .receive()
+            .ok()
+            .flatten()
+            .map(|sample| sample[0])
+    }
+}

@@ -1,0 +1,177 @@
+//! The best course of the spare motion over a whole path.
+//!
+//! A grid of path parameter and spare motion is filled by continuation; a shortest
+//! way through it weighs room to the limits, distance from singular poses and changes
+//! of the spare motion; polynomials through that way are the courses to try.
+
+use super::redundancy::{Course, Spare};
+use super::trace::{Task, smallest};
+use nalgebra::{SMatrix, SVector};
+
+/// Steps along the path.
+const LAYERS: usize = 32;
+/// Steps of the spare motion to either side.
+const SIDE: usize = 14;
+const WIDTH: usize = 2 * SIDE + 1;
+/// Size of such a step, rad.
+const STEP: f64 = 0.1;
+/// Most such steps from one layer to the next.
+const SWING: usize = 3;
+/// Largest difference of a joint from one cell of the grid to the next, rad.
+const SURPRISE: f64 = 0.8;
+
+/// A place in the grid: joints and what it costs to be there.
+#[derive(Clone, Copy)]
+struct Cell<const N: usize> {
+    q: SVector<f64, N>,
+    cost: f64,
+}
+
+type Layer<const N: usize> = Vec<Option<Cell<N>>>;
+
+/// Courses worth trying, best fit first; none where the search finds no way.
+pub(super) fn search<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+    still: &Spare<N>,
+) -> Vec<Course> {
+    let layers = fill(task, start, still);
+    let Some(way) = shortest(&layers) else {
+        return Vec::new();
+    };
+    let points: Vec<(f64, f64)> = way
+        .iter()
+        .enumerate()
+        .map(|(i, column)| {
+            let offset = (*column as f64 - SIDE as f64) * STEP;
+            (i as f64 / LAYERS as f64, offset)
+        })
+        .collect();
+    let base = still.at(still.from)[0];
+    [5, 4, 3, 2, 1]
+        .into_iter()
+        .filter_map(|degree| fit(&points, base, degree))
+        .collect()
+}
+
+/// Fills the grid by continuation from the start.
+fn fill<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+    still: &Spare<N>,
+) -> Vec<Layer<N>> {
+    let value = |column: usize| {
+        let mut at = still.at(still.from);
+        at[0] += (column as f64 - SIDE as f64) * STEP;
+        at
+    };
+    let cell = |q0: &SVector<f64, N>, u: f64, column: usize| {
+        let q = task.newton((q0, SURPRISE), u, still, &value(column))?;
+        Some(Cell {
+            q,
+            cost: cost(task, &q),
+        })
+    };
+    let mut first: Layer<N> = vec![None; WIDTH];
+    first[SIDE] = Some(Cell {
+        q: *start,
+        cost: 0.0,
+    });
+    for step in 1..=SIDE {
+        let right = first[SIDE + step - 1].and_then(|c| cell(&c.q, still.from, SIDE + step));
+        let left = first[SIDE + 1 - step].and_then(|c| cell(&c.q, still.from, SIDE - step));
+        (first[SIDE + step], first[SIDE - step]) = (right, left);
+    }
+    let mut layers = vec![first];
+    for i in 1..=LAYERS {
+        let u = still.from + still.span * i as f64 / LAYERS as f64;
+        let before = &layers[i - 1];
+        let next = (0..WIDTH)
+            .map(|column| {
+                let near = [Some(column), column.checked_sub(1), Some(column + 1)];
+                let mut seeds = near.into_iter().flatten().filter_map(|c| *before.get(c)?);
+                seeds.find_map(|seed| cell(&seed.q, u, column))
+            })
+            .collect();
+        layers.push(next);
+    }
+    // Only the start itself can be the beginning of a way.
+    for (column, cell) in layers[0].iter_mut().enumerate() {
+        if column != SIDE {
+            *cell = None;
+        }
+    }
+    layers
+}
+
+/// What it costs to be at `q`: grows towards limits and singular poses, infinite beyond.
+fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>) -> f64 {
+    let chain = task.solver.chain();
+    let mut sum = 0.0;
+    for i in 0..N {
+        let room = (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]);
+        if room <= 0.0 {
+            return f64::INFINITY;
+        }
+        sum += (0.15 / room).powi(2).min(1e6);
+    }
+    let (_, jacobian) = chain.jacobian(q);
+    sum + (0.08 / smallest(jacobian).max(1e-4)).powi(2)
+}
+
+/// Columns of the cheapest way through the grid.
+fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
+    let mut total: Vec<f64> = layers
+        .first()?
+        .iter()
+        .map(|cell| if cell.is_some() { 0.0 } else { f64::INFINITY })
+        .collect();
+    let mut back: Vec<Vec<usize>> = Vec::new();
+    for (i, layer) in layers.iter().enumerate().skip(1) {
+        let (mut next, mut from) = (vec![f64::INFINITY; WIDTH], vec![0; WIDTH]);
+        for (column, cell) in layer.iter().enumerate() {
+            let Some(cell) = cell else { continue };
+            for source in column.saturating_sub(SWING)..(column + SWING + 1).min(WIDTH) {
+                let Some(before) = layers[i - 1][source] else {
+                    continue;
+                };
+                // The same spare value can be on another branch: the joints tell.
+                if (before.q - cell.q).amax() > 2.0 * SURPRISE {
+                    continue;
+                }
+                let swing = column.abs_diff(source) as f64;
+                let sum = total[source] + cell.cost + 0.3 * swing * swing;
+                if sum < next[column] {
+                    (next[column], from[column]) = (sum, source);
+                }
+            }
+        }
+        total = next;
+        back.push(from);
+    }
+    let last = (0..WIDTH).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
+    if !total[last].is_finite() {
+        return None;
+    }
+    let mut way = vec![last];
+    for from in back.iter().rev() {
+        way.push(from[*way.last()?]);
+    }
+    way.reverse();
+    Some(way)
+}
+
+/// Least-squares polynomial of a degree up to 5 through points `(x, offset)`, with
+/// offset zero at x = 0, added to `base`.
+fn fit(points: &[(f64, f64)], base: f64, degree: usize) -> Option<Course> {
+    let mut normal = SMatrix::<f64, 5, 5>::identity();
+    let mut right = SVector::<f64, 5>::zeros();
+    for i in 0..degree {
+        for j in 0..degree {
+            normal[(i, j)] = points.iter().map(|(x, _)| x.powi((i + j + 2) as i32)).sum();
+        }
+        right[i] = points.iter().map(|(x, y)| x.powi(i as i32 + 1) * y).sum();
+    }
+    let c = normal.cholesky()?.solve(&right);
+    Some([base, c[0], c[1], c[2], c[3], c[4]])
+}

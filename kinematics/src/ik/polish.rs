@@ -1,0 +1,132 @@
+//! Branches of arms that are only near a closed form, as calibrated ones are.
+//!
+//! The closed form of the near arm seeds a descent. Where two branches lie close
+//! together (a fold: elbow straight, wrist straight), both seeds may fall on the same
+//! one or on none; then the other is looked for across the fold.
+
+use super::closed::Closed;
+use super::goal::Goal;
+use super::numeric::Stop;
+use super::report::{Branches, Solution};
+use super::{LENGTH, Solver, turns};
+use nalgebra::{Isometry3, SMatrix, SVector};
+
+/// Smallest singular value below which a twin across a fold is looked for.
+const FOLD: f64 = 0.15;
+/// Step along the fold when its middle is all that is known, rad.
+const ASIDE: f64 = 0.15;
+
+impl<const N: usize> Solver<N> {
+    /// All branches at one parameter of an arm whose closed form is only near.
+    #[cold]
+    pub(super) fn near_branches(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        seed: &SVector<f64, N>,
+        parameter: f64,
+    ) -> Branches<N> {
+        let raw = self.raw(closed, pose, parameter, seed);
+        let mut found = Branches::new();
+        for id in 0..8_u8 {
+            let place = (usize::from(id / 4), usize::from(id % 4));
+            let Some(q) = self.branch(closed, &raw, place, seed) else {
+                continue;
+            };
+            match self.polished(pose, &q) {
+                Some(q) => self.add(&mut found, &q, id, seed),
+                None => {
+                    let (along, _) = self.fold(&q);
+                    for step in [ASIDE, -ASIDE] {
+                        if let Some(q) = self.polished(pose, &(q + along * step)) {
+                            self.add(&mut found, &q, id, seed);
+                        }
+                    }
+                }
+            }
+        }
+        for index in 0..found.len() {
+            let Some(solution) = found.get(index).copied() else {
+                continue;
+            };
+            let (along, smallest) = self.fold(&solution.q);
+            if smallest > FOLD {
+                continue;
+            }
+            let twin = solution.q + along * self.across(&solution.q, &along, smallest);
+            if let Some(q) = self.polished(pose, &twin) {
+                let id = solution.branch.unwrap_or(0);
+                self.add(&mut found, &q, id, seed);
+            }
+        }
+        found
+    }
+
+    /// Adds a joint position that is inside the limits and new.
+    fn add(&self, found: &mut Branches<N>, q: &SVector<f64, N>, id: u8, seed: &SVector<f64, N>) {
+        let q = turns::nearest(&self.chain, q, seed);
+        let known = |other: &Solution<N>| turns::distance(&self.chain, &other.q, &q) < 1e-6;
+        if self.chain.within_limits(&q, 0.0) && !found.iter().any(known) {
+            found.push(Solution {
+                q,
+                branch: Some(id),
+            });
+        }
+    }
+
+    /// Brings a near branch onto the pose; `None` where it does not get there.
+    fn polished(&self, pose: &Isometry3<f64>, q: &SVector<f64, N>) -> Option<SVector<f64, N>> {
+        let target = Goal::Pose(*pose).target();
+        let landing = self.descend(
+            &target,
+            q,
+            Stop {
+                limits: false,
+                steps: 20,
+                ..self.stop
+            },
+        );
+        // A seed that had to go far was none.
+        (landing.reached && turns::distance(&self.chain, &landing.q, q) < 2.0).then_some(landing.q)
+    }
+
+    /// Direction of the joints that moves the tool least, and by how much: the last
+    /// singular vector, by inverse iteration.
+    fn fold(&self, q: &SVector<f64, N>) -> (SVector<f64, N>, f64) {
+        let j = self.scaled_jacobian(q);
+        let mut normal = j.transpose() * j;
+        for i in 0..N {
+            normal[(i, i)] += 1e-12;
+        }
+        let Some(factor) = normal.cholesky() else {
+            return (SVector::zeros(), 0.0);
+        };
+        let mut v = SVector::<f64, N>::from_fn(|i, _| 1.0 + 0.1 * i as f64).normalize();
+        for _ in 0..6 {
+            let next = factor.solve(&v);
+            v = next / next.norm().max(f64::MIN_POSITIVE);
+        }
+        (v, (j * v).norm())
+    }
+
+    /// How far along a fold the twin of a solution lies: with `f(s) = a s + b s^2 / 2`
+    /// along it, the other root.
+    fn across(&self, q: &SVector<f64, N>, along: &SVector<f64, N>, smallest: f64) -> f64 {
+        let j = self.scaled_jacobian(q);
+        let image = (j * along) / smallest.max(1e-12);
+        let mut change = self.chain.jacobian_derivative(q, along) * along;
+        change.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+        let bend = image.dot(&change);
+        if bend.abs() < 1e-6 {
+            0.0
+        } else {
+            (-2.0 * smallest / bend).clamp(-1.5, 1.5)
+        }
+    }
+
+    fn scaled_jacobian(&self, q: &SVector<f64, N>) -> SMatrix<f64, 6, N> {
+        let (_, mut j) = self.chain.jacobian(q);
+        j.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+        j
+    }
+}

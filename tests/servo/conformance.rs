@@ -1,0 +1,48 @@
+//! The simulated driver keeps every clause of the protocol; the kit sees a driver that does not.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use engine::conformance::{Verdict, test_driver};
+use system_tests::servo_arm::{JOINTS, driver_options};
+
+#[test]
+fn the_simulated_driver_conforms() {
+    let arm: ipc::Arm = format!("conform-{}/sim", std::process::id()).parse().unwrap();
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let options = driver_options(arm.clone());
+        let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
+        let clauses = test_driver(&arm, JOINTS).unwrap();
+        for clause in &clauses {
+            println!("{:?} {}: {}", clause.verdict, clause.name, clause.seen);
+        }
+        assert_eq!(clauses.len(), 16);
+        assert!(clauses.iter().all(|clause| clause.verdict == Verdict::Pass));
+        stop.store(true, Ordering::Relaxed);
+        driver.join().unwrap();
+    });
+}
+
+/// A driver that is too slow to follow and has no gripper is seen.
+#[test]
+fn a_lazy_driver_is_seen() {
+    let arm: ipc::Arm = format!("conform-{}/lazy", std::process::id()).parse().unwrap();
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let mut options = driver_options(arm.clone());
+        options.frequency = 0.5;
+        options.delay = 300;
+        options.gripper = None;
+        let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
+        let clauses = test_driver(&arm, JOINTS).unwrap();
+        let verdict = |name: &str| {
+            clauses.iter().find(|clause| clause.name == name).map(|clause| clause.verdict)
+        };
+        assert_eq!(verdict("follows a motion"), Some(Verdict::Fail));
+        assert_eq!(verdict("the gripper answers"), Some(Verdict::Skip));
+        assert_eq!(verdict("wrong protocol is refused"), Some(Verdict::Pass));
+        stop.store(true, Ordering::Relaxed);
+        driver.join().unwrap();
+    });
+}

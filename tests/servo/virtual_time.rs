@@ -1,0 +1,330 @@
+//! The real-time thread's work on a virtual clock, with an ideal driver: what happens when is
+//! exact.
+
+use engine::executor::{Control, Event, Fault, Feeder, Monitor, Remote, Runner, Tick};
+use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
+use realtime::{Piece, Sample, Segment};
+use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
+
+/// A runner, its ends, and a driver that is always exactly at the last setpoint.
+struct Bench {
+    runner: Runner<JOINTS>,
+    feeder: Feeder<JOINTS>,
+    remote: Remote<JOINTS>,
+    monitor: Monitor<JOINTS>,
+    state: State,
+    tick: u64,
+    setpoints: Vec<Setpoint>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let mut config = executor_config("virtual/arm".parse().unwrap(), Clock::Wall);
+        config.record = false;
+        let (mut runner, feeder, remote, monitor) = Runner::new(config);
+        let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
+        ack.session = 1;
+        ack.position[..JOINTS].copy_from_slice(home().as_slice());
+        runner.open(&ack);
+        let mut state = State {
+            joints: JOINTS as u32,
+            session: 1,
+            ..State::default()
+        };
+        state.position = ack.position;
+        Self {
+            runner,
+            feeder,
+            remote,
+            monitor,
+            state,
+            tick: 0,
+            setpoints: Vec::new(),
+        }
+    }
+
+    /// A period, after `skipped` that were left out; `change` spoils the state on its way.
+    fn period(&mut self, skipped: u64, change: impl Fn(State) -> Option<State>) -> Setpoint {
+        self.state.sequence += 1;
+        self.state.driver_state = DriverState::Active as u32;
+        self.tick += skipped;
+        let begin_ns = self.tick * 1_000_000;
+        let tick = Tick {
+            number: self.tick,
+            begin_ns,
+            now_ns: begin_ns,
+            skipped,
+        };
+        let setpoint = self.runner.tick(change(self.state), tick);
+        self.state.position = setpoint.position;
+        self.tick += 1;
+        self.setpoints.push(setpoint);
+        setpoint
+    }
+
+    fn run(&mut self, periods: u64) {
+        for _ in 0..periods {
+            self.period(0, Some);
+        }
+    }
+
+    fn events(&mut self) -> Vec<Event> {
+        std::iter::from_fn(|| self.monitor.event()).collect()
+    }
+
+    /// Every setpoint keeps the limits against those before it, by finite differences.
+    fn assert_smooth(&self) {
+        let limits = limits();
+        for four in self.setpoints.windows(4) {
+            let whole = four.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1);
+            for joint in (0..JOINTS).filter(|_| whole) {
+                let p = |index: usize| four[index].position[joint];
+                let third = (p(3) - p(0) + (p(1) - p(2)) * 3.0) / 1e-9;
+                let second = (p(3) - p(2) * 2.0 + p(1)) / 1e-6;
+                assert!(
+                    third.abs() <= limits.jerk[joint] * (1.0 + 1e-6) + 1e-5,
+                    "{third}"
+                );
+                assert!(second.abs() <= limits.acceleration[joint] * (1.0 + 1e-6) + 1e-8);
+            }
+        }
+    }
+}
+
+/// A pause, an override and a fast stop on the way change the time, never the way.
+#[test]
+fn the_operator_changes_time_only() {
+    let mut bench = Bench::new();
+    (0..6).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    let script = [
+        (300, Control::Pause),
+        (900, Control::Resume),
+        (600, Control::Override(0.3)),
+        (1300, Control::Stop { fast: true }),
+        (500, Control::Resume),
+        (2000, Control::Override(1.0)),
+    ];
+    for (periods, control) in script {
+        bench.run(periods);
+        bench.remote.control(control);
+    }
+    bench.run(6000);
+    for setpoint in bench.setpoints.iter().filter(|setpoint| setpoint.tick > 20) {
+        let plan = planned(setpoint.command, setpoint.path_time);
+        for joint in 0..JOINTS {
+            assert!((setpoint.position[joint] - plan[joint]).abs() < 1e-9);
+        }
+    }
+    bench.assert_smooth();
+    let events = bench.events();
+    let stops = events
+        .iter()
+        .filter(|event| matches!(event, Event::Stopped { .. }))
+        .count();
+    assert_eq!(stops, 2);
+    assert!(
+        events
+            .iter()
+            .any(|event| matches!(event, Event::Finished { command: 5, .. }))
+    );
+}
+
+/// How a fault in the middle of a move ends: latched, at rest, on the path, deaf to `Resume`.
+fn faulted(change: impl Fn(State) -> Option<State> + Copy, periods: u64) -> Fault {
+    let mut bench = Bench::new();
+    assert!(feed(&mut bench.feeder, 0));
+    bench.run(400);
+    for _ in 0..periods {
+        bench.period(0, change);
+    }
+    bench.run(600);
+    bench.remote.control(Control::Resume);
+    bench.run(200);
+    bench.assert_smooth();
+    let last = bench.setpoints.last().unwrap();
+    assert_ne!(last.flags & SetpointFlags::HOLD, 0, "it still moves");
+    let now = bench.remote.measured();
+    assert!(now.faulted && now.resting);
+    let before = now.setpoint;
+    assert!(
+        feed(&mut bench.feeder, 1),
+        "the ring takes it, nobody executes it"
+    );
+    bench.run(1000);
+    assert_eq!(bench.remote.measured().setpoint, before);
+    let fault = bench.events().into_iter().find_map(|event| match event {
+        Event::Faulted { fault, .. } => Some(fault),
+        _ => None,
+    });
+    fault.expect("a fault was reported")
+}
+
+#[test]
+fn what_a_driver_may_do_wrong() {
+    let lost = faulted(|_| None, 150);
+    assert!(
+        matches!(
+            lost,
+            Fault::DriverLost {
+                silent_ms: 100..=102
+            }
+        ),
+        "{lost}"
+    );
+    let other = faulted(
+        |state| {
+            Some(State {
+                session: 9,
+                ..state
+            })
+        },
+        150,
+    );
+    assert!(matches!(other, Fault::DriverLost { .. }));
+    let nan = faulted(
+        |mut state| {
+            state.position[2] = f64::NAN;
+            Some(state)
+        },
+        1,
+    );
+    assert!(matches!(nan, Fault::BadState(_)), "{nan}");
+    let nonsense = faulted(
+        |state| {
+            Some(State {
+                driver_state: 99,
+                ..state
+            })
+        },
+        1,
+    );
+    assert!(matches!(nonsense, Fault::BadState(_)));
+    let joints = faulted(|state| Some(State { joints: 7, ..state }), 1);
+    assert!(matches!(joints, Fault::BadState(_)));
+    let far = faulted(
+        |mut state| {
+            state.position[1] += 0.5;
+            Some(state)
+        },
+        1,
+    );
+    assert!(
+        matches!(far, Fault::Limit(trip) if trip.joint == 1),
+        "{far}"
+    );
+    assert!(
+        far.to_string().starts_with("joint 2: following error 0.5"),
+        "{far}"
+    );
+    let stopped = faulted(
+        |state| {
+            let driver_state = DriverState::Stopping as u32;
+            let fault = FaultCode::Hardware as u32;
+            Some(State {
+                driver_state,
+                fault,
+                fault_joint: 3,
+                ..state
+            })
+        },
+        1,
+    );
+    assert_eq!(
+        stopped.to_string(),
+        "driver fault at joint 4: a fault of the hardware"
+    );
+}
+
+/// Periods that come late are left out: the next setpoint is where the plan is by then.
+#[test]
+fn late_periods_are_left_out() {
+    let mut bench = Bench::new();
+    assert!(feed(&mut bench.feeder, 0));
+    bench.run(200);
+    for skipped in [1, 4, 0, 17, 2] {
+        let setpoint = bench.period(skipped, Some);
+        let plan = planned(0, setpoint.path_time);
+        assert!((setpoint.position[0] - plan[0]).abs() < 1e-9);
+    }
+    let counters = bench.remote.counters();
+    assert_eq!(
+        (counters.published, counters.skipped, counters.ticks),
+        (205, 24, 229)
+    );
+    let before = bench.setpoints.last().unwrap().path_time;
+    // Longer than the watchdog: no jump, a latched fault, a stop from where it was.
+    let after = bench.period(300, Some);
+    assert!(after.path_time - before < 0.0011);
+    assert!(bench.remote.measured().faulted);
+    let stalled = |event: &Event| {
+        matches!(
+            event,
+            Event::Faulted {
+                fault: Fault::Stalled { .. },
+                ..
+            }
+        )
+    };
+    assert!(bench.events().iter().any(stalled));
+}
+
+/// A planner that hands over half a command and dies: the arm stops on the path.
+#[test]
+fn a_starved_planner() {
+    let mut bench = Bench::new();
+    let goal = home() + (planned(0, 9.0) - home()) * 4.0;
+    let whole = Piece::hermite(6.0, &Sample::rest(home()), &Sample::rest(goal));
+    let half = Piece {
+        duration: 3.0,
+        ..whole
+    };
+    bench
+        .feeder
+        .push(Segment {
+            piece: half,
+            command: 0,
+            last: false,
+        })
+        .unwrap();
+    bench.run(9000);
+    bench.assert_smooth();
+    let now = bench.remote.measured();
+    assert!(now.resting && !now.faulted);
+    let last = bench.setpoints.last().unwrap();
+    assert!(last.path_time > 2.0 && last.path_time < 3.0);
+    assert!((last.position[0] - whole.sample(last.path_time).position[0]).abs() < 1e-9);
+}
+
+/// An abort on the way comes to rest on the path and forgets the rest; what is pushed after it
+/// counts.
+#[test]
+fn abort_and_begin_anew() {
+    let mut bench = Bench::new();
+    (0..4).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    bench.run(400);
+    bench.remote.control(Control::Abort);
+    assert!(
+        feed(&mut bench.feeder, 0),
+        "too late, it belongs to the old program"
+    );
+    bench.run(1000);
+    bench.assert_smooth();
+    let aborted = |event: &Event| matches!(event, Event::Aborted { .. });
+    assert!(bench.events().iter().any(aborted));
+    let here = bench.remote.measured();
+    assert!(here.resting && here.idle && !here.faulted);
+    bench.feeder.renew();
+    let back = Piece::hermite(1.0, &Sample::rest(here.setpoint), &Sample::rest(home()));
+    bench
+        .feeder
+        .push(Segment {
+            piece: back,
+            command: 5,
+            last: true,
+        })
+        .unwrap();
+    bench.run(1010);
+    let finished = |event: &Event| matches!(event, Event::Finished { command: 5, .. });
+    assert!(bench.events().iter().any(finished));
+    assert!((bench.remote.measured().setpoint - home()).amax() < 1e-12);
+}

@@ -1,0 +1,87 @@
+//! Laws that start from a given state of motion.
+//!
+//! Such a law cannot be slowed down as a whole, so a feasible one has to be found first: with all
+//! limits wide enough for the first guess, go to the middle of what is feasible, narrow the
+//! limits to what that needs, and so on until they are the true ones.
+
+use super::certificate::Limit;
+use super::grid::{Bounded, Grid};
+use super::interior::Interior;
+use super::problem::Problem;
+use super::tighten::{Draft, MOST_STEPS, tighten};
+use crate::{Path, TimingError};
+
+/// Times that limits are narrowed.
+const NARROWINGS: usize = 60;
+/// Newton steps for each.
+const STEPS: usize = 6;
+/// Times that rows are tightened between the grid points.
+const ROUNDS: usize = 10;
+/// What a given state may exceed the limits by.
+const ROUNDING: f64 = 1e-6;
+
+/// The fastest law found over `grid` that meets every bound as it is.
+pub(super) fn best<P: Path<N>, const N: usize>(
+    bounded: Bounded<'_, P, N>,
+    grid: &Grid,
+    mut problem: Problem,
+) -> Result<Draft<N>, TimingError> {
+    problem.release_start();
+    let mut x = vec![1.0; problem.cells() + 2];
+    let mut iterations = 0;
+    for round in 0..ROUNDS {
+        let mut interior = Interior::new(&problem, enter(&problem, x)?);
+        interior.solve(bounded.options.gap, 0.3, MOST_STEPS);
+        iterations += interior.iterations;
+        let draft = Draft::new(bounded, (grid, &problem), interior.x, iterations);
+        if draft.audit.stretch_after_first() <= 1.0 {
+            return start_holds(draft);
+        }
+        tighten(&mut problem, &draft, 1.0 + 5e-4 * (round + 1) as f64);
+        problem.release_start();
+        x = draft.x;
+    }
+    Err(TimingError::StartTooFast {
+        ratio: 1.0,
+        limit: "between the grid points".to_owned(),
+    })
+}
+
+/// The draft, if its first piece, which the given state rules, keeps the limits.
+fn start_holds<const N: usize>(draft: Draft<N>) -> Result<Draft<N>, TimingError> {
+    let (limit, ratio) = draft.audit.first();
+    if ratio <= 1.0 + ROUNDING {
+        return Ok(draft);
+    }
+    Err(TimingError::StartTooFast {
+        ratio,
+        limit: limit.map_or(String::new(), |x: Limit| x.to_string()),
+    })
+}
+
+/// A law near `x` in which every row has a slack.
+fn enter(problem: &Problem, x: Vec<f64>) -> Result<Vec<f64>, TimingError> {
+    let mut x = x;
+    let mut wide = 1.02 * Interior::new(problem, x.clone()).worst();
+    for _ in 0..NARROWINGS {
+        if wide <= 1.0 {
+            return Ok(x);
+        }
+        let relaxed = problem.relaxed(wide);
+        let mut interior = Interior::new(&relaxed, x);
+        interior.center(STEPS);
+        x = interior.x;
+        let worst = Interior::new(problem, x.clone()).worst();
+        if worst < 1.0 {
+            return Ok(x);
+        }
+        if worst > 0.9995 * wide {
+            break;
+        }
+        wide = worst + 0.2 * (wide - worst);
+    }
+    Err(TimingError::StartTooFast {
+        ratio: wide,
+        limit: "any along the way".to_owned(),
+    })
+}
