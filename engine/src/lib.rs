@@ -18,7 +18,6 @@ pub mod modal;
 pub mod planner;
 pub mod queue;
 pub mod robot;
-pub mod server;
 pub mod session;
 pub mod task;
 pub mod tooling;
