@@ -1,0 +1,138 @@
+//! A program through the whole chain: queue, planner, real-time thread, shared memory, driver.
+//! The driver runs in a thread of this process here; its own process is the business of the
+//! tests of the command line.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use engine::dry_run::{PlanOptions, PlanSample, plan_program};
+use engine::robot::Robot;
+use engine::session::{Note, RunSample, Session, SessionConfig};
+use ipc::{Arm, Clock};
+
+const PROGRAM: &str = r#"
+InitCanon()
+SetRelativeSpeed(50)
+SetRelativeAcceleration(50)
+SetIntermediatePointTolerance(2)
+MoveTo({{400, -100, 300}, {0, 0, -1}, {1, 0, 0}})
+MoveStraightTo({{400, 100, 300}, {0, 0, -1}, {1, 0, 0}})
+CloseGripper()
+Message("half way")
+Dwell(0.05)
+MoveSmoothlyTo({{{400, 100, 200}, {0, 0, -1}, {1, 0, 0}}, {{400, -100, 200}, {0, 0, -1}, {1, 0, 0}},
+  {{400, -100, 300}, {0, 0, -1}, {1, 0, 0}}}, 3)
+OpenGripper()
+EndCanon(0)
+"#;
+
+/// A simulated driver in a thread, ended when it is dropped.
+struct Driver {
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Driver {
+    fn start(robot: &Robot, arm: &Arm) -> Self {
+        let mut options = driver_sim::Options::new(arm.clone(), robot.dof());
+        options.position.clone_from(&robot.home);
+        options.model = ipc::model_hash(robot.urdf.as_bytes());
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || {
+            driver_sim::run(options, &seen).unwrap();
+        });
+        Self { stop, thread: Some(thread) }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Runs the program to its end and returns what was reported and recorded.
+fn run(robot: &Robot, clock: Clock, name: &str) -> (Vec<Note>, Vec<RunSample>) {
+    let arm: Arm = format!("test-{}/{name}", std::process::id()).parse().unwrap();
+    let _driver = Driver::start(robot, &arm);
+    let mut config = SessionConfig::new(arm);
+    config.clock = clock;
+    config.record = true;
+    let session = Session::start(robot, &config).unwrap();
+    let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
+    session.submit(program.commands).unwrap();
+    let mut notes = Vec::new();
+    for _ in 0..600 {
+        notes.extend(session.note(Duration::from_millis(100)));
+        let over = |note: &Note| matches!(note, Note::Done { name: "EndCanon", .. } | Note::Faulted { .. });
+        if notes.iter().any(over) {
+            break;
+        }
+    }
+    let samples = session.samples();
+    session.close();
+    (notes, samples)
+}
+
+fn planned(robot: &Robot) -> Vec<PlanSample> {
+    let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
+    let plan = plan_program(robot, &program, &PlanOptions::default()).unwrap();
+    assert!(plan.refusals.is_empty(), "{:?}", plan.refusals);
+    plan.samples(0.001).collect()
+}
+
+/// Every setpoint of every move is the one of the dry run, in order, none left out.
+fn assert_equal_to_plan(run: &[RunSample], plan: &[PlanSample]) {
+    for command in 0..12_u32 {
+        let dry: Vec<_> = plan.iter().filter(|s| s.command == command as usize).collect();
+        let moves = dry.windows(2).any(|pair| pair[0].q != pair[1].q);
+        if !moves {
+            continue;
+        }
+        let wet: Vec<_> = run
+            .iter()
+            .filter(|s| s.command == command + 1 && s.path_time > 0.0)
+            .collect();
+        assert!(wet.len() >= dry.len(), "command {command}: {} < {}", wet.len(), dry.len());
+        for (wet, dry) in wet.iter().zip(&dry) {
+            for (a, b) in wet.q.iter().zip(&dry.q) {
+                assert!((a - b).abs() < 1e-9, "command {command} at {} s", wet.path_time);
+            }
+        }
+    }
+}
+
+fn names_done(notes: &[Note]) -> Vec<&'static str> {
+    notes
+        .iter()
+        .filter_map(|note| match note {
+            Note::Done { name, .. } => Some(*name),
+            _ => None,
+        })
+        .collect()
+}
+
+#[test]
+fn a_program_runs_in_step_with_the_driver() {
+    let robot = engine::robot::load("ur5e").unwrap();
+    let (notes, samples) = run(&robot, Clock::LockStep, "step");
+    assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
+    assert_equal_to_plan(&samples, &planned(&robot));
+    let off = |s: &RunSample| {
+        let gap = s.workstation_from_tool.translation.vector - s.measured_pose.translation.vector;
+        gap.norm()
+    };
+    let worst = samples.iter().map(off).fold(0.0, f64::max);
+    assert!(worst < 2e-3, "the driver is {worst} m off its setpoint");
+}
+
+#[test]
+fn a_program_runs_by_the_clock() {
+    let robot = engine::robot::load("ur5e").unwrap();
+    let (notes, samples) = run(&robot, Clock::Wall, "wall");
+    assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
+    assert_equal_to_plan(&samples, &planned(&robot));
+}
