@@ -28,14 +28,41 @@ impl Failure {
             return Exit::Done;
         }
         // Nobody is left to be told when standard error is closed.
-        let _ = writeln!(io::stderr(), "canter: error: {:#}", self.cause);
+        let _ = writeln!(io::stderr(), "canter: error: {}", chain(&self.cause));
         self.exit
     }
+}
+
+/// The causes from the outermost to the innermost; one that already says what its own cause says
+/// is not followed by it.
+fn chain(cause: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for link in cause.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = link;
+        } else if !text.contains(&link) {
+            text = format!("{text}: {link}");
+        }
+    }
+    text
 }
 
 /// Writing the answer failed; everything else names its exit code itself.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         Self::new(Exit::Internal, error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::anyhow;
+
+    #[test]
+    fn no_cause_is_said_twice() {
+        let cause = anyhow!("no such file")
+            .context("cannot read a: no such file")
+            .context("robot");
+        assert_eq!(super::chain(&cause), "robot: cannot read a: no such file");
     }
 }

@@ -11,14 +11,22 @@
 //! It is a library with one function so that the system tests run the same code as a process of
 //! their own; the binary `canter` is three lines.
 
+mod client;
 mod commands;
 mod exit;
 mod failure;
+mod host;
 mod logging;
 mod output;
-#[allow(dead_code)]
+mod picture;
+
 mod plot;
+mod program;
+mod progress;
+mod recording;
 mod robot;
+mod samples;
+mod simulation;
 mod table;
 
 use std::panic::catch_unwind;

@@ -20,6 +20,11 @@ impl RobotOption {
     pub(crate) fn load(&self) -> Result<Robot, Failure> {
         load(&self.robot)
     }
+
+    /// The name or folder as it was given.
+    pub(crate) fn place(&self) -> &str {
+        &self.robot
+    }
 }
 
 /// Loads a robot by shipped name or folder.

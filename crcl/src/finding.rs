@@ -153,6 +153,11 @@ impl Findings {
         }
     }
 
+    /// How many findings were made so far, kept or not.
+    pub(crate) fn total(&self) -> usize {
+        self.kept.len() + self.omitted.total()
+    }
+
     /// The findings in the order of the source, with what could be read.
     pub(crate) fn into_reading(self, program: Program) -> Reading {
         let (mut findings, omitted) = (self.kept, self.omitted);

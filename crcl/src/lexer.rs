@@ -342,11 +342,17 @@ fn stray_help(text: &str) -> Option<&'static str> {
     }
 }
 
-/// The text, or its beginning when it is long.
+/// The text on one line, or its beginning when it is long, fit to be shown in a terminal.
 pub(crate) fn clip(text: &str) -> String {
     const LONGEST: usize = 40;
-    match text.char_indices().nth(LONGEST) {
-        None => text.to_owned(),
-        Some((end, _)) => format!("{}...", text.get(..end).unwrap_or_default()),
-    }
+    let visible = |c: char| {
+        if c.is_control() {
+            char::REPLACEMENT_CHARACTER
+        } else {
+            c
+        }
+    };
+    let clipped: String = text.chars().take(LONGEST).map(visible).collect();
+    let whole = text.chars().nth(LONGEST).is_none();
+    if whole { clipped } else { clipped + "..." }
 }

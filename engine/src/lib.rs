@@ -12,6 +12,7 @@ pub mod command_error;
 pub mod conformance;
 pub mod controller;
 mod dof;
+pub mod doctor;
 pub mod dry_run;
 pub mod executor;
 pub mod modal;

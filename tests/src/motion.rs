@@ -342,11 +342,14 @@ impl Modes {
 
     /// Intermediate poses are passed in order, each at the first closest approach that is near.
     fn passes(&self, poses: &[Pose], rows: &[Row], say: &mut impl FnMut(String)) {
+        // Between two rows the point may bulge out of the line by a h^2 / 8.
+        let period = rows.get(1).map_or(0.0, |row| row.t - rows[0].t);
+        let sag = self.acceleration * period * period / 8.0;
         let mut from = 0;
         for (index, pose) in poses.iter().enumerate() {
             let target = self.pose(pose).translation.vector;
             let gap = |k: usize| gap(&rows[k], &rows[k + 1], &target);
-            let allowed = self.tolerance.max(1e-6) * (1.0 + 1e-6);
+            let allowed = self.tolerance.max(1e-6) * (1.0 + 1e-6) + sag;
             match (from..rows.len().saturating_sub(1)).find(|&k| gap(k) <= allowed) {
                 Some(enters) => from = enters,
                 None => {

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 mod arrows;
+mod bad_inputs;
 mod canter;
 mod command_line;
+mod planned_motions;
 mod session;
 
 /// Every file of this folder is a module above: a forgotten one would never run.

@@ -2,10 +2,22 @@
 //!
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
+mod abort;
+mod check;
 mod completions;
+mod driver;
 mod fk;
+mod ik;
 mod man;
+mod override_speed;
+mod pause;
+mod plan;
+mod recover;
+mod resume;
 mod robots;
+mod run;
+mod shutdown;
+mod stop;
 
 use clap::Subcommand;
 
@@ -15,20 +27,44 @@ use crate::failure::Failure;
 /// What `canter` can do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Fk(fk::Fk),
-    Robots(robots::Robots),
+    Abort(abort::Abort),
+    Check(check::Check),
     Completions(completions::Completions),
+    Driver(driver::Driver),
+    Fk(fk::Fk),
+    Ik(ik::Ik),
     Man(man::Man),
+    Override(override_speed::Override),
+    Pause(pause::Pause),
+    Plan(plan::Plan),
+    Recover(recover::Recover),
+    Resume(resume::Resume),
+    Robots(robots::Robots),
+    Run(run::Run),
+    Shutdown(shutdown::Shutdown),
+    Stop(stop::Stop),
 }
 
 impl Command {
     /// Runs the command that was given.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
-            Self::Fk(command) => command.run(),
-            Self::Robots(command) => command.run(),
+            Self::Abort(command) => command.run(),
+            Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Driver(command) => command.run(),
+            Self::Fk(command) => command.run(),
+            Self::Ik(command) => command.run(),
             Self::Man(command) => command.run(),
+            Self::Override(command) => command.run(),
+            Self::Pause(command) => command.run(),
+            Self::Plan(command) => command.run(),
+            Self::Recover(command) => command.run(),
+            Self::Resume(command) => command.run(),
+            Self::Robots(command) => command.run(),
+            Self::Run(command) => command.run(),
+            Self::Shutdown(command) => command.run(),
+            Self::Stop(command) => command.run(),
         }
     }
 }

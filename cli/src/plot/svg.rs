@@ -63,11 +63,12 @@ impl Svg {
         ));
     }
 
-    /// A line through points, in a colour.
+    /// A line through points, in a colour; points that nobody could see the lack of are left out.
     pub(super) fn curve(&mut self, class: &str, colour: &str, points: &[[f64; 2]]) {
         if points.len() < 2 {
             return;
         }
+        let points = simplified(points);
         self.push(format_args!(
             "<path class=\"{class}\" stroke=\"{colour}\" d=\""
         ));
@@ -129,6 +130,45 @@ impl Svg {
     }
 }
 
+/// How far a curve may be from its points, pixels.
+const UNSEEN: f64 = 0.12;
+
+/// The points without those that are within [`UNSEEN`] of the line through their neighbours.
+///
+/// # Source
+/// D. Douglas and T. Peucker, "Algorithms for the reduction of the number of points required to
+/// represent a digitized line", Cartographica 10(2), 1973.
+fn simplified(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut keep = vec![false; points.len()];
+    let mut open = vec![(0, points.len() - 1)];
+    while let Some((first, last)) = open.pop() {
+        (keep[first], keep[last]) = (true, true);
+        let distance = |index: &usize| off_line(points[*index], points[first], points[last]);
+        let farthest = (first + 1..last).max_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(farthest) = farthest.filter(|index| distance(index) > UNSEEN) {
+            open.extend([(first, farthest), (farthest, last)]);
+        }
+    }
+    points
+        .iter()
+        .zip(keep)
+        .filter_map(|(point, kept)| kept.then_some(*point))
+        .collect()
+}
+
+/// Distance of a point from the line between two others.
+fn off_line([x, y]: [f64; 2], [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> f64 {
+    let (dx, dy) = (x2 - x1, y2 - y1);
+    let squared = dx * dx + dy * dy;
+    let part = if squared > 0.0 {
+        ((x - x1) * dx + (y - y1) * dy) / squared
+    } else {
+        0.0
+    };
+    let part = part.clamp(0.0, 1.0);
+    (x - x1 - part * dx).hypot(y - y1 - part * dy)
+}
+
 /// Text with the characters that mean something in XML replaced, control characters dropped.
 fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
@@ -148,6 +188,22 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_simplified_curve_stays_within_the_unseen() {
+        let points: Vec<_> = (0..2000)
+            .map(|k| [f64::from(k) * 0.4, 70.0 * (f64::from(k) * 0.01).sin()])
+            .collect();
+        let kept = simplified(&points);
+        assert!(kept.len() < points.len() / 10, "{} points", kept.len());
+        for point in &points {
+            let nearest = kept
+                .windows(2)
+                .map(|pair| off_line(*point, pair[0], pair[1]))
+                .fold(f64::INFINITY, f64::min);
+            assert!(nearest <= UNSEEN);
+        }
+    }
 
     #[test]
     fn text_of_a_program_cannot_break_the_picture() {

@@ -1,0 +1,63 @@
+use std::time::Duration;
+
+use clap::Args;
+use ipc::{Answer, Arm, Client, IpcError, Verb};
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// How long an engine may take to answer; it answers between two periods of its main loop.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// Which arm a command is about.
+#[derive(Args, Debug)]
+pub(crate) struct ArmOption {
+    /// Name of the arm, as cell/arm; engine, driver and clients find each other by it
+    #[arg(long, value_name = "CELL/ARM", default_value = "canter/arm")]
+    pub(crate) arm: Arm,
+}
+
+impl ArmOption {
+    /// Asks the arm's engine and waits for the answer.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
+    /// refuses.
+    pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
+        let client = Client::open(&self.arm, "canter").map_err(failure)?;
+        accepted(client.ask(verb, PATIENCE).map_err(failure)?)
+    }
+
+    /// Asks, prints the engine's words, if any, to standard error.
+    ///
+    /// # Errors
+    /// As [`Self::ask`].
+    pub(crate) fn tell(&self, verb: Verb) -> Result<Exit, Failure> {
+        let answer = self.ask(verb)?;
+        if !answer.message.is_empty() {
+            crate::output::note(&answer.message);
+        }
+        Ok(Exit::Done)
+    }
+}
+
+/// The answer, or the engine's refusal as a failure.
+///
+/// # Errors
+/// [`Exit::Refused`] when the engine said no.
+pub(crate) fn accepted(answer: Answer) -> Result<Answer, Failure> {
+    if answer.accepted {
+        Ok(answer)
+    } else {
+        Err(Failure::new(Exit::Refused, anyhow::anyhow!(answer.message)))
+    }
+}
+
+/// A fault of the border to other processes with its exit code.
+pub(crate) fn failure(error: IpcError) -> Failure {
+    let exit = match error {
+        IpcError::BadArmName { .. } => Exit::Usage,
+        _ => Exit::NoPeer,
+    };
+    Failure::new(exit, error)
+}

@@ -1,0 +1,20 @@
+use clap::Args;
+use ipc::Verb;
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// Come to rest on the path and forget the rest of the program
+#[derive(Args, Debug)]
+pub(crate) struct Abort {
+    #[command(flatten)]
+    arm: ArmOption,
+}
+
+impl Abort {
+    /// Asks the engine.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        self.arm.tell(Verb::Abort)
+    }
+}

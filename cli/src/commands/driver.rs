@@ -1,0 +1,131 @@
+use std::io::{self, Read};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use driver_sim::Options;
+use engine::robot::Robot;
+use ipc::IpcError;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::output;
+use crate::robot::RobotOption;
+
+/// How long the driver goes on when the process that started it is gone: enough for its watchdog
+/// to stop the arm.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// Drivers: the processes that move an arm
+#[derive(Args, Debug)]
+pub(crate) struct Driver {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Sim(Sim),
+}
+
+/// Run the simulated driver of an arm until Ctrl-C
+///
+/// It takes setpoints from shared memory, moves a second-order servo a joint, and gives measured
+/// states back, as the driver of a real arm does.
+#[derive(Args, Debug)]
+struct Sim {
+    #[command(flatten)]
+    robot: RobotOption,
+    #[command(flatten)]
+    arm: ArmOption,
+    /// Natural frequency of the servos, rad/s
+    #[arg(long, value_name = "RAD/S", default_value_t = 300.0)]
+    frequency: f64,
+    /// Damping ratio of the servos
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
+    damping: f64,
+    /// Periods by which setpoints come late
+    #[arg(long, value_name = "PERIODS", default_value_t = 0)]
+    delay: usize,
+    /// Amplitude of the noise on measured positions, rad
+    #[arg(long, value_name = "RAD", default_value_t = 0.0)]
+    noise: f64,
+    /// Seed of the noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// End soon after standard input ends
+    #[arg(long, hide = true)]
+    until_end_of_input: bool,
+}
+
+impl Driver {
+    /// Runs the driver that was chosen.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        match &self.what {
+            What::Sim(sim) => sim.run(),
+        }
+    }
+}
+
+impl Sim {
+    fn run(&self) -> Result<Exit, Failure> {
+        let robot = self.robot.load()?;
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop))?;
+        }
+        if self.until_end_of_input {
+            let stop = Arc::clone(&stop);
+            thread::spawn(move || {
+                // A byte asks for an end at once. Without one, the starter is gone.
+                if io::stdin().read_exact(&mut [0]).is_err() {
+                    thread::sleep(FAREWELL);
+                }
+                stop.store(true, Ordering::Relaxed);
+            });
+        }
+        let report = driver_sim::run(self.options(&robot), &stop).map_err(failure)?;
+        if let Some(warning) = &report.warning {
+            tracing::warn!("{warning}");
+        }
+        if !self.until_end_of_input {
+            output::note(&format!(
+                "{} periods in {} sessions, {} without a new setpoint",
+                report.periods, report.sessions, report.missed
+            ));
+        }
+        Ok(Exit::Done)
+    }
+
+    fn options(&self, robot: &Robot) -> Options {
+        let joints = &robot.joints;
+        Options {
+            model: ipc::model_hash(robot.urdf.as_bytes()),
+            position: robot.home.clone(),
+            lower: joints.lower.iter().map(|value| value.max(-1e3)).collect(),
+            upper: joints.upper.iter().map(|value| value.min(1e3)).collect(),
+            velocity: joints.velocity.clone(),
+            acceleration: joints.acceleration.clone(),
+            jerk: joints.jerk.clone(),
+            frequency: self.frequency,
+            damping: self.damping,
+            delay: self.delay,
+            noise: self.noise,
+            seed: self.seed,
+            ..Options::new(self.arm.arm.clone(), robot.dof())
+        }
+    }
+}
+
+fn failure(error: driver_sim::SimError) -> Failure {
+    let exit = match &error {
+        driver_sim::SimError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
+        driver_sim::SimError::Ipc(_) => Exit::NoPeer,
+        _ => Exit::Usage,
+    };
+    Failure::new(exit, error)
+}

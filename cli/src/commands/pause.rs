@@ -1,0 +1,22 @@
+use clap::Args;
+use ipc::Verb;
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// Come to rest on the path and wait there
+///
+/// The program stays where it is; `canter resume` goes on from exactly there.
+#[derive(Args, Debug)]
+pub(crate) struct Pause {
+    #[command(flatten)]
+    arm: ArmOption,
+}
+
+impl Pause {
+    /// Asks the engine.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        self.arm.tell(Verb::Pause)
+    }
+}

@@ -1,0 +1,20 @@
+use clap::Args;
+use ipc::Verb;
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// Go on along the path after a pause or a stop
+#[derive(Args, Debug)]
+pub(crate) struct Resume {
+    #[command(flatten)]
+    arm: ArmOption,
+}
+
+impl Resume {
+    /// Asks the engine.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        self.arm.tell(Verb::Resume)
+    }
+}

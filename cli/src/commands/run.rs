@@ -1,0 +1,249 @@
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use clap::Args;
+use engine::dry_run::FailurePolicy;
+use engine::executor::Control;
+use engine::session::{Blame, Note};
+use serde_json::json;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::host::{DriverChoice, Host, HostOptions};
+use crate::output;
+use crate::program::{ProgramArgument, ProgramFile};
+use crate::progress::Progress;
+use crate::recording::Recording;
+use crate::robot::RobotOption;
+
+/// How long an aborted arm may take to come to rest.
+const LAST_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Run a program on an arm
+///
+/// Starts the engine and, unless told otherwise, the simulated driver, runs the program, prints a
+/// line for each command that is done, and ends both. The whole program is planned first: one that
+/// cannot be executed moves nothing. Ctrl-C stops on the path and ends; a second Ctrl-C aborts.
+#[derive(Args, Debug)]
+pub(crate) struct Run {
+    #[command(flatten)]
+    program: ProgramArgument,
+    #[command(flatten)]
+    robot: RobotOption,
+    #[command(flatten)]
+    host: HostOptions,
+    /// Write what was published and measured as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    samples: Option<PathBuf>,
+    /// Print one JSON object for everything that happens, one a line
+    #[arg(long)]
+    json: bool,
+}
+
+impl Run {
+    /// Runs the program to its end.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        let robot = self.robot.load()?;
+        let program = self.program.read()?;
+        program.report();
+        if program.exit() != Exit::Done {
+            return Ok(program.exit());
+        }
+        // The simulated arm starts where the dry run does, so that what is refused later is known
+        // before anything moves. Where another arm stands is known to its driver only.
+        if self.host.driver == DriverChoice::Sim {
+            let plan = program.plan(&robot, self.host.rate, FailurePolicy::Abort)?;
+            plan.refusals
+                .iter()
+                .for_each(|refusal| program.report_refusal(refusal));
+            if !plan.refusals.is_empty() {
+                return Ok(Exit::Refused);
+            }
+        }
+        let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+        let mut host = self
+            .host
+            .start(&robot, self.robot.place(), program.default_length())?;
+        host.own("canter run");
+        let sink = self.samples.as_ref().map(|path| {
+            let file =
+                File::create(path).with_context(|| format!("cannot write {}", path.display()));
+            file.map_err(|cause| Failure::new(Exit::Unreadable, cause))
+        });
+        let sink = sink.transpose()?.map(BufWriter::new);
+        let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
+        let progress = Progress::new(io::stderr().is_terminal() && !self.json);
+        Running {
+            json: self.json,
+            host,
+            signals,
+            recording,
+            progress,
+            signalled: 0,
+            deadline: None,
+        }
+        .to_the_end(&program)
+    }
+}
+
+/// A program on its way.
+struct Running {
+    json: bool,
+    host: Host,
+    signals: Signals,
+    recording: Recording<BufWriter<File>>,
+    progress: Progress,
+    signalled: usize,
+    deadline: Option<Instant>,
+}
+
+impl Running {
+    fn to_the_end(mut self, program: &ProgramFile) -> Result<Exit, Failure> {
+        let commands = program.program().commands.clone();
+        let count = commands.len();
+        let ids = self
+            .host
+            .session
+            .submit(commands)
+            .map_err(|full| Failure::new(Exit::Refused, full))?;
+        let last = ids.last().copied().unwrap_or(0);
+        let mut done = 0;
+        let exit = loop {
+            self.obey_signals();
+            let note = self.host.turn()?;
+            self.recording.take(&self.host.session.samples())?;
+            self.progress.show(&self.host.session.status());
+            if self.deadline.is_some_and(|at| Instant::now() > at) {
+                break Exit::Stopped;
+            }
+            if self.host.is_shut_down() {
+                break Exit::Stopped;
+            }
+            let Some(note) = note else { continue };
+            self.tell(&note)?;
+            done += usize::from(matches!(note, Note::Done { .. }));
+            if let Some(exit) = self.over(&note, last) {
+                break exit;
+            }
+        };
+        self.finish(exit, done, count)
+    }
+
+    /// What a note means for the process, if it is the last one.
+    fn over(&self, note: &Note, last: u32) -> Option<Exit> {
+        match note {
+            Note::Done { id, .. } if *id == last => Some(Exit::Done),
+            Note::Refused { id, dropped, .. } if *dropped > 0 || *id == last => Some(Exit::Refused),
+            Note::Stopped if self.signalled > 0 => Some(Exit::Stopped),
+            Note::Aborted { .. } => Some(Exit::Stopped),
+            Note::Faulted {
+                blame: Blame::Guard,
+                ..
+            } => Some(Exit::Aborted),
+            Note::Faulted { .. } => Some(Exit::DriverFault),
+            Note::Closed => Some(Exit::Internal),
+            _ => None,
+        }
+    }
+
+    /// The first signal stops on the path, the second aborts.
+    fn obey_signals(&mut self) {
+        for _ in self.signals.pending() {
+            self.signalled += 1;
+            if self.signalled == 1 {
+                output::note("canter: stopping on the path; once more to abort");
+                self.host.session.control(Control::Stop { fast: false });
+                // An arm that rests already has nothing to report.
+                if self.host.session.status().idle {
+                    self.deadline = Some(Instant::now());
+                }
+            } else {
+                self.host.session.control(Control::Stop { fast: true });
+                self.deadline = Some(Instant::now() + LAST_PATIENCE);
+            }
+        }
+    }
+
+    /// One line for what happened.
+    fn tell(&mut self, note: &Note) -> io::Result<()> {
+        self.progress.clear();
+        if self.json {
+            let mut out = io::stdout().lock();
+            serde_json::to_writer(&mut out, note)?;
+            return writeln!(out);
+        }
+        let mut out = io::stdout().lock();
+        match note {
+            Note::Done {
+                line, name, ticks, ..
+            } => {
+                let seconds = *ticks as f64 * self.recording.period();
+                writeln!(out, "done     line {line:4}  {name:30} {seconds:9.3} s")
+            }
+            Note::Message { text } => writeln!(out, "message  {text}"),
+            Note::Refused {
+                line, name, error, ..
+            } => {
+                output::note(&format!(
+                    "canter: error: line {line}: {name}: {}",
+                    error.message
+                ));
+                Ok(())
+            }
+            Note::Faulted { reason, .. } => {
+                output::note(&format!("canter: error: {reason}"));
+                Ok(())
+            }
+            Note::Ended { reason } if *reason > 0 => {
+                output::note(&format!("canter: the program ended with reason {reason}"));
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Ends session and driver, writes the rest of the samples, sums up.
+    fn finish(mut self, exit: Exit, done: usize, count: usize) -> Result<Exit, Failure> {
+        self.progress.clear();
+        self.recording.take(&self.host.session.samples())?;
+        let status = self.host.session.status();
+        let driver = self.host.session.driver.clone();
+        let tracking = self.recording.worst();
+        let duration = self.recording.duration();
+        drop(self.host);
+        self.recording.finish()?;
+        let mut out = io::stdout().lock();
+        if self.json {
+            let summary = json!({
+                "event": "summary",
+                "schema": 1,
+                "exit": exit as u8,
+                "commands": count,
+                "done": done,
+                "robot": status.robot,
+                "driver": driver,
+                "duration_s": duration,
+                "cycles": status.cycles,
+                "tracking_m": tracking,
+            });
+            serde_json::to_writer(&mut out, &summary).map_err(io::Error::from)?;
+            writeln!(out)?;
+            return Ok(exit);
+        }
+        let cycles = status.cycles;
+        writeln!(
+            out,
+            "{done} of {count} commands done in {duration:.3} s; {} periods, {} of them late; \
+             driver {driver} followed within {:.3} mm",
+            cycles.ticks,
+            cycles.skipped,
+            tracking * 1e3
+        )?;
+        Ok(exit)
+    }
+}

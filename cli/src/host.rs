@@ -1,0 +1,279 @@
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use crcl::ReadOptions;
+use engine::dry_run::FailurePolicy;
+use engine::executor::{Control, ExecutorError};
+use engine::robot::Robot;
+use engine::session::{Note, Session, SessionConfig, SessionError};
+use ipc::{Answer, ClientServer, Clock, Identity, Ownership, Request, StatusWriter, Verb};
+use serde_json::{Value, json};
+
+use crate::client::{self, ArmOption};
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::simulation::Simulation;
+
+/// How often the report for everybody is written.
+const REPORT: Duration = Duration::from_millis(100);
+
+/// How many notes are kept for clients that ask.
+const KEPT: usize = 512;
+
+/// How an engine is started.
+#[derive(Args, Debug)]
+pub(crate) struct HostOptions {
+    #[command(flatten)]
+    pub(crate) arm: ArmOption,
+    /// Servo rate
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    pub(crate) rate: f64,
+    /// Which driver moves the arm
+    #[arg(long, value_enum, default_value_t = DriverChoice::Sim)]
+    pub(crate) driver: DriverChoice,
+    /// Go in step with the driver instead of by the clock: faster, and the same every time
+    #[arg(long)]
+    lock_step: bool,
+    /// What happens when a command cannot be executed
+    #[arg(long, value_enum, default_value_t = OnRefusal::Abort)]
+    on_refusal: OnRefusal,
+}
+
+/// Which driver moves the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DriverChoice {
+    /// The built-in simulated servo, started and ended with the engine.
+    Sim,
+    /// One that runs already.
+    External,
+}
+
+/// What happens when a command cannot be executed.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OnRefusal {
+    /// Stop and forget the rest of the program.
+    Abort,
+    /// The command has no effect; go on with the next.
+    Skip,
+    /// Stop and wait for the operator.
+    Hold,
+}
+
+impl From<OnRefusal> for FailurePolicy {
+    fn from(choice: OnRefusal) -> Self {
+        match choice {
+            OnRefusal::Abort => Self::Abort,
+            OnRefusal::Skip => Self::Skip,
+            OnRefusal::Hold => Self::Hold,
+        }
+    }
+}
+
+impl HostOptions {
+    /// Starts driver (if it is ours) and session, opens the channels for clients.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] without a driver or with another engine on the arm; the driver that was
+    /// started is ended again.
+    pub(crate) fn start(
+        &self,
+        robot: &Robot,
+        place: &str,
+        default_length: crcl::LengthUnit,
+    ) -> Result<Host, Failure> {
+        let arm = self.arm.arm.clone();
+        // Before the driver: a second engine must not disturb the arm of the first.
+        let clients = ClientServer::open(&arm).map_err(client::failure)?;
+        let status = StatusWriter::open(&arm).map_err(client::failure)?;
+        let simulation = match self.driver {
+            DriverChoice::Sim => Some(Simulation::start(place, &arm)?),
+            DriverChoice::External => None,
+        };
+        let mut config = SessionConfig::new(arm);
+        config.rate_hz = self.rate;
+        config.clock = if self.lock_step {
+            Clock::LockStep
+        } else {
+            Clock::Wall
+        };
+        config.record = true;
+        config.on_refusal = self.on_refusal.into();
+        config.default_length = default_length;
+        let session = Session::start(robot, &config).map_err(failure)?;
+        if let Some(warning) = &session.warning {
+            tracing::warn!("{warning}");
+        }
+        Ok(Host {
+            session,
+            clients,
+            status,
+            reported: None,
+            ownership: Ownership::default(),
+            notes: VecDeque::new(),
+            count: 0,
+            shutdown: false,
+            _simulation: simulation,
+        })
+    }
+}
+
+/// A fault of the session's start with its exit code.
+fn failure(error: SessionError) -> Failure {
+    let exit = match &error {
+        SessionError::Robot(_) => Exit::Unreadable,
+        SessionError::Executor(ExecutorError::Rate { .. } | ExecutorError::Limit { .. }) => {
+            Exit::Usage
+        }
+        SessionError::Executor(_) => Exit::NoPeer,
+        _ => Exit::Internal,
+    };
+    Failure::new(exit, error)
+}
+
+/// A running session with its clients and, perhaps, its simulated driver.
+///
+/// Fields are dropped in this order: the session stops the arm while the driver still lives.
+pub(crate) struct Host {
+    /// The session.
+    pub(crate) session: Session,
+    clients: ClientServer,
+    status: StatusWriter,
+    reported: Option<Instant>,
+    ownership: Ownership,
+    notes: VecDeque<Value>,
+    count: u64,
+    shutdown: bool,
+    _simulation: Option<Simulation>,
+}
+
+impl Host {
+    /// Takes the arm for this process: other clients may stop it, not command it.
+    pub(crate) fn own(&mut self, name: &str) {
+        let client = Identity {
+            name: name.to_owned(),
+            process: std::process::id(),
+        };
+        // Nobody owns an arm that was just taken into service.
+        let _ = self.ownership.admit(
+            &Request {
+                client,
+                ask: Verb::Recover,
+            },
+            true,
+        );
+    }
+
+    /// Whether a client has asked for the end.
+    pub(crate) fn is_shut_down(&self) -> bool {
+        self.shutdown
+    }
+
+    /// Serves clients, reports, and waits a little for the next thing that happens.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] when shared memory fails.
+    pub(crate) fn turn(&mut self) -> Result<Option<Note>, Failure> {
+        while self.serve()? {}
+        if self.reported.is_none_or(|at| at.elapsed() >= REPORT) {
+            self.reported = Some(Instant::now());
+            self.status
+                .write(&self.session.status())
+                .map_err(client::failure)?;
+        }
+        let note = self.session.note(Duration::from_millis(5));
+        if let Some(note) = &note {
+            self.count += 1;
+            self.notes
+                .push_back(json!({"number": self.count, "note": note}));
+            if self.notes.len() > KEPT {
+                self.notes.pop_front();
+            }
+        }
+        Ok(note)
+    }
+
+    fn serve(&mut self) -> Result<bool, Failure> {
+        let Self {
+            session,
+            clients,
+            ownership,
+            notes,
+            shutdown,
+            ..
+        } = self;
+        let served = clients.serve(|request| {
+            let status = session.status();
+            // Whoever may stop a motion may let it go on; what is executed stays the owner's.
+            let free = matches!(request.ask, Verb::Resume | Verb::Override { .. });
+            if !free && let Err(refusal) = ownership.admit(&request, !status.idle) {
+                return refusal;
+            }
+            match request.ask {
+                Verb::Status => Answer::accept(json!({"status": status, "notes": notes})),
+                Verb::Shutdown => {
+                    *shutdown = true;
+                    Answer::accept(Value::Null)
+                }
+                Verb::Submit {
+                    format,
+                    name,
+                    program,
+                } => submit(session, &format, &name, &program),
+                ask => control(session, &ask),
+            }
+        });
+        served.map_err(client::failure)
+    }
+}
+
+/// Takes a program of a client: all its commands or none.
+fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    let read = match format {
+        "text" => crcl::text::read,
+        "json" => crcl::json::read,
+        other => return Answer::refuse(format!("a program is text or json, not {other:?}")),
+    };
+    let reading = read(program, &ReadOptions::default());
+    if reading.has_errors() {
+        let source = crcl::Source::new(name, program);
+        let text = crcl::render(
+            &reading.findings,
+            reading.omitted,
+            &source,
+            (crcl::Look::Plain, 100),
+        );
+        return Answer::refuse(text.trim_end());
+    }
+    match session.submit(reading.program.commands) {
+        Ok(ids) => Answer::accept(json!({"ids": ids})),
+        Err(full) => Answer::refuse(full.to_string()),
+    }
+}
+
+/// Passes on what acts on the motion that is under way.
+fn control(session: &Session, ask: &Verb) -> Answer {
+    match ask {
+        Verb::Pause => session.control(Control::Pause),
+        Verb::Resume => session.control(Control::Resume),
+        Verb::Override { share } if (0.0..=1.0).contains(share) => {
+            session.control(Control::Override(*share));
+        }
+        Verb::Override { share } => {
+            return Answer::refuse(format!("an override is 0 to 1, got {share}"));
+        }
+        Verb::Stop { fast } => session.control(Control::Stop { fast: *fast }),
+        Verb::Abort => session.control(Control::Abort),
+        Verb::Recover => session.recover(),
+        _ => return Answer::refuse("this engine cannot do that"),
+    }
+    Answer::accept(Value::Null)
+}
+
+/// A servo rate in Hz.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (100.0..=4000.0).contains(&value) => Ok(value),
+        _ => Err("expected Hz from 100 to 4000".to_owned()),
+    }
+}

@@ -1,0 +1,303 @@
+use std::fs;
+use std::io::{self, IsTerminal, Read, Write};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
+use engine::command_error::ErrorClass;
+use engine::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
+use engine::robot::Robot;
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::output;
+
+/// Which program, and how it is read.
+#[derive(Args, Debug)]
+pub(crate) struct ProgramArgument {
+    /// File of canonical commands, text or JSON; `-` is standard input
+    #[arg(value_name = "PROGRAM")]
+    path: String,
+    /// Refuse the extensions of the language
+    #[arg(long)]
+    strict: bool,
+    /// Form of the program; JSON is recognised by itself unless told
+    #[arg(long, value_enum, default_value_t = Form::Auto)]
+    form: Form,
+    /// Unit of length until the program sets one
+    #[arg(long, value_enum, default_value_t = Length::Mm)]
+    default_length: Length,
+}
+
+/// Form of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// JSON if it begins with a brace or bracket, else text.
+    Auto,
+    /// The call syntax of the specification.
+    Text,
+    /// JSON.
+    Json,
+}
+
+/// Unit of length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Length {
+    /// The language's own default.
+    Mm,
+    /// For programs that were written in metres without saying so.
+    Meter,
+    /// Inch.
+    Inch,
+}
+
+impl From<Length> for LengthUnit {
+    fn from(length: Length) -> Self {
+        match length {
+            Length::Mm => Self::Millimeter,
+            Length::Meter => Self::Meter,
+            Length::Inch => Self::Inch,
+        }
+    }
+}
+
+/// A program that was read, with all that is to be said about it so far.
+pub(crate) struct ProgramFile {
+    source: Source,
+    reading: Reading,
+    default_length: LengthUnit,
+    json: bool,
+}
+
+impl ProgramArgument {
+    /// Reads and checks the program as far as that needs no robot.
+    ///
+    /// # Errors
+    /// [`Exit::Unreadable`] when the file cannot be read; faults of the program are findings.
+    pub(crate) fn read(&self) -> Result<ProgramFile, Failure> {
+        let bytes = bytes(&self.path)
+            .with_context(|| format!("cannot read {}", self.path))
+            .map_err(|cause| Failure::new(Exit::Unreadable, cause))?;
+        let name = if self.path == "-" {
+            "standard input"
+        } else {
+            &self.path
+        };
+        let options = ReadOptions {
+            strict: self.strict,
+            ..ReadOptions::default()
+        };
+        let json = match self.form {
+            Form::Text => false,
+            Form::Json => true,
+            Form::Auto => {
+                let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+                first.is_some_and(|byte| matches!(byte, b'{' | b'['))
+            }
+        };
+        let read = if json {
+            crcl::json::read_bytes
+        } else {
+            crcl::text::read_bytes
+        };
+        let mut reading = read(&bytes, &options);
+        let default_length = self.default_length.into();
+        // What comes after a fault of form may only be its consequence.
+        if !reading.findings.iter().any(is_unreadable) {
+            let options = CheckOptions {
+                strict: self.strict,
+                default_length,
+            };
+            reading
+                .findings
+                .extend(crcl::check(&reading.program, &options));
+            reading.findings.sort_by_key(|finding| finding.span.start);
+        }
+        Ok(ProgramFile {
+            source: Source::from_bytes(name, &bytes),
+            reading,
+            default_length,
+            json,
+        })
+    }
+}
+
+fn bytes(path: &str) -> io::Result<Vec<u8>> {
+    if path == "-" {
+        let mut bytes = Vec::new();
+        io::stdin().lock().read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    fs::read(path)
+}
+
+impl ProgramFile {
+    /// The program's commands.
+    pub(crate) fn program(&self) -> &Program {
+        &self.reading.program
+    }
+
+    /// Unit of length until the program sets one.
+    pub(crate) fn default_length(&self) -> LengthUnit {
+        self.default_length
+    }
+
+    /// The name it is reported under.
+    pub(crate) fn name(&self) -> &str {
+        self.source.name()
+    }
+
+    /// The text.
+    pub(crate) fn text(&self) -> &str {
+        self.source.text()
+    }
+
+    /// `json` or `text`.
+    pub(crate) fn form(&self) -> &'static str {
+        if self.json { "json" } else { "text" }
+    }
+
+    /// What is to be said about it.
+    pub(crate) fn reading(&self) -> &Reading {
+        &self.reading
+    }
+
+    /// Where findings point to.
+    pub(crate) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// What the findings mean for the process.
+    pub(crate) fn exit(&self) -> Exit {
+        if self.reading.findings.iter().any(is_unreadable) {
+            Exit::Unreadable
+        } else if self.reading.has_errors() {
+            Exit::Refused
+        } else {
+            Exit::Done
+        }
+    }
+
+    /// Plans the program; commands that are refused are in the plan.
+    ///
+    /// # Errors
+    /// [`Exit::Unreadable`] when the robot cannot be planned for.
+    pub(crate) fn plan(
+        &self,
+        robot: &Robot,
+        rate_hz: f64,
+        on_refusal: FailurePolicy,
+    ) -> Result<Plan, Failure> {
+        let options = PlanOptions {
+            rate_hz,
+            default_length: self.default_length,
+            on_refusal,
+            start: None,
+        };
+        plan_program(robot, &self.reading.program, &options)
+            .map_err(|error| Failure::new(Exit::Unreadable, error))
+    }
+
+    /// Adds what a robot has against the program. A command that has an error already is not
+    /// mentioned again, and wrong order has been found without a robot.
+    pub(crate) fn add_refusals(&mut self, refusals: &[Refusal]) {
+        let findings = &mut self.reading.findings;
+        for refusal in refusals {
+            let known = findings.iter().any(|finding| {
+                finding.is_error()
+                    && finding.span.start < refusal.span.end
+                    && refusal.span.start < finding.span.end.max(finding.span.start + 1)
+            });
+            if !known && refusal.error.class != ErrorClass::Sequence {
+                findings.push(finding(refusal));
+            }
+        }
+        findings.sort_by_key(|finding| finding.span.start);
+    }
+
+    /// Findings as text for a terminal or file, with a last line that counts them.
+    pub(crate) fn shown(&self, look: Look) -> String {
+        let width = 100;
+        crcl::render(
+            &self.reading.findings,
+            self.reading.omitted,
+            &self.source,
+            (look, width),
+        )
+    }
+
+    /// Writes all findings to standard error.
+    pub(crate) fn report(&self) {
+        if !self.reading.findings.is_empty() {
+            let look = look(io::stderr().is_terminal());
+            // Nobody is left to be told when standard error is closed.
+            let _ = write!(io::stderr(), "{}", self.shown(look));
+        }
+    }
+
+    /// Writes a refusal of the planner to standard error.
+    pub(crate) fn report_refusal(&self, refusal: &Refusal) {
+        let look = look(io::stderr().is_terminal());
+        let omitted = crcl::Omitted::default();
+        let text = crcl::render(&[finding(refusal)], omitted, &self.source, (look, 100));
+        output::note(text.trim_end());
+    }
+}
+
+/// How findings look on a terminal or elsewhere.
+pub(crate) fn look(terminal: bool) -> Look {
+    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    match (terminal, plain) {
+        (false, _) => Look::Plain,
+        (true, true) => Look::Monochrome,
+        (true, false) => Look::Colour,
+    }
+}
+
+/// A refusal as a finding about its command.
+fn finding(refusal: &Refusal) -> Finding {
+    let code = match refusal.error.class {
+        ErrorClass::Range => "engine::range",
+        ErrorClass::Parse => "engine::parse",
+        ErrorClass::Sequence => "engine::sequence",
+        ErrorClass::GripperUse => "engine::gripper-use",
+        ErrorClass::ToolChange => "engine::tool-change",
+        ErrorClass::Motion => "engine::motion",
+    };
+    let message = format!("{}: {}", refusal.name, refusal.error.message);
+    let finding = Finding::error(code, refusal.span.clone(), message);
+    match &refusal.error.help {
+        Some(help) => finding.help(help),
+        None => finding,
+    }
+}
+
+/// Whether a finding says that the form of the program is broken, not what it asks for.
+fn is_unreadable(finding: &Finding) -> bool {
+    const FORM: [&str; 23] = [
+        code::BINARY,
+        code::NOT_UTF8,
+        code::CHARACTER,
+        code::COMMENT,
+        code::TEXT,
+        code::ESCAPE,
+        code::NUMBER,
+        code::NOT_A_COMMAND,
+        code::PARENTHESES,
+        code::UNKNOWN_COMMAND,
+        code::UNCLOSED,
+        code::BRACKET,
+        code::SURPLUS_BRACKET,
+        code::COMMA,
+        code::SURPLUS_COMMA,
+        code::TOO_DEEP,
+        code::ARGUMENT_COUNT,
+        code::ARGUMENT_TYPE,
+        code::POSE_SHAPE,
+        code::JSON_SYNTAX,
+        code::MISSING_FIELD,
+        code::UNKNOWN_FIELD,
+        code::SCHEMA_VERSION,
+    ];
+    finding.is_error() && FORM.contains(&finding.code)
+}
