@@ -32,7 +32,7 @@ fn a_lazy_driver_is_seen() {
     thread::scope(|scope| {
         let mut options = driver_options(arm.clone());
         options.frequency = 0.5;
-        options.delay = 15;
+        options.delay = 300;
         options.gripper = None;
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
         let clauses = test_driver(&arm, JOINTS).unwrap();
