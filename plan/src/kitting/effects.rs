@@ -7,26 +7,18 @@ use super::types::Scope;
 
 /// Variables that a statement uses.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Effects {
+pub(crate) struct Effects {
     /// Read before the statement itself surely wrote them.
-    pub reads: BTreeSet<String>,
+    pub(crate) reads: BTreeSet<String>,
     /// Perhaps written.
-    pub writes: BTreeSet<String>,
+    pub(crate) writes: BTreeSet<String>,
     /// Surely written.
     sure: BTreeSet<String>,
     /// It moves the robot, or calls the factotum.
-    pub acts: bool,
+    pub(crate) acts: bool,
 }
 
 impl Effects {
-    /// Effects of one statement with everything in it.
-    #[must_use]
-    pub fn of(statement: &Statement, scope: &Scope) -> Self {
-        let mut effects = Self::default();
-        effects.add(statement, scope);
-        effects
-    }
-
     fn read(&mut self, expression: &Expression, scope: &Scope) {
         match &expression.term {
             Term::Name(name) => self.read_name(name, scope),
@@ -110,6 +102,13 @@ impl Effects {
                 self.read(object, scope);
                 self.read(pose, scope);
             }
+            _ => self.add_list(statement, scope),
+        }
+    }
+
+    /// Effects of a statement that holds others.
+    fn add_list(&mut self, statement: &Statement, scope: &Scope) {
+        match &statement.action {
             Action::If { test, then } | Action::ElseIf { test, then } => {
                 self.read(test, scope);
                 self.add_perhaps(then, scope);
@@ -134,14 +133,14 @@ impl Effects {
                 self.sure = sure;
             }
             Action::DoInGivenOrder(list) => list.iter().for_each(|s| self.add(s, scope)),
-            Action::Start {} | Action::Stop {} | Action::Quit {} => {}
+            _ => {}
         }
     }
 
     /// Whether the order of two statements matters for the variables: one may write what the other
     /// reads before writing it itself.
     #[must_use]
-    pub fn conflicts_with<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
+    pub(crate) fn conflicts_with<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
         let clash = self.writes.intersection(&other.reads).next();
         clash
             .or_else(|| other.writes.intersection(&self.reads).next())
@@ -151,7 +150,7 @@ impl Effects {
 
 /// A step of a list: one statement, or an If with the ElseIf and Else that follow it.
 #[must_use]
-pub fn steps(list: &[Statement]) -> Vec<std::ops::Range<usize>> {
+pub(crate) fn steps(list: &[Statement]) -> Vec<std::ops::Range<usize>> {
     let mut steps: Vec<std::ops::Range<usize>> = Vec::new();
     for (index, statement) in list.iter().enumerate() {
         let follows = matches!(
@@ -169,7 +168,7 @@ pub fn steps(list: &[Statement]) -> Vec<std::ops::Range<usize>> {
 /// Pairs of steps of an any-order list that keep their written order because their order matters,
 /// with the variable they share.
 #[must_use]
-pub fn conflicts(list: &[Statement], scope: &Scope) -> Vec<(usize, usize, String)> {
+pub(crate) fn conflicts(list: &[Statement], scope: &Scope) -> Vec<(usize, usize, String)> {
     let effects: Vec<Effects> = steps(list)
         .into_iter()
         .map(|range| {

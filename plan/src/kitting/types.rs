@@ -7,7 +7,7 @@ use crate::world::Class;
 
 /// The type of a variable or expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Type {
+pub(crate) enum Type {
     /// A number; whole and from the smallest value on, where given.
     Number {
         /// Only whole numbers.
@@ -42,7 +42,7 @@ pub(crate) const NUMBER: Type = Type::Number {
 impl Type {
     /// The type of this name.
     #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         let whole = |least| Some(Self::Number { whole: true, least });
         match name {
             "positiveInteger" => whole(Some(1)),
@@ -61,7 +61,7 @@ impl Type {
 
     /// Whether a value of type `value` may be assigned to a variable of this type.
     #[must_use]
-    pub fn accepts(self, value: Self) -> bool {
+    pub(crate) fn accepts(self, value: Self) -> bool {
         match (self, value) {
             (_, Self::Unknown) | (Self::Unknown, _) => true,
             (Self::Object(_) | Self::Pose | Self::Data | Self::Text, Self::Null) => true,
@@ -73,7 +73,7 @@ impl Type {
 
     /// For messages.
     #[must_use]
-    pub fn describe(self) -> String {
+    pub(crate) fn describe(self) -> String {
         match self {
             Self::Number {
                 least: Some(least), ..
@@ -94,7 +94,7 @@ impl Type {
 
 /// What kind of name it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(crate) enum Role {
     /// A parameter: cannot be assigned.
     Parameter,
     /// An internal variable.
@@ -103,7 +103,7 @@ pub enum Role {
 
 /// The names that a plan declares.
 #[derive(Clone, Debug, Default)]
-pub struct Scope {
+pub(crate) struct Scope {
     names: BTreeMap<String, (Role, Type)>,
     folded: BTreeMap<String, String>,
 }
@@ -111,7 +111,7 @@ pub struct Scope {
 impl Scope {
     /// The names of this plan; of two equal names the first counts.
     #[must_use]
-    pub fn new(plan: &Plan) -> Self {
+    pub(crate) fn new(plan: &Plan) -> Self {
         let mut scope = Self::default();
         let parameters = plan
             .parameters
@@ -134,7 +134,7 @@ impl Scope {
 
     /// The declared name that `name` means: the same, or the same but for capitals.
     #[must_use]
-    pub fn declared(&self, name: &str) -> Option<&str> {
+    pub(crate) fn declared(&self, name: &str) -> Option<&str> {
         let exact = self
             .names
             .get_key_value(name)
@@ -144,14 +144,14 @@ impl Scope {
 
     /// Role and type of a name.
     #[must_use]
-    pub fn lookup(&self, name: &str) -> Option<(Role, Type)> {
+    pub(crate) fn lookup(&self, name: &str) -> Option<(Role, Type)> {
         self.declared(name)
             .and_then(|name| self.names.get(name))
             .copied()
     }
 
     /// All declared names.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.names.keys().map(String::as_str)
     }
 }

@@ -15,38 +15,7 @@ pub fn write(plan: &Plan) -> String {
     for field in &plan.about {
         out.line(&format!("  {} = {}", field.name, quoted(&field.value)));
     }
-    out.line("PlanRequirements");
-    for item in &plan.requirements {
-        let mut fields = vec![
-            format!("name = {}", quoted(&item.name)),
-            format!("type = {}", quoted(&item.class)),
-        ];
-        fields.extend(
-            item.sku
-                .iter()
-                .map(|sku| format!("SkuRef = {}", quoted(sku))),
-        );
-        let contents = item.contents_type.iter();
-        fields.extend(
-            contents.map(|sku| format!("contentsType = {}", quoted(&format!("SkuRef {sku}")))),
-        );
-        fields.extend(
-            item.contents_quantity
-                .iter()
-                .map(|n| format!("contentsQuantity = {n}")),
-        );
-        fields.extend(
-            item.location
-                .iter()
-                .map(|place| format!("location = {}", place.name())),
-        );
-        fields.extend(
-            item.conditions
-                .iter()
-                .map(|test| format!("where {}", expression(test))),
-        );
-        out.item(&fields);
-    }
+    requirements(plan, &mut out);
     out.line("PlanParameters");
     for item in &plan.parameters {
         out.item(&[
@@ -83,6 +52,41 @@ pub fn write(plan: &Plan) -> String {
         .iter()
         .for_each(|statement| out.statement("", statement, ""));
     out.text
+}
+
+fn requirements(plan: &Plan, out: &mut Out) {
+    out.line("PlanRequirements");
+    for item in &plan.requirements {
+        let mut fields = vec![
+            format!("name = {}", quoted(&item.name)),
+            format!("type = {}", quoted(&item.class)),
+        ];
+        fields.extend(
+            item.sku
+                .iter()
+                .map(|sku| format!("SkuRef = {}", quoted(sku))),
+        );
+        let contents = item.contents_type.iter();
+        fields.extend(
+            contents.map(|sku| format!("contentsType = {}", quoted(&format!("SkuRef {sku}")))),
+        );
+        fields.extend(
+            item.contents_quantity
+                .iter()
+                .map(|n| format!("contentsQuantity = {n}")),
+        );
+        fields.extend(
+            item.location
+                .iter()
+                .map(|place| format!("location = {}", place.name())),
+        );
+        fields.extend(
+            item.conditions
+                .iter()
+                .map(|test| format!("where {}", expression(test))),
+        );
+        out.item(&fields);
+    }
 }
 
 /// A text in quotes; a quotation mark in it cannot be written and becomes an apostrophe.

@@ -436,9 +436,8 @@ impl<'a> Controller<'a> {
             warning,
         } = step;
         let line = crate::finding::position(&self.source, span.start).0;
-        let mut seconds = 0.0;
-        match act {
-            Act::Nothing => {}
+        let seconds = match act {
+            Act::Nothing => 0.0,
             Act::End | Act::Exhausted => {
                 let outcome = state.outcome.take().unwrap_or(Outcome::Stopped);
                 self.state = state;
@@ -446,33 +445,34 @@ impl<'a> Controller<'a> {
             }
             Act::Motion(batch) => {
                 let mark = format!("{name} (line {line})");
-                match self.execute(&mark, &batch, observer)? {
-                    Ok(time) => seconds = time,
+                let seconds = match self.execute(&mark, &batch, observer)? {
+                    Ok(seconds) => seconds,
                     Err(reason) => {
                         let reason = format!("{mark}: {reason}");
                         return self.end(Outcome::Failed { code: 3, reason });
                     }
-                }
+                };
                 state.counters.motion_s += seconds;
                 for (_, tool) in &batch.tools {
                     tool.iter()
                         .for_each(|tool| observer(&Event::EndEffector(tool.name.clone())));
                 }
                 changes.extend(batch.changes);
+                seconds
             }
             Act::Errand(request) => match self.errand(&request, observer) {
                 Ok(delivery) => {
-                    seconds = delivery.seconds;
                     let value = delivery.object.map_or(Value::Null, Value::Object);
                     state.bindings.insert(request.variable, value);
                     changes.extend(delivery.changes);
+                    delivery.seconds
                 }
                 Err(reason) => {
                     let reason = format!("{name} (line {line}): {reason}");
                     return self.end(Outcome::Failed { code: 4, reason });
                 }
             },
-        }
+        };
         let kits = self.state.counters.kits;
         self.commit(&changes, state)?;
         let number = self.state.counters.statements;
@@ -485,13 +485,16 @@ impl<'a> Controller<'a> {
         if self.state.counters.kits > kits {
             observer(&Event::Kit(self.state.counters.kits));
         }
-        if let Some(warning) = warning {
-            observer(&Event::Warning(warning.clone()));
-            if !self.warnings.contains(&warning) && self.warnings.len() < 100 {
-                self.warnings.push(warning);
-            }
-        }
+        self.warn(warning, observer);
         Ok(())
+    }
+
+    fn warn(&mut self, warning: Option<String>, observer: &mut dyn FnMut(&Event)) {
+        let Some(warning) = warning else { return };
+        observer(&Event::Warning(warning.clone()));
+        if !self.warnings.contains(&warning) && self.warnings.len() < 100 {
+            self.warnings.push(warning);
+        }
     }
 
     fn interpret(&mut self) -> Result<Step, PlanError> {

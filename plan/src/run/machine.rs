@@ -334,16 +334,16 @@ impl Machine<'_> {
                 variable,
                 object,
                 property,
-            } => self.create(variable, object, property, span, state),
+            } => self.create(variable, (object, property), span, state),
             Action::DestroyInstance { variable } => self.destroy(variable, span, state),
             Action::FactotumRefill { variable } => {
-                self.errand(Errand::Refill, variable, name, span, state)
+                self.errand(Errand::Refill, variable, span, state)
             }
             Action::FactotumRemove { variable } => {
-                self.errand(Errand::Remove, variable, name, span, state)
+                self.errand(Errand::Remove, variable, span, state)
             }
             Action::FactotumReplace { variable } => {
-                self.errand(Errand::Replace, variable, name, span, state)
+                self.errand(Errand::Replace, variable, span, state)
             }
             Action::RobotChangeEndEffector { .. }
             | Action::RobotMoveAbove { .. }
@@ -499,8 +499,7 @@ impl Machine<'_> {
     fn create(
         &self,
         variable: &Name,
-        part: &Expression,
-        property: &str,
+        (part, property): (&Expression, &str),
         span: Span,
         mut state: State,
     ) -> Result<Step> {
@@ -614,7 +613,6 @@ impl Machine<'_> {
         &self,
         errand: Errand,
         variable: &Name,
-        name: &'static str,
         span: Span,
         mut state: State,
     ) -> Result<Step> {
@@ -635,6 +633,11 @@ impl Machine<'_> {
             .iter()
             .find(|v| v.name == declared);
         let requirement = own.and_then(|v| v.requirement.clone());
+        let name = match errand {
+            Errand::Refill => "FactotumRefill",
+            Errand::Remove => "FactotumRemove",
+            Errand::Replace => "FactotumReplace",
+        };
         state.counters.factotum_calls += 1;
         state.bindings.insert(declared.clone(), Value::Null);
         let request = Request {

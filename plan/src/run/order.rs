@@ -105,7 +105,7 @@ impl Chooser for Foresight<'_> {
         let mut at = Some((0.0, state.clone(), model.clone()));
         for member in &first {
             at = at.and_then(|(time, state, model)| {
-                self.follow(program, list[*member], time, &state, &model)
+                self.follow(program, list[*member], time, (&state, &model))
             });
         }
         // The members' own frame is done when they are: the rest of the plan goes on below it.
@@ -146,7 +146,8 @@ impl Foresight<'_> {
             }
             search.branches += 1;
             let node = search.list[member];
-            let Some((later, state, model)) = self.follow(search.program, node, time, state, model)
+            let Some((later, state, model)) =
+                self.follow(search.program, node, time, (state, model))
             else {
                 continue;
             };
@@ -203,8 +204,7 @@ impl Foresight<'_> {
         program: &Program,
         node: usize,
         time: f64,
-        state: &State,
-        model: &Model,
+        (state, model): (&State, &Model),
     ) -> Option<(f64, State, Model)> {
         let mut time = time;
         let mut model = model.clone();

@@ -259,7 +259,9 @@ fn failed_refills_end_the_plan_with_a_positive_reason() {
     let names = ["partASupplyRequirement", "supply of A"];
     for mut trial in document_or_own(6) {
         trial.adjust = |factotum| {
-            ["partASupplyRequirement", "supply of A"].map(|name| factotum.stock.empty(name));
+            for name in ["partASupplyRequirement", "supply of A"] {
+                factotum.stock.empty(name);
+            }
         };
         let Result { report, world, .. } = trial.run();
         assert_eq!((report.outcome, report.code), ("failed", 1), "{report:#?}");

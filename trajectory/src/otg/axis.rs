@@ -77,7 +77,7 @@ impl Axis {
             self.bounds.top
         };
         let ramps = if self.bounds.smooth {
-            (32.0 * way).cbrt()
+            rough_cube_root(32.0 * way)
         } else {
             0.0
         };
@@ -204,6 +204,11 @@ impl Axis {
     }
 }
 
+/// The cube root to a few percent, for the price of a division: a third of the exponent.
+fn rough_cube_root(value: f64) -> f64 {
+    f64::from_bits(value.to_bits() / 3 + 0x2a9f_7893_0000_0000)
+}
+
 /// Durations after which the velocity and acceleration of `end` can be reached from `start`
 /// within acceleration and jerk bounds, whatever the position.
 ///
@@ -272,34 +277,41 @@ fn first_above(side: &Side, target: (f64, f64), from: f64, last: f64) -> Option<
     if here.distance >= goal - slack - side.noise(&here) {
         return Some(from);
     }
+    let below = (from, here.distance - goal);
+    let until = |time: f64, distance: f64| root(side, goal, below, (time, distance - goal));
     if !here.crossing
         && here.slope > 0.0
         && let Some(top) = hump(side, from, last)
-        && side.at(top).distance >= goal
     {
-        return Some(root(side, goal, from, top));
+        let distance = side.at(top).distance;
+        if distance >= goal {
+            return Some(until(top, distance));
+        }
     }
     if last.is_finite() {
-        return (side.at(last).distance >= goal).then(|| root(side, goal, from, last));
+        let distance = side.at(last).distance;
+        return (distance >= goal).then(|| until(last, distance));
     }
     let cruise = side.cruise_time();
     if !cruise.is_finite() {
-        return unbounded_root(side, goal, from);
+        return unbounded_root(side, goal, below);
     }
     let end = cruise.max(from);
-    let missing = goal - side.at(end).distance;
-    if missing >= 0.0 {
-        return Some(end + missing / side.top());
+    let distance = side.at(end).distance;
+    if distance <= goal {
+        return Some(end + (goal - distance) / side.top());
     }
-    Some(root(side, goal, from, end))
+    Some(until(end, distance))
 }
 
 /// The root where velocity has no bound: double the time until it is enclosed.
-fn unbounded_root(side: &Side, goal: f64, from: f64) -> Option<f64> {
-    let mut step = 1.0 + from;
+fn unbounded_root(side: &Side, goal: f64, below: (f64, f64)) -> Option<f64> {
+    let mut step = 1.0 + below.0;
     for _ in 0..1100 {
-        if side.at(from + step).distance >= goal {
-            return Some(root(side, goal, from, from + step));
+        let time = below.0 + step;
+        let error = side.at(time).distance - goal;
+        if error >= 0.0 {
+            return Some(root(side, goal, below, (time, error)));
         }
         step *= 2.0;
     }
@@ -323,17 +335,14 @@ fn hump(side: &Side, from: f64, last: f64) -> Option<f64> {
     Some(low)
 }
 
-/// The time between `low` (not far enough) and `high` (far enough) at which `goal` is reached.
-fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
-    let (mut low, mut high) = (low, high);
-    let below = goal - side.at(low).distance;
-    let width = side.at(high).distance - goal + below;
-    let share = if width > 0.0 {
-        (below / width).clamp(0.0, 1.0)
-    } else {
-        1.0
-    };
-    let mut time = low + (high - low) * share.cbrt();
+/// The time between `below` (not far enough) and `above` (far enough) at which `goal` is reached;
+/// both are a time and the distance beyond the goal there.
+fn root(side: &Side, goal: f64, below: (f64, f64), above: (f64, f64)) -> f64 {
+    let (mut low, mut high) = (below.0, above.0);
+    let width = above.1 - below.1;
+    // Without limits but jerk, distance grows with the cube of time.
+    let share = if width > 0.0 { -below.1 / width } else { 1.0 };
+    let mut time = (low + (high - low) * rough_cube_root(share.max(0.0))).min(high);
     for _ in 0..100 {
         let here = side.at(time);
         let error = here.distance - goal;
@@ -343,20 +352,19 @@ fn root(side: &Side, goal: f64, low: f64, high: f64) -> f64 {
             low = time;
         }
         let step = error / here.slope;
-        let newton = time - step;
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if step.abs() <= 2.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
+        if step.abs() <= 4.0 * f64::EPSILON * time || high - low <= f64::EPSILON * high {
             return if error >= 0.0 || step.abs() <= 4.0 * f64::EPSILON * time {
                 time
             } else {
                 high
             };
         }
-        time = next;
+        let newton = time - step;
+        time = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
     }
     high
 }

@@ -1,6 +1,7 @@
 //! What must hold before and after planning.
 
 use super::error::OtgError;
+use super::joint::Joint;
 use super::limits::Limits;
 use super::motion::{Motion, Track};
 use super::options::{Interface, Options};
@@ -173,9 +174,11 @@ fn reachable<const N: usize>(
 }
 
 /// The whole move must stay inside the position limits, which are widened to hold the start.
-/// A joint that would leave them gets the profile of the same duration that strays least.
+/// A joint that would leave them gets the profile of the same duration that strays least, made
+/// from its problem in `joints` (none for a move along a straight line, which is left as it is).
 pub(crate) fn keep_positions<const N: usize>(
     motion: &mut Motion<N>,
+    joints: &[Joint],
     limits: &Limits<N>,
     options: &Options<N>,
 ) -> Result<(), OtgError> {
@@ -190,11 +193,9 @@ pub(crate) fn keep_positions<const N: usize>(
             continue;
         };
         let mut other = *track;
-        let course = if motion.straight {
-            None
-        } else {
-            track.joint.direct_course(track.duration)
-        };
+        let course = joints
+            .get(joint)
+            .and_then(|j| j.direct_course(track.duration));
         match course {
             Some(course) => other.course = course,
             None => {

@@ -16,7 +16,7 @@ impl Track {
         let mut times = [self.duration; SWITCHES];
         times[0] = 0.0;
         let mut count = 1;
-        self.joint.switches(&self.course, |time| {
+        self.frame.switches(&self.course, |time| {
             if let Some(place) = times.get_mut(count) {
                 *place = time.min(self.duration);
                 count += 1;

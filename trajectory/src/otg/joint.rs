@@ -109,28 +109,36 @@ pub(crate) enum Task {
     Pace(Pace),
 }
 
+/// Where one joint's profile lives: its units, and what comes before the profile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    units: Units,
+    brake: Brake,
+    pause: f64,
+    /// The normalised start before and after braking.
+    start: Point,
+    launch: Point,
+}
+
 /// One joint's problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Joint {
-    pub(crate) units: Units,
-    pub(crate) brake: Brake,
-    pause: f64,
-    smooth: bool,
-    /// The normalised start before and after braking.
-    pub(crate) start: Point,
-    pub(crate) launch: Point,
-    pub(crate) task: Task,
+    pub(crate) frame: Frame,
+    pub(crate) smooth: bool,
+    task: Task,
 }
 
 impl Default for Joint {
     fn default() -> Self {
         Self {
-            units: Units::new(1.0, 1.0, 1.0),
-            brake: Brake::default(),
-            pause: 0.0,
+            frame: Frame {
+                units: Units::new(1.0, 1.0, 1.0),
+                brake: Brake::default(),
+                pause: 0.0,
+                start: Point::default(),
+                launch: Point::default(),
+            },
             smooth: true,
-            start: Point::default(),
-            launch: Point::default(),
             task: Task::Idle,
         }
     }
@@ -186,36 +194,23 @@ impl Joint {
             }
             Interface::Velocity => Task::Pace(Pace::new(ready, to, bounds)),
         };
-        Self {
+        let frame = Frame {
             units,
             brake,
             pause,
-            smooth: bounds.smooth,
             start,
             launch,
+        };
+        Self {
+            frame,
+            smooth: bounds.smooth,
             task,
         }
     }
 
-    /// The joint that moves `share` times as far.
-    pub(crate) fn scaled(mut self, share: f64) -> Self {
-        self.units = self.units.scaled(share);
-        self
-    }
-
-    /// Whether jerk is limited.
-    pub(crate) fn is_smooth(&self) -> bool {
-        self.smooth
-    }
-
-    /// How long (s) it takes to get back inside the limits.
-    pub(crate) fn braking(&self) -> f64 {
-        self.pause * self.units.time
-    }
-
     /// The shortest possible duration (s) not below `from` (s); infinity if none can be computed.
     pub(crate) fn next_possible(&self, from: f64) -> f64 {
-        let wanted = from / self.units.time - self.pause;
+        let wanted = from / self.frame.units.time - self.frame.pause;
         let next = match &self.task {
             Task::Idle => return from,
             Task::Reach(axis) => axis.next_possible(wanted),
@@ -224,13 +219,13 @@ impl Joint {
         if next <= wanted {
             from
         } else {
-            (next + self.pause) * self.units.time
+            (next + self.frame.pause) * self.frame.units.time
         }
     }
 
     /// The profile of `duration` (s) after braking, which must be possible.
     pub(crate) fn course(&self, duration: f64) -> Course {
-        let time = (duration / self.units.time - self.pause).max(0.0);
+        let time = (duration / self.frame.units.time - self.frame.pause).max(0.0);
         match &self.task {
             Task::Idle => Course::default(),
             Task::Reach(axis) => axis.course(time),
@@ -241,9 +236,35 @@ impl Joint {
     /// The profile of `duration` (s) that strays least, if there is one of that shape.
     pub(crate) fn direct_course(&self, duration: f64) -> Option<Course> {
         match &self.task {
-            Task::Reach(axis) => direct(axis, duration / self.units.time - self.pause),
+            Task::Reach(axis) => direct(axis, duration / self.frame.units.time - self.frame.pause),
             Task::Idle | Task::Pace(_) => None,
         }
+    }
+
+    /// A cheap guess at the duration (s), to look at the slowest joint first.
+    pub(crate) fn guess(&self) -> f64 {
+        match &self.task {
+            Task::Reach(axis) => (axis.guess() + self.frame.pause) * self.frame.units.time,
+            _ => 0.0,
+        }
+    }
+}
+
+impl Frame {
+    /// The frame of a joint that moves `share` times as far.
+    pub(crate) fn scaled(mut self, share: f64) -> Self {
+        self.units = self.units.scaled(share);
+        self
+    }
+
+    /// The units of the profile.
+    pub(crate) fn units(&self) -> &Units {
+        &self.units
+    }
+
+    /// How long (s) it takes to get back inside the limits.
+    pub(crate) fn braking(&self) -> f64 {
+        self.pause * self.units.time
     }
 
     /// The normalised point at `time` (s).
@@ -253,14 +274,6 @@ impl Joint {
             self.brake.point(self.start, time)
         } else {
             course.point(self.launch, time - self.pause)
-        }
-    }
-
-    /// A cheap guess at the duration (s), to look at the slowest joint first.
-    pub(crate) fn guess(&self) -> f64 {
-        match &self.task {
-            Task::Reach(axis) => (axis.guess() + self.pause) * self.units.time,
-            _ => 0.0,
         }
     }
 

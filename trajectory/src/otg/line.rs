@@ -44,12 +44,12 @@ pub(crate) fn plan<const N: usize>(
         let share = direction[index];
         track.duration = duration;
         track.course = course;
-        track.joint = joint.scaled(share);
+        track.frame = joint.frame.scaled(share);
         if interface == Interface::Velocity && options.enabled[index] {
             track.end[0] = track.last_position();
         }
     }
-    check::keep_positions(&mut motion, limits, options)?;
+    check::keep_positions(&mut motion, &[], limits, options)?;
     Ok(motion)
 }
 
@@ -223,7 +223,8 @@ fn standing<const N: usize>(
             end[0] = begin[0];
         }
         Track {
-            joint: Joint::default(),
+            frame: Joint::default().frame,
+            placed: options.interface[joint] == Interface::Position,
             course: Course::default(),
             duration,
             start: begin,

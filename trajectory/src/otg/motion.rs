@@ -5,14 +5,16 @@ use realtime::{Piece, Sample};
 
 use crate::Trajectory;
 
-use super::joint::{Joint, Task};
+use super::joint::Frame;
 use super::state::State;
 use super::strand::Course;
 
 /// One joint's part of a move.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
-    pub(crate) joint: Joint,
+    pub(crate) frame: Frame,
+    /// Whether a position had to be reached.
+    pub(crate) placed: bool,
     pub(crate) course: Course,
     /// When this joint arrives (s).
     pub(crate) duration: f64,
@@ -34,8 +36,8 @@ impl Track {
 
     /// The same before arrival, where the end of the profile is not the exact target.
     pub(crate) fn inside(&self, time: f64) -> [f64; 4] {
-        let units = &self.joint.units;
-        let point = self.joint.point(&self.course, time.max(0.0));
+        let units = self.frame.units();
+        let point = self.frame.point(&self.course, time.max(0.0));
         [
             self.start[0] + units.position * point.position,
             units.velocity * point.velocity,
@@ -75,15 +77,12 @@ impl<const N: usize> Motion<N> {
     pub fn braking(&self, joint: usize) -> f64 {
         self.tracks
             .get(joint)
-            .map_or(0.0, |track| track.joint.braking())
+            .map_or(0.0, |track| track.frame.braking())
     }
 
     /// Whether joint `joint` had to reach a position (not only a velocity).
     pub fn reaches_position(&self, joint: usize) -> bool {
-        !matches!(
-            self.tracks.get(joint).map(|t| t.joint.task),
-            Some(Task::Pace(_)) | None
-        )
+        self.tracks.get(joint).is_some_and(|track| track.placed)
     }
 
     /// Whether the joints were planned along one straight line in joint space.
@@ -146,7 +145,7 @@ impl<const N: usize> Motion<N> {
     fn switches(&self) -> Vec<f64> {
         let mut times = vec![0.0];
         for track in &self.tracks {
-            track.joint.switches(&track.course, |time| times.push(time));
+            track.frame.switches(&track.course, |time| times.push(time));
             times.push(track.duration);
         }
         times.sort_by(f64::total_cmp);

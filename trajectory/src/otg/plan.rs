@@ -40,7 +40,7 @@ pub(crate) fn plan<const N: usize>(
         let duration = common_duration(&joints, options)?;
         assemble(&joints, start, target, options, &[duration; N])
     };
-    check::keep_positions(&mut motion, limits, options)?;
+    check::keep_positions(&mut motion, &joints, limits, options)?;
     Ok(motion)
 }
 
@@ -129,7 +129,8 @@ fn assemble<const N: usize>(
 ) -> Motion<N> {
     let tracks = std::array::from_fn(|joint| {
         let mut track = Track {
-            joint: joints[joint],
+            frame: joints[joint].frame,
+            placed: options.interface[joint] == Interface::Position,
             course: joints[joint].course(durations[joint]),
             duration: durations[joint],
             start: [
@@ -144,7 +145,7 @@ fn assemble<const N: usize>(
             ],
         };
         finish(&mut track, options.enabled[joint], options.interface[joint]);
-        if !joints[joint].is_smooth() {
+        if !joints[joint].smooth {
             track.end[2] = 0.0;
         }
         track

@@ -1,0 +1,343 @@
+//! Looks at what the servo loop needs of this machine, and says what would repair it.
+
+use core::time::Duration;
+use std::fs;
+use std::thread;
+
+use ipc::{Arm, EngineLink, Hello, Probe, Urgency, now_ns, sleep_until_ns, urge};
+use serde::Serialize;
+
+/// How a check ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Health {
+    /// As it should be.
+    Ok,
+    /// It works, but not as well as it could.
+    Warn,
+    /// It does not work.
+    Fail,
+}
+
+/// One check.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Check {
+    /// What was looked at.
+    pub name: &'static str,
+    /// How it is.
+    pub health: Health,
+    /// What was seen.
+    pub seen: String,
+    /// The command or setting that repairs it; empty where nothing is to be repaired.
+    pub remedy: String,
+}
+
+impl Check {
+    fn new(name: &'static str, health: Health, seen: String, remedy: &str) -> Self {
+        let remedy = if health == Health::Ok {
+            String::new()
+        } else {
+            remedy.to_owned()
+        };
+        Self {
+            name,
+            health,
+            seen,
+            remedy,
+        }
+    }
+}
+
+/// What to look at.
+#[derive(Clone, Debug)]
+pub struct DoctorOptions {
+    /// Servo rate to measure wake-ups at (Hz).
+    pub rate_hz: f64,
+    /// How long to measure wake-ups.
+    pub wake_up: Duration,
+    /// An arm whose driver to greet, with its number of joints. The driver must have no engine.
+    pub driver: Option<(Arm, usize)>,
+}
+
+impl Default for DoctorOptions {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1000.0,
+            wake_up: Duration::from_secs(5),
+            driver: None,
+        }
+    }
+}
+
+/// Makes all checks, one after the other.
+pub fn examine(options: &DoctorOptions) -> Vec<Check> {
+    let mut checks = vec![kernel(), governor(), shared_memory(), leftovers()];
+    checks.extend(rights());
+    checks.push(wake_up(options));
+    checks.push(round_trip());
+    if let Some((arm, joints)) = &options.driver {
+        checks.push(driver(arm, *joints, options.rate_hz));
+    }
+    checks
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(path)
+        .unwrap_or_default()
+        .trim()
+        .to_owned()
+}
+
+fn kernel() -> Check {
+    let release = read("/proc/sys/kernel/osrelease");
+    let real_time = read("/sys/kernel/realtime") == "1";
+    let health = if real_time { Health::Ok } else { Health::Warn };
+    let kind = if real_time {
+        "PREEMPT_RT"
+    } else {
+        "not PREEMPT_RT"
+    };
+    let remedy = "install a real-time kernel (Debian: apt install linux-image-rt-amd64)";
+    Check::new("kernel", health, format!("{release}, {kind}"), remedy)
+}
+
+fn governor() -> Check {
+    let seen = read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+    let (health, seen) = match seen.as_str() {
+        "" => (Health::Ok, "no frequency scaling".to_owned()),
+        "performance" => (Health::Ok, seen),
+        _ => (Health::Warn, seen),
+    };
+    Check::new(
+        "processor governor",
+        health,
+        seen,
+        "cpupower frequency-set -g performance",
+    )
+}
+
+fn shared_memory() -> Check {
+    let path = format!("/dev/shm/canter-doctor-{}", std::process::id());
+    let written = fs::write(&path, vec![1_u8; 1 << 20]).and_then(|()| fs::remove_file(&path));
+    match written {
+        Ok(()) => Check::new("shared memory", Health::Ok, "1 MiB written".to_owned(), ""),
+        Err(cause) => {
+            let remedy = "mount -t tmpfs -o size=256m,mode=1777 tmpfs /dev/shm";
+            Check::new("shared memory", Health::Fail, cause.to_string(), remedy)
+        }
+    }
+}
+
+/// Cleans up while it looks: what is left then cannot be cleaned up by this user.
+fn leftovers() -> Check {
+    let before = ipc::survey();
+    let (cleaned, failed) = ipc::cleanup();
+    let after = ipc::survey();
+    let seen = format!(
+        "{} processes alive, {} dead, {cleaned} cleaned up, {failed} could not be",
+        before.alive, before.dead
+    );
+    let health = if after.dead == 0 {
+        Health::Ok
+    } else {
+        Health::Warn
+    };
+    let remedy = "stop all engines and drivers, then rm -r /tmp/iceoryx2/nodes";
+    Check::new("left-over segments", health, seen, remedy)
+}
+
+/// Asks for each right in a thread of its own, which ends at once.
+fn rights() -> Vec<Check> {
+    let none = Urgency {
+        priority: 0,
+        processor: None,
+        lock_memory: false,
+        low_latency: false,
+    };
+    let ask = |name, wish: Urgency, remedy: &str| {
+        let refused = thread::spawn(move || urge(wish).refused)
+            .join()
+            .unwrap_or_default();
+        match refused.first() {
+            None => Check::new(name, Health::Ok, "granted".to_owned(), ""),
+            Some(refused) => Check::new(name, Health::Warn, refused.clone(), remedy),
+        }
+    };
+    vec![
+        ask(
+            "real-time priority",
+            Urgency {
+                priority: 60,
+                ..none
+            },
+            "echo \"$USER - rtprio 95\" | sudo tee /etc/security/limits.d/canter.conf",
+        ),
+        ask(
+            "memory lock",
+            Urgency {
+                lock_memory: true,
+                ..none
+            },
+            "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/canter.conf",
+        ),
+        ask(
+            "processor latency",
+            Urgency {
+                low_latency: true,
+                ..none
+            },
+            "sudo setfacl -m u:$USER:rw /dev/cpu_dma_latency",
+        ),
+    ]
+}
+
+fn quantile(sorted: &[u64], share: f64) -> u64 {
+    sorted
+        .get((sorted.len().saturating_sub(1) as f64 * share) as usize)
+        .copied()
+        .unwrap_or(0)
+}
+
+fn wake_up(options: &DoctorOptions) -> Check {
+    let period = (1e9 / options.rate_hz.clamp(100.0, 4000.0)) as u64;
+    let count = options.wake_up.as_nanos() as u64 / period;
+    let wish = Urgency {
+        lock_memory: false,
+        ..Urgency::default()
+    };
+    let measured = thread::spawn(move || {
+        let _granted = urge(wish);
+        let origin = now_ns() + period;
+        let mut late = Vec::with_capacity(count as usize);
+        for tick in 0..count {
+            sleep_until_ns(origin + tick * period);
+            late.push(now_ns().saturating_sub(origin + tick * period));
+        }
+        late.sort_unstable();
+        late
+    });
+    let late = measured.join().unwrap_or_default();
+    let missed = late.iter().filter(|late| **late > period).count();
+    let seen = format!(
+        "{} wake-ups: p50 {} us, p99 {} us, worst {} us, {missed} later than a period",
+        late.len(),
+        quantile(&late, 0.5) / 1000,
+        quantile(&late, 0.99) / 1000,
+        quantile(&late, 1.0) / 1000
+    );
+    let health = if quantile(&late, 0.99) > period {
+        Health::Fail
+    } else if missed > 0 || quantile(&late, 0.99) > period / 2 {
+        Health::Warn
+    } else {
+        Health::Ok
+    };
+    let remedy = "stop other load, isolate a processor (isolcpus=) or lower --rate";
+    Check::new("wake-up at the servo period", health, seen, remedy)
+}
+
+/// Round trips of bare messages between two threads.
+fn round_trip() -> Check {
+    const TRIPS: u64 = 2000;
+    const NAME: &str = "shared-memory round trip";
+    let result = (|| {
+        let arm: Arm = format!("doctor/{}", std::process::id()).parse()?;
+        let asks = Probe::open(&arm, true)?;
+        let other = arm.clone();
+        let echo = thread::spawn(move || -> Result<(), ipc::IpcError> {
+            let answers = Probe::open(&other, false)?;
+            let end = now_ns() + 3_000_000_000;
+            let mut last = 0;
+            while last < TRIPS && now_ns() < end {
+                if let Some(number) = answers.receive() {
+                    last = number;
+                    answers.send(number);
+                }
+                thread::yield_now();
+            }
+            Ok(())
+        });
+        let mut times = Vec::with_capacity(TRIPS as usize);
+        let end = now_ns() + 3_000_000_000;
+        for number in 1..=TRIPS {
+            let start = now_ns();
+            asks.send(number);
+            while asks.receive() != Some(number) && now_ns() < end {
+                thread::yield_now();
+                // The other side may not have been there when the first was sent.
+                if number == 1 && now_ns() - start > 1_000_000 {
+                    asks.send(number);
+                }
+            }
+            times.push(now_ns() - start);
+        }
+        echo.join().unwrap_or(Ok(()))?;
+        times.sort_unstable();
+        Ok::<_, ipc::IpcError>((times, now_ns() < end))
+    })();
+    match result {
+        Ok((times, true)) => {
+            let (half, most) = (quantile(&times, 0.5), quantile(&times, 0.99));
+            let seen = format!("p50 {} us, p99 {} us", half as f64 / 1e3, most as f64 / 1e3);
+            Check::new(NAME, Health::Ok, seen, "")
+        }
+        Ok((_, false)) => Check::new(
+            NAME,
+            Health::Fail,
+            "messages were lost".to_owned(),
+            "canter doctor again",
+        ),
+        Err(error) => Check::new(
+            NAME,
+            Health::Fail,
+            error.to_string(),
+            "check /dev/shm and /tmp",
+        ),
+    }
+}
+
+fn driver(arm: &Arm, joints: usize, rate_hz: f64) -> Check {
+    const NAME: &str = "driver handshake";
+    let period = (1e9 / rate_hz) as u64;
+    let hello = Hello::new(joints, period, 100_000_000.max(period), ipc::Clock::Wall);
+    let greeted = EngineLink::open(arm)
+        .and_then(|link| link.greet(&hello, Duration::from_secs(2)))
+        .map(|ack| ipc::text_of(&ack.name));
+    match greeted {
+        Ok(name) => Check::new(
+            NAME,
+            Health::Ok,
+            format!("{arm}: {name} opened a session"),
+            "",
+        ),
+        Err(error) => {
+            let remedy = "start the driver, e.g. canter driver sim --name CELL/ARM";
+            Check::new(NAME, Health::Fail, error.to_string(), remedy)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_check_that_is_not_ok_has_a_remedy() {
+        let options = DoctorOptions {
+            wake_up: Duration::from_millis(100),
+            driver: Some(("doctor/nobody-there".parse().unwrap(), 6)),
+            ..DoctorOptions::default()
+        };
+        let checks = examine(&options);
+        assert_eq!(checks.len(), 10);
+        for check in &checks {
+            println!("{check:?}");
+            assert_eq!(
+                check.remedy.is_empty(),
+                check.health == Health::Ok,
+                "{check:?}"
+            );
+        }
+        assert_eq!(checks.last().map(|check| check.health), Some(Health::Fail));
+    }
+}
