@@ -90,7 +90,16 @@ fn a_run_publishes_what_was_planned() {
         let wet = published
             .iter()
             .filter(|row| row.0 == command && row.1[6] > 0.0);
-        for (wet, dry) in wet.zip(&dry) {
+        for wet in wet {
+            // Late periods are left out, so rows are matched by the time on the path, in periods;
+            // the dry run's first row of a command is one period after its start.
+            let at = wet.1[6] / 0.001;
+            let Some(dry) = dry.get((at.round() as usize).wrapping_sub(1)) else {
+                continue;
+            };
+            if (at - at.round()).abs() > 1e-6 {
+                continue; // between two rows of the dry run
+            }
             for joint in 0..6 {
                 let gap = (wet.1[joint] - dry.1[joint]).abs();
                 assert!(
