@@ -14,7 +14,10 @@ mod pause;
 mod plan;
 mod recover;
 mod resume;
+mod plan_check;
+mod plan_run;
 mod robots;
+mod world;
 mod run;
 mod shutdown;
 mod stop;
@@ -40,6 +43,9 @@ pub(crate) enum Command {
     Recover(recover::Recover),
     Resume(resume::Resume),
     Robots(robots::Robots),
+    World(world::World),
+    PlanCheck(plan_check::PlanCheck),
+    PlanRun(plan_run::PlanRun),
     Run(run::Run),
     Shutdown(shutdown::Shutdown),
     Stop(stop::Stop),
@@ -62,6 +68,9 @@ impl Command {
             Self::Recover(command) => command.run(),
             Self::Resume(command) => command.run(),
             Self::Robots(command) => command.run(),
+            Self::World(command) => command.run(),
+            Self::PlanCheck(command) => command.run(),
+            Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Stop(command) => command.run(),
