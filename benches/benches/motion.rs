@@ -101,23 +101,6 @@ fn cases() -> Vec<Case> {
 }
 
 fn main() {
-    if let Ok(name) = std::env::var("CASE") {
-        let l = ToolLimits {
-            speed: 0.5,
-            acceleration: 5.0,
-            jerk: 100.0,
-            ..ToolLimits::UNLIMITED
-        };
-        for c in cases() {
-            if c.name == name {
-                println!(
-                    "{:?}",
-                    measure(&c.poses, &SmoothOptions::new(c.tolerance, l))
-                );
-            }
-        }
-        return;
-    }
     let limits = ToolLimits {
         speed: 0.5,
         acceleration: 5.0,

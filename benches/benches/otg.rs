@@ -115,6 +115,21 @@ fn case<const N: usize>(
             }
         }
     }
+    let longer = (0..count)
+        .filter(|&i| {
+            let Problem {
+                start,
+                target,
+                limits,
+                options,
+            } = &problems[i];
+            let motion = Otg::plan(start, target, limits, options).unwrap();
+            let refused = cpp_otg.calculate(&mut cpp_inputs[i], &mut cpp_trajectory);
+            let peer = cpp_trajectory.get_duration();
+            refused == ruckig::Result::Working && motion.duration() > peer * (1.0 + 1e-9)
+        })
+        .count();
+    println!("{name:<16}{longer} of {count} moves last longer than Ruckig's");
     let copy = copy_cost(&problems[0]);
     let ours = ours.summary(clock);
     let cpp = cpp.summary(copy);

@@ -60,6 +60,8 @@ class Checker:
 
         if q is None:
             return False
+        if isinstance(q, list):
+            return any(self.good(one, target) for one in q)
         q = np.asarray(q, float)
         lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
         turned = np.where(q > upper + 1e-6, q - 2 * math.pi, np.where(q < lower - 1e-6, q + 2 * math.pi, q))
@@ -117,7 +119,7 @@ def toolbox(urdf, dof):
 
     def solve(t, seed):
         answer = ets.ik_LM(t, q0=seed, tol=1e-11, joint_limits=True)
-        return answer[0] if answer[1] else None
+        return answer.q if answer.success else None
 
     return solve
 
@@ -125,11 +127,18 @@ def toolbox(urdf, dof):
 def eaik(urdf, dof):
     from eaik.IK_URDF import UrdfRobot
 
+    import numpy as np
+
     robot = UrdfRobot(str(urdf))
+    # It leaves out the turn of the last fixed joint.
+    checker = Checker(urdf)
+    q = np.zeros(dof)
+    checker.pin.framesForwardKinematics(checker.model, checker.data, q)
+    fixed = np.linalg.inv(checker.data.oMf[checker.frame].homogeneous) @ robot.fwdKin(q)
 
     def solve(t, seed):
-        answers = robot.IK(t).Q
-        return answers[0] if len(answers) else None
+        """All answers; limits are not its business, so any inside them counts."""
+        return list(robot.IK(t @ fixed).Q)
 
     return solve
 

@@ -7,8 +7,15 @@ use serde::Serialize;
 /// # Errors
 /// Standard output cannot be written.
 pub(crate) fn json(value: &impl Serialize) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, value)?;
+    json_to(&mut io::stdout().lock(), value)
+}
+
+/// Writes `value` as indented JSON and a newline.
+///
+/// # Errors
+/// The sink cannot be written.
+pub(crate) fn json_to(out: &mut impl Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *out, value)?;
     writeln!(out)
 }
 

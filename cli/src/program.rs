@@ -199,8 +199,9 @@ impl ProgramFile {
     }
 
     /// Adds what a robot has against the program. A command that has an error already is not
-    /// mentioned again, and wrong order has been found without a robot.
+    /// mentioned again, and wrong order only where nothing else explains it.
     pub(crate) fn add_refusals(&mut self, refusals: &[Refusal]) {
+        let explained = self.reading.has_errors();
         let findings = &mut self.reading.findings;
         for refusal in refusals {
             let known = findings.iter().any(|finding| {
@@ -208,7 +209,7 @@ impl ProgramFile {
                     && finding.span.start < refusal.span.end
                     && refusal.span.start < finding.span.end.max(finding.span.start + 1)
             });
-            if !known && refusal.error.class != ErrorClass::Sequence {
+            if !known && !(explained && refusal.error.class == ErrorClass::Sequence) {
                 findings.push(finding(refusal));
             }
         }

@@ -1,7 +1,8 @@
+use std::collections::VecDeque;
 use std::io::{self, Write};
 
 use engine::session::RunSample;
-use nalgebra::Isometry3;
+use nalgebra::Vector3;
 
 use crate::samples::{SampleRow, SampleWriter};
 
@@ -12,7 +13,11 @@ pub(crate) struct Recording<W: Write> {
     first: Option<u64>,
     last: u64,
     worst: f64,
+    path: VecDeque<Vector3<f64>>,
 }
+
+/// How many published points the measured one is held against: the arm is behind by less.
+const BEHIND: usize = 100;
 
 impl<W: Write> Recording<W> {
     /// A recording of `joints` joints at `rate_hz`; the file gets the columns of a plan and, beside
@@ -34,6 +39,7 @@ impl<W: Write> Recording<W> {
             first: None,
             last: 0,
             worst: 0.0,
+            path: VecDeque::with_capacity(BEHIND + 1),
         })
     }
 
@@ -45,9 +51,7 @@ impl<W: Write> Recording<W> {
         for sample in samples {
             let first = *self.first.get_or_insert(sample.tick);
             self.last = sample.tick;
-            self.worst = self
-                .worst
-                .max(apart(&sample.workstation_from_tool, &sample.measured_pose));
+            self.hold_against_path(sample);
             let Some(writer) = &mut self.writer else {
                 continue;
             };
@@ -66,6 +70,24 @@ impl<W: Write> Recording<W> {
         Ok(())
     }
 
+    /// How far the measured point is from the way that was published lately: off the path, not
+    /// behind on it.
+    fn hold_against_path(&mut self, sample: &RunSample) {
+        self.path
+            .push_back(sample.workstation_from_tool.translation.vector);
+        if self.path.len() > BEHIND {
+            self.path.pop_front();
+        }
+        let measured = sample.measured_pose.translation.vector;
+        let mut nearest = f64::INFINITY;
+        for (from, to) in self.path.iter().zip(self.path.iter().skip(1)) {
+            nearest = nearest.min(off_line(&measured, from, to));
+        }
+        if nearest.is_finite() {
+            self.worst = self.worst.max(nearest);
+        }
+    }
+
     /// Length of a servo period, s.
     pub(crate) fn period(&self) -> f64 {
         self.period
@@ -77,7 +99,7 @@ impl<W: Write> Recording<W> {
             .map_or(0.0, |first| (self.last - first) as f64 * self.period)
     }
 
-    /// Largest distance of the measured from the published controlled point, m.
+    /// Largest distance of the measured controlled point from the published way, m.
     pub(crate) fn worst(&self) -> f64 {
         self.worst
     }
@@ -91,6 +113,14 @@ impl<W: Write> Recording<W> {
     }
 }
 
-fn apart(one: &Isometry3<f64>, other: &Isometry3<f64>) -> f64 {
-    (one.translation.vector - other.translation.vector).norm()
+/// Distance of a point from the line between two others.
+fn off_line(point: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+    let way = to - from;
+    let squared = way.norm_squared();
+    let part = if squared > 0.0 {
+        ((point - from).dot(&way) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (from + way * part - point).norm()
 }

@@ -19,7 +19,6 @@ pub mod modal;
 pub mod planner;
 pub mod queue;
 pub mod robot;
-pub mod server;
 pub mod session;
 pub mod task;
 pub mod tooling;

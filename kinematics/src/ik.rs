@@ -144,12 +144,10 @@ impl<const N: usize> Solver<N> {
             return Ok(solution);
         }
         if closed.spare() {
-            const STEPS: u32 = 60;
-            for step in 1..=STEPS {
-                for side in [1.0, -1.0] {
-                    let moved = parameter
-                        + side * std::f64::consts::PI * f64::from(step) / f64::from(STEPS);
-                    if let Some(solution) = self.nearest_at(closed, pose, seed, moved) {
+            for step in [0.1, 0.25, 0.5, 0.9, 1.4, 2.0, 3.0] {
+                for side in [step, -step] {
+                    let moved = self.nearest_at(closed, pose, seed, parameter + side);
+                    if let Some(solution) = moved {
                         return Ok(solution);
                     }
                 }

@@ -22,6 +22,7 @@ fn run(name: &str, commands: u32) -> Run {
         .unwrap();
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
+        let _stop = crate::StopOnDrop(&stop);
         let options = driver_options(arm.clone());
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
         let config = executor_config(arm, Clock::LockStep);

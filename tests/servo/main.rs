@@ -6,3 +6,12 @@ mod lock_step;
 mod processes;
 mod virtual_time;
 mod wall_clock;
+
+/// Ends a driver's thread however the test ends: a scope waits for its threads.
+struct StopOnDrop<'a>(&'a std::sync::atomic::AtomicBool);
+
+impl Drop for StopOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+    }
+}

@@ -20,6 +20,7 @@ fn the_periods_add_up() {
     let arm = arm("count");
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
+        let _stop = crate::StopOnDrop(&stop);
         let options = driver_options(arm.clone());
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
         let mut config = executor_config(arm, Clock::Wall);
@@ -97,6 +98,7 @@ fn a_following_error_latches_until_recovery() {
     let arm = arm("following");
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
+        let _stop = crate::StopOnDrop(&stop);
         let mut options = driver_options(arm.clone());
         options.frequency = 1.0;
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());

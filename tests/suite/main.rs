@@ -6,6 +6,7 @@ mod bad_inputs;
 mod canter;
 mod command_line;
 mod planned_motions;
+mod runs;
 mod session;
 
 /// Every file of this folder is a module above: a forgotten one would never run.

@@ -141,3 +141,67 @@ fn some_limit_is_active() {
         certificate.duration
     );
 }
+
+/// Near-duplicate waypoints, reversals, nothing but repeats, very many waypoints: all are timed
+/// and certified, and what does not move at all is refused by name.
+#[test]
+fn awkward_paths() {
+    let limits = JointLimits::uniform(2.0, 10.0, 100.0);
+    let a = [0.0, 0.0, 0.0];
+    let b = [1.0, 0.5, -0.3];
+    let near = [1.0 + 1e-6, 0.5, -0.3];
+    let many: Vec<[f64; 3]> = (0..200)
+        .map(|i| {
+            [
+                f64::from(i) * 0.01,
+                f64::from(i % 7) * 0.05,
+                f64::from(i % 2) * 0.02,
+            ]
+        })
+        .collect();
+    let cases = [vec![a, b, near, a], vec![a, b, a], vec![a, a, b, b], many];
+    for points in &cases {
+        let timed = time(&spline(points), &limits);
+        assert!(timed.certificate.holds() && timed.certificate.fit_error < 1e-7);
+        assert!(
+            timed.certificate.stretch < 1.05,
+            "{}",
+            timed.certificate.stretch
+        );
+    }
+    let still = time_path(
+        &spline(&[a, a]),
+        &limits,
+        &ToolLimits::UNLIMITED,
+        &TimingOptions::default(),
+    );
+    assert!(still.is_err());
+}
+
+/// Ten cells or ten thousand: the certificate holds; more cells are not slower.
+#[test]
+fn any_number_of_cells() {
+    let path = spline(&[
+        [0.0, 0.0, 0.0],
+        [1.0, -1.0, 0.5],
+        [0.2, 0.3, -1.0],
+        [1.0, 1.0, 1.0],
+    ]);
+    let limits = JointLimits::uniform(2.0, 10.0, 100.0);
+    let mut last = f64::INFINITY;
+    for cells in [10, 100, 1000, 10_000] {
+        let options = TimingOptions {
+            cells: Some(cells),
+            ..TimingOptions::default()
+        };
+        let timed = time_path(&path, &limits, &ToolLimits::UNLIMITED, &options).unwrap();
+        let certificate = &timed.certificate;
+        assert!(certificate.holds());
+        assert!(
+            certificate.duration < last * 1.002,
+            "{cells}: {}",
+            certificate.duration
+        );
+        last = certificate.duration;
+    }
+}

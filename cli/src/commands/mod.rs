@@ -6,6 +6,7 @@ mod abort;
 mod check;
 mod completions;
 mod driver;
+mod engine;
 mod fk;
 mod ik;
 mod man;
@@ -19,7 +20,9 @@ mod plan_run;
 mod robots;
 mod world;
 mod run;
+mod send;
 mod shutdown;
+mod status;
 mod stop;
 
 use clap::Subcommand;
@@ -34,6 +37,7 @@ pub(crate) enum Command {
     Check(check::Check),
     Completions(completions::Completions),
     Driver(driver::Driver),
+    Engine(engine::Engine),
     Fk(fk::Fk),
     Ik(ik::Ik),
     Man(man::Man),
@@ -47,7 +51,9 @@ pub(crate) enum Command {
     PlanCheck(plan_check::PlanCheck),
     PlanRun(plan_run::PlanRun),
     Run(run::Run),
+    Send(send::Send),
     Shutdown(shutdown::Shutdown),
+    Status(status::Status),
     Stop(stop::Stop),
 }
 
@@ -59,6 +65,7 @@ impl Command {
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Driver(command) => command.run(),
+            Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
             Self::Man(command) => command.run(),
@@ -72,7 +79,9 @@ impl Command {
             Self::PlanCheck(command) => command.run(),
             Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
+            Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
         }
     }

@@ -229,7 +229,7 @@ impl Running {
                 "driver": driver,
                 "duration_s": duration,
                 "cycles": status.cycles,
-                "tracking_m": tracking,
+                "off_path_m": tracking,
             });
             serde_json::to_writer(&mut out, &summary).map_err(io::Error::from)?;
             writeln!(out)?;
@@ -239,7 +239,7 @@ impl Running {
         writeln!(
             out,
             "{done} of {count} commands done in {duration:.3} s; {} periods, {} of them late; \
-             driver {driver} followed within {:.3} mm",
+             driver {driver} at most {:.3} mm off the path",
             cycles.ticks,
             cycles.skipped,
             tracking * 1e3

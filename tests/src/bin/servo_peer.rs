@@ -87,7 +87,9 @@ fn paced(arm: &str, commands: &str) -> Outcome {
                 Event::Finished { command, .. } if command >= last => {
                     let ticks = executor.remote().counters().ticks;
                     let speed = ticks as f64 * 0.001 / start.elapsed().as_secs_f64();
-                    say(&format!("{ticks} periods, {speed:.1} times real time, error {worst:e}"));
+                    say(&format!(
+                        "{ticks} periods, {speed:.1} times real time, error {worst:e}"
+                    ));
                     return Ok(());
                 }
                 Event::Faulted { fault, .. } => return Err(fault.to_string().into()),

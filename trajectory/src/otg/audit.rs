@@ -12,8 +12,8 @@ use super::state::State;
 /// accelerations, A/J for times (J the jerk limit), hence A²/J for velocities and A³/J² for
 /// positions; V, V/A where jerk is not limited. Positions are further divided by
 /// `1 + |start| + |target| + fastest · duration` in those units, velocities by `1 + fastest`, since
-/// numbers of that size are all that floating point resolves. Steps and excess of the acceleration are less
-/// what four roundings of a time as long as the move amount to.
+/// numbers of that size are all that floating point resolves. Steps and excess of velocity and
+/// acceleration are less what four roundings of a time as long as the move amount to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
     /// Largest difference between the first piece and the start.
@@ -141,12 +141,15 @@ impl Audit {
                 speeds = (speeds.0.min(extreme), speeds.1.max(extreme));
             }
             let over = (speeds.1 - allowed.1).max(allowed.0 - speeds.0);
-            raise(&mut self.velocity, over / scale.velocity);
+            raise(
+                &mut self.velocity,
+                (over - scale.rounding[0]) / scale.velocity,
+            );
             let over = (a.max(b) - limits.acceleration_max[joint])
                 .max(limits.acceleration_min[joint] - a.min(b));
             raise(
                 &mut self.acceleration,
-                (over - scale.rounding) / scale.acceleration,
+                (over - scale.rounding[1]) / scale.acceleration,
             );
         }
     }
@@ -157,8 +160,8 @@ struct Scale {
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// What rounding of a time of the size of the duration does to the acceleration.
-    rounding: f64,
+    /// What rounding of a time of the size of the duration does to velocity and acceleration.
+    rounding: [f64; 2],
     braking: f64,
     positions: bool,
     accelerations: bool,
@@ -181,6 +184,8 @@ impl Scale {
             acceleration / jerk
         };
         let end = motion.end();
+        let clock = 4.0 * f64::EPSILON * motion.duration();
+        let finite = if second { 0.0 } else { jerk };
         let reached = start.velocity[joint]
             .abs()
             .max(end.velocity[joint].abs())
@@ -196,11 +201,10 @@ impl Scale {
             position: acceleration * time * time + way,
             velocity: acceleration * time + fastest,
             acceleration,
-            rounding: if second {
-                0.0
-            } else {
-                4.0 * f64::EPSILON * motion.duration() * jerk
-            },
+            rounding: [
+                clock * acceleration.max(-limits.acceleration_min[joint]),
+                clock * finite,
+            ],
             braking: motion.braking(joint),
             positions: motion.reaches_position(joint),
             accelerations: !second,
@@ -209,8 +213,9 @@ impl Scale {
 
     fn difference(&self, left: [f64; 3], right: [f64; 3]) -> f64 {
         let position = (left[0] - right[0]).abs() / self.position;
-        let velocity = (left[1] - right[1]).abs() / self.velocity;
-        let step = (left[2] - right[2]).abs() - self.rounding;
+        let step = (left[1] - right[1]).abs() - self.rounding[0];
+        let velocity = step.max(0.0) / self.velocity;
+        let step = (left[2] - right[2]).abs() - self.rounding[1];
         let acceleration = step.max(0.0) / self.acceleration;
         let position = if self.positions { position } else { 0.0 };
         let acceleration = if self.accelerations {

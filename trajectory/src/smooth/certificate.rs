@@ -18,8 +18,8 @@ pub struct Peak {
 
 impl Peak {
     fn raise(&mut self, ratio: f64, time: f64) {
-        // `!(<=)`: a number that is not a number must fail the certificate.
-        if !(ratio <= self.ratio) {
+        // What is not a number must fail the certificate.
+        if ratio > self.ratio || ratio.is_nan() {
             *self = Self { ratio, time };
         }
     }
@@ -297,7 +297,7 @@ fn away(control: &[Vector3<f64>; 5], ends: &[Vector3<f64>; 2], room: f64, depth:
     let mut bound = 0.0;
     for c in control {
         let distance = to_segment(c, ends);
-        if !(distance <= bound) {
+        if distance > bound || distance.is_nan() {
             bound = distance;
         }
     }

@@ -13,6 +13,7 @@ use super::spline::{self, Effort, Moving, Request};
 /// Effort of one spline: a time within 0.1 % of the optimum.
 const EFFORT: Effort = Effort {
     steps: 90,
+    search: 72,
     gap: 3e-3,
 };
 
@@ -123,25 +124,30 @@ fn spline(
         if certificate.holds() {
             return Some(spans);
         }
-        narrow(&mut inner, &certificate, &passes);
-        coupled = Some(request.coupled || (attempt == 1 && request.moves()[1]));
+        narrow(&mut inner, &certificate, &passes, request.coupled);
+        coupled = Some(request.coupled || ((attempt == 1 || over > 1.3) && request.moves()[1]));
     }
     None
 }
 
 /// Narrows the options by what a motion exceeded.
-fn narrow(options: &mut SmoothOptions, certificate: &Certificate, passes: &[Pass]) {
+fn narrow(options: &mut SmoothOptions, certificate: &Certificate, passes: &[Pass], coupled: bool) {
     if certificate.corridor.ratio > 1.0 {
         options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
     }
-    let mut excess = 1.0_f64;
+    let (mut far, mut turned) = (1.0_f64, 1.0_f64);
     for pass in passes.iter().filter(|pass| !pass.holds()) {
-        excess = excess
-            .max(pass.deviation / pass.tolerance)
-            .max(pass.angle / pass.angular_tolerance);
+        far = far.max(pass.deviation / pass.tolerance);
+        turned = turned.max(pass.angle / pass.angular_tolerance);
     }
-    if excess > 1.0 {
-        options.tolerance *= 0.9 / excess.min(10.0);
+    if turned > 1.0 && coupled {
+        options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));
+    } else {
+        // An orientation that follows the way cuts corners as the way does.
+        far = far.max(turned);
+    }
+    if far > 1.0 {
+        options.tolerance *= 0.9 / far.min(10.0);
     }
     let over = certificate.worst_limit();
     if over > 1.0 {

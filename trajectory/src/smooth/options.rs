@@ -97,7 +97,7 @@ impl SmoothOptions {
                 .vector
                 .iter()
                 .chain(pose.rotation.coords.iter());
-            if let Some(value) = numbers.copied().find(|x| !(x.abs() <= 1e6)) {
+            if let Some(value) = numbers.copied().find(|x| x.is_nan() || x.abs() > 1e6) {
                 return Err(SmoothError::BadPose { index, value });
             }
         }
@@ -110,7 +110,7 @@ impl SmoothOptions {
             ("angular acceleration", limits.angular_acceleration),
             ("angular jerk", limits.angular_jerk),
         ] {
-            if !(value >= 1e-9) {
+            if value.is_nan() || value < 1e-9 {
                 return Err(SmoothError::BadLimit { quantity, value });
             }
         }
@@ -119,7 +119,7 @@ impl SmoothOptions {
             ("corridor", self.corridor()),
             ("angular tolerance", self.angular_tolerance()),
         ] {
-            if !(value >= 0.0) {
+            if value.is_nan() || value < 0.0 {
                 return Err(SmoothError::BadTolerance { quantity, value });
             }
         }

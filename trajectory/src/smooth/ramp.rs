@@ -117,11 +117,6 @@ pub(crate) fn leg(length: f64, start: Gate, end: Gate, caps: &Caps) -> Option<Ve
     ])
 }
 
-/// Sum of the durations of a leg's pieces, s.
-pub(crate) fn duration(pieces: &[(f64, f64)]) -> f64 {
-    pieces.iter().map(|piece| piece.0).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,6 +161,7 @@ mod tests {
             jerk: 100.0,
         };
         let pieces = leg(0.1, Gate::default(), Gate::default(), &caps).unwrap();
-        assert_relative_eq!(duration(&pieces), 0.35, epsilon = 1e-12);
+        let duration: f64 = pieces.iter().map(|piece| piece.0).sum();
+        assert_relative_eq!(duration, 0.35, epsilon = 1e-12);
     }
 }

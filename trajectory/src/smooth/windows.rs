@@ -1,7 +1,5 @@
 //! Long lists, window by window, so that motion can start after the first.
 
-use std::collections::VecDeque;
-
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::certificate::certify;
@@ -19,10 +17,14 @@ const LONGEST: f64 = 1.0;
 
 /// Least and most of a window, in braking times.
 const LEAST_BRAKES: f64 = 8.0;
-const MOST_BRAKES: f64 = 30.0;
+const MOST_BRAKES: f64 = 16.0;
 
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
+
+/// Share of the speed limit used by windows that others follow: the hull of a
+/// start in motion on a bend is a little faster than the motion.
+const JOIN_SPEED: f64 = 0.998;
 
 /// Most poses of one window.
 const MOST_POSES: usize = 400;
@@ -184,8 +186,13 @@ impl Windows {
 
     /// Motion from the end of `done` to rest in pose `end`.
     fn plan(&self, end: usize) -> Motion {
+        let mut options = self.options.clone();
+        if end + 1 < self.poses.len() {
+            options.limits.speed *= JOIN_SPEED;
+            options.limits.angular_speed *= JOIN_SPEED;
+        }
         if self.tail.spans.is_empty() {
-            return from_rest(&self.poses[self.end..=end], &self.options);
+            return from_rest(&self.poses[self.end..=end], &options);
         }
         let more = &self.poses[self.end..=end];
         let stop = exact_stop::plan(more, &self.options.limits);
@@ -195,11 +202,11 @@ impl Windows {
             spacing: span.duration,
         });
         let ahead = moving.and_then(|moving| {
-            from_motion(&self.poses[self.passed..=end], &self.options, &moving, most)
+            from_motion(&self.poses[self.passed..=end], &options, &moving, most)
         });
         ahead.unwrap_or_else(|| {
             let mut motion = self.tail.clone();
-            motion.append(from_rest(more, &self.options));
+            motion.append(from_rest(more, &options));
             motion
         })
     }
@@ -240,14 +247,11 @@ impl Windows {
             self.passed = self.end;
             return;
         };
-        let rest = self.tail.spans.split_off(cut);
+        let mut rest = self.tail.spans.split_off(cut);
         let offset = rest.first().map_or(0.0, |span| span.start);
-        let rest: VecDeque<Span> = rest.into();
-        let rest = rest.into_iter().map(|mut span| {
+        for span in &mut rest {
             span.start -= offset;
-            span
-        });
-        let rest: Vec<Span> = rest.collect();
+        }
         let parts = vec![(Method::Spline, rest.len())];
         let mut head = std::mem::replace(&mut self.tail, Motion { spans: rest, parts });
         head.parts = vec![(Method::Spline, head.spans.len())];

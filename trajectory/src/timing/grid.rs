@@ -12,6 +12,8 @@ use crate::{JointLimits, Path, PathPoint, ToolLimits};
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
 
+/// Finer cells gain nothing, and the search for the law slows down.
+const MOST_CELLS_PER_RAMP: f64 = 40.0;
 /// Cells from either end whose jerk rows stand closer: the path starts there like the cube of the
 /// parameter, which two places cannot hold.
 const DENSE: usize = 2;
@@ -135,7 +137,11 @@ impl Grid {
         let lead = if start_rest { 0.5 * ramp } else { 0.0 };
         let total = fast + lead + if end_rest { 0.5 * ramp } else { 0.0 };
         let wanted = (CELLS_PER_RAMP * total / ramp).ceil().clamp(40.0, 20_000.0);
-        let cells = options.cells.unwrap_or(wanted as usize).max(8);
+        let most = (MOST_CELLS_PER_RAMP * total / ramp).ceil() as usize;
+        let cells = options
+            .cells
+            .unwrap_or(wanted as usize)
+            .clamp(8, most.max(40));
         let spans = (cells / 2).max(12);
         let span = total / spans as f64;
         let floor = 1e-3 * end / fast;

@@ -69,8 +69,7 @@ pub fn time_path<const N: usize>(
         tool,
         options,
     };
-    let grid = Grid::new(&survey, path.knots(), path.end(), options);
-    let draft = tighten::best(bounded, &grid)?;
+    let draft = draft(bounded, &survey)?;
     let tighten::Draft { pieces, audit, .. } = draft;
     // A moving start fixes the law there, so it cannot be stretched: it holds as it is.
     let moving = matches!(options.start, Boundary::Moving { .. });
@@ -94,7 +93,7 @@ pub fn time_path<const N: usize>(
         } else {
             0.0
         },
-        cells: grid.nodes.len() - 1,
+        cells: draft.cells,
         iterations: draft.iterations,
     };
     Ok(Timed {
@@ -103,3 +102,26 @@ pub fn time_path<const N: usize>(
         certificate,
     })
 }
+
+/// The best law for the survey. A moving start near what is possible may need finer cells than the
+/// law of the whole does.
+fn draft<P: Path<N>, const N: usize>(
+    bounded: Bounded<'_, P, N>,
+    survey: &Survey,
+) -> Result<tighten::Draft<N>, TimingError> {
+    let mut options = *bounded.options;
+    let mut refused = None;
+    for _ in 0..FINER {
+        let grid = Grid::new(survey, bounded.path.knots(), bounded.path.end(), &options);
+        match tighten::best(bounded, &grid) {
+            Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
+            answer => return answer,
+        }
+        options.cells = Some(2 * (grid.nodes.len() - 1));
+    }
+    let limit = String::new();
+    Err(refused.unwrap_or(TimingError::StartTooFast { ratio: 1.0, limit }))
+}
+
+/// Grids that are tried for a moving start, each twice as fine as the one before.
+const FINER: usize = 3;

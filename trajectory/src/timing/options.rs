@@ -29,7 +29,8 @@ pub struct TimingOptions {
     pub end: Boundary,
     /// Upper bound of `du/dt` (u/s).
     pub rate_cap: Option<f64>,
-    /// Number of cells of the law; `None` chooses it from the duration and the path.
+    /// Number of cells of the law; `None` chooses it from the duration and the path. At most forty
+    /// are taken for the time in which accelerations build up.
     pub cells: Option<usize>,
     /// Largest distance (rad) of a joint from the path between the knots of the motion.
     pub fit: f64,

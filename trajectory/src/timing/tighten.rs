@@ -24,6 +24,7 @@ pub(super) struct Draft<const N: usize> {
     pub(super) pieces: Pieces<N>,
     pub(super) audit: Audit,
     pub(super) iterations: usize,
+    pub(super) cells: usize,
     pub(super) x: Vec<f64>,
     duration: f64,
 }
@@ -44,6 +45,7 @@ impl<const N: usize> Draft<N> {
             pieces,
             audit,
             iterations,
+            cells: problem.cells(),
             x,
             duration,
         }

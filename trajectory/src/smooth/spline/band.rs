@@ -37,7 +37,7 @@ impl<const B: usize> Band<B> {
                 return false;
             };
             let pivot = column[0];
-            if !(pivot > 0.0 && pivot.is_finite()) {
+            if pivot <= 0.0 || !pivot.is_finite() {
                 return false;
             }
             let inverse = 1.0 / pivot.sqrt();

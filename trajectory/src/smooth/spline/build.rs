@@ -16,7 +16,7 @@ const INSIDE: f64 = 0.9999;
 
 /// Share of the corridor that the samples use, since the curve between two
 /// samples may lie a little outside of them.
-const CORRIDOR: f64 = 0.99;
+const CORRIDOR: f64 = 0.98;
 
 /// Share of the angular caps; the rest is for turns about changing axes.
 const ANGULAR: f64 = 0.985;
@@ -56,13 +56,16 @@ impl Request<'_> {
         ]
     }
 
-    /// True when each leg that turns also moves, so that the orientation can
-    /// follow the progress.
+    /// True when each leg that turns takes about as long to move as to turn, so
+    /// that the orientation can follow the progress.
     pub(crate) fn can_follow(&self) -> bool {
+        let limits = &self.options.limits;
         self.poses.windows(2).all(|pair| {
             let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
-            way > self.options.tolerance.min(1e-3)
-                || body_turn(&pair[0].rotation, &pair[1].rotation).norm() < 1e-12
+            let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
+            turn < 1e-12
+                || (way > self.options.tolerance.min(1e-3)
+                    && turn / limits.angular_speed < 1.5 * way / limits.speed)
         })
     }
 }
@@ -191,8 +194,7 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
         };
-        let spacing = self.moving.map(|m| m.spacing);
-        let mut point = start::first(&mut problem, self.moving.is_some(), spacing);
+        let mut point = start::first(&mut problem, self.moving.is_some());
         solve::<D, B>(&problem, &mut point, self.request.effort)?;
         Some(self.spans(&problem, &point, used))
     }

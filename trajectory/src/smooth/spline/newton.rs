@@ -31,7 +31,7 @@ struct Slacks {
 impl Slacks {
     /// False when the slack is not positive.
     fn take(&mut self, slack: f64) -> bool {
-        if !(slack > 0.0) {
+        if slack <= 0.0 || slack.is_nan() {
             return false;
         }
         self.product *= slack;
@@ -135,7 +135,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             bent += old[1] * new[1];
         }
         let pivot = self.hessian_z - bent;
-        if !(pivot > 0.0) {
+        if pivot <= 0.0 || pivot.is_nan() {
             return None;
         }
         let z = -(self.gradient_z - cross) / pivot;

@@ -225,7 +225,7 @@ impl<const D: usize> Point<D> {
 pub(crate) fn sample_weights(k: usize) -> (usize, &'static [f64; 5]) {
     (
         k / 2,
-        if k % 2 == 0 {
+        if k.is_multiple_of(2) {
             &basis::AT_KNOT
         } else {
             &basis::AT_MIDDLE

@@ -7,6 +7,19 @@ use super::problem::{Point, Problem, Room, part, square};
 /// Iterates are held this far inside the widened bounds.
 const WIDEN: f64 = 1.03;
 
+/// Share of a bound below which it need not be widened.
+const CLEAR: f64 = 0.99;
+
+/// Bound for a present value: the true one when the value is clear of it, else
+/// one widened to hold the value, but never wider than before.
+fn narrowed(before: f64, value: f64, bound: f64, clear: f64) -> f64 {
+    if value <= clear * bound {
+        bound
+    } else {
+        before.min((WIDEN * value).max(bound))
+    }
+}
+
 /// Moves every passing time to the closest approach near by, in order.
 ///
 /// With one group that is the least distance; with rotation it is the least
@@ -126,8 +139,8 @@ impl Room {
             tight &= self.tighten_caps(ratios, g);
             let radius = problem.groups[g].radius;
             for i in 0..point.passes.len() {
-                let need = (WIDEN * miss(problem, point, i, g)).max(radius);
-                self.balls[g][i] = self.balls[g][i].min(need);
+                let far = miss(problem, point, i, g);
+                self.balls[g][i] = narrowed(self.balls[g][i], far, radius, CLEAR);
                 tight &= self.balls[g][i] <= radius;
             }
         }
@@ -140,7 +153,8 @@ impl Room {
     fn tighten_caps(&mut self, ratios: &[f64; 3], g: usize) -> bool {
         let mut tight = true;
         for k in 0..3 {
-            self.caps[g][k] = self.caps[g][k].min((WIDEN * ratios[k]).max(1.0));
+            // A start in motion may sit close to a limit, and stays there.
+            self.caps[g][k] = narrowed(self.caps[g][k], ratios[k], 1.0, 0.9999);
             tight &= self.caps[g][k] <= 1.0;
         }
         tight
@@ -169,9 +183,9 @@ impl Room {
                 }
             }
             for g in 0..Problem::<D>::GROUPS {
-                let need = WIDEN * away(problem, point, k, g, self.legs[k]);
+                let far = away(problem, point, k, g, self.legs[k]);
                 let width = problem.groups[g].width;
-                self.widths[g][k] = self.widths[g][k].min(need.max(width));
+                self.widths[g][k] = narrowed(self.widths[g][k], far, width, CLEAR);
                 tight &= self.widths[g][k] <= width;
             }
         }

@@ -10,6 +10,8 @@ use super::project::project;
 pub(crate) struct Effort {
     /// Most Newton steps.
     pub(crate) steps: usize,
+    /// Steps after which an iterate that still needs room is given up.
+    pub(crate) search: usize,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
 }
@@ -50,6 +52,9 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             tight = room.tighten(problem, point);
             since = 0;
         }
+        if !tight && count >= effort.search {
+            return None;
+        }
         let Some(step) = system.step(problem, point, &room, weight) else {
             return tight.then_some(count);
         };
@@ -64,7 +69,11 @@ pub(crate) fn solve<const D: usize, const B: usize>(
                 if stuck {
                     return None;
                 }
-                since = PATIENCE;
+                since = if step.decrement < 0.1 || !moved {
+                    PATIENCE
+                } else {
+                    since
+                };
             } else {
                 weight *= GROWTH;
                 weight = weight.min(1.01 * parameter / (effort.gap * point.z));

@@ -9,6 +9,11 @@ const SHARE: f64 = 0.6;
 /// Knot intervals in one time `A / J`.
 const KNOTS_PER_RAMP: f64 = 5.0;
 
+/// Rounds of averaging of the control points, and the share of the tolerance
+/// they may use up.
+const ROUNDS: usize = 12;
+const HELD: f64 = 0.3;
+
 /// Least and most spans of one spline.
 const FEWEST: f64 = 12.0;
 const MOST: f64 = 700.0;
@@ -56,17 +61,13 @@ impl Schedule {
 }
 
 /// First iterate of a problem whose `scale` it also sets; `moving` tells that
-/// the start is not at rest, `spacing` is the wanted knot spacing if any.
-pub(crate) fn first<const D: usize>(
-    problem: &mut Problem<D>,
-    moving: bool,
-    spacing: Option<f64>,
-) -> Point<D> {
+/// the start is not at rest.
+pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, moving: bool) -> Point<D> {
     let legs = legs(problem);
     let ramp = (0..Problem::<D>::GROUPS)
         .map(|g| problem.groups[g].caps[1] / problem.groups[g].caps[2])
         .fold(0.0, f64::max);
-    let coarse = spacing.unwrap_or(ramp / KNOTS_PER_RAMP);
+    let coarse = ramp / KNOTS_PER_RAMP;
     let start = begin(problem, &legs);
     let mut rates = junctions(problem, &legs, coarse);
     rates[0] = start[1];
@@ -75,15 +76,21 @@ pub(crate) fn first<const D: usize>(
     let smoothing = ramp.min(0.5 * schedule.duration / (schedule.dips + 1) as f64);
     let total = schedule.duration + smoothing;
     let finest = total / (8 * (schedule.dips + 1)) as f64;
-    let h = match spacing {
-        Some(h) => h,
-        None => coarse.min(finest).min(total / FEWEST).max(total / MOST),
-    };
+    let h = coarse.min(finest).min(total / FEWEST).max(total / MOST);
     let spans = (total / h).ceil().clamp(FEWEST, MOST) as usize + 3;
     problem.scale = if moving {
         h
     } else {
         total / (spans - 3) as f64
+    };
+    if moving {
+        calm(problem);
+    }
+    // A spacing that was lowered needs more spans for the same time.
+    let spans = if moving {
+        ((total / problem.scale).ceil() as usize + 3).min(2 * MOST as usize)
+    } else {
+        spans
     };
     let lead = if moving {
         0.0
@@ -91,6 +98,25 @@ pub(crate) fn first<const D: usize>(
         0.5 * smoothing + 1.5 * problem.scale
     };
     place(problem, &legs, &schedule, [spans as f64, lead, smoothing])
+}
+
+/// Lowers the knot spacing until the pinned control points of a start in motion
+/// keep the limits: their differences bound more than the start itself.
+fn calm<const D: usize>(problem: &mut Problem<D>) {
+    for _ in 0..6 {
+        let control = problem.pinned(1.0).map(|pinned| pinned[0]).to_vec();
+        let point = Point {
+            control,
+            z: 1.0,
+            passes: Vec::new(),
+        };
+        let ratios = super::project::ratios(problem, &point);
+        // The jerk of the start does not depend on the spacing.
+        if ratios.iter().all(|r| r[0].max(r[1]) <= 0.9995) {
+            break;
+        }
+        problem.scale *= 0.95;
+    }
 }
 
 fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
@@ -284,7 +310,47 @@ fn place<const D: usize>(
     for c in point.control.iter_mut().rev().take(4) {
         *c = problem.vertices[problem.vertices.len() - 1];
     }
+    round_off(problem, &mut point);
     point
+}
+
+/// Rounds the corners of the control polygon within the balls: repeated
+/// averaging, held near the way.
+fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
+    let knots = point.control.len();
+    let mut legs = vec![1; knots];
+    for k in 1..knots {
+        let time = k as f64 - 1.5;
+        let mut leg = legs[k - 1];
+        while leg < problem.vertices.len() - 1 && point.passes[leg - 1] <= time {
+            leg += 1;
+        }
+        legs[k] = leg;
+    }
+    let mut rounded = point.control.clone();
+    for _ in 0..ROUNDS {
+        for k in 4..knots - 4 {
+            for d in 0..D {
+                let sides = point.control[k - 1][d] + point.control[k + 1][d];
+                rounded[k][d] = 0.5 * point.control[k][d] + 0.25 * sides;
+            }
+            for g in 0..Problem::<D>::GROUPS {
+                let place = [
+                    rounded[k][3 * g],
+                    rounded[k][3 * g + 1],
+                    rounded[k][3 * g + 2],
+                ];
+                let (away, _) = problem.offset(&place, legs[k], g);
+                let (far, most) = (square(&away).sqrt(), HELD * problem.groups[g].radius);
+                if far > most {
+                    for d in 0..3 {
+                        rounded[k][3 * g + d] -= away[d] * (1.0 - most / far);
+                    }
+                }
+            }
+        }
+        std::mem::swap(&mut point.control, &mut rounded);
+    }
 }
 
 /// Lets the offset between the start's own control points and the polyline

@@ -1,0 +1,91 @@
+use std::io::{self, Write};
+use std::thread::sleep;
+use std::time::Duration;
+
+use clap::Args;
+use ipc::Verb;
+use serde_json::Value;
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::output;
+use crate::program::ProgramArgument;
+
+/// How often the engine is asked how far it is.
+const POLL: Duration = Duration::from_millis(50);
+
+/// Send a program to a running engine and wait for its end
+///
+/// Prints one JSON object for everything that happens to it, one a line.
+#[derive(Args, Debug)]
+pub(crate) struct Send {
+    #[command(flatten)]
+    program: ProgramArgument,
+    #[command(flatten)]
+    arm: ArmOption,
+    /// Only hand it over
+    #[arg(long)]
+    no_wait: bool,
+}
+
+impl Send {
+    /// Sends, then follows.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        let program = self.program.read()?;
+        program.report();
+        if program.exit() != Exit::Done {
+            return Ok(program.exit());
+        }
+        let seen = self.arm.ask(Verb::Status)?.body["notes"]
+            .as_array()
+            .and_then(|notes| notes.last()?["number"].as_u64())
+            .unwrap_or(0);
+        let answer = self.arm.ask(Verb::Submit {
+            format: program.form().to_owned(),
+            name: program.name().to_owned(),
+            program: program.text().to_owned(),
+        })?;
+        let ids = answer.body["ids"].as_array().cloned().unwrap_or_default();
+        output::note(&format!("canter: {} commands accepted", ids.len()));
+        let last = ids.last().and_then(Value::as_u64);
+        match last {
+            Some(last) if !self.no_wait => self.follow(seen, last),
+            _ => Ok(Exit::Done),
+        }
+    }
+
+    /// Prints what happens until the last command is over.
+    fn follow(&self, mut seen: u64, last: u64) -> Result<Exit, Failure> {
+        loop {
+            let body = self.arm.ask(Verb::Status)?.body;
+            for entry in body["notes"].as_array().into_iter().flatten() {
+                let number = entry["number"].as_u64().unwrap_or(0);
+                if number <= seen {
+                    continue;
+                }
+                seen = number;
+                let note = &entry["note"];
+                writeln!(io::stdout().lock(), "{note}")?;
+                if let Some(exit) = over(note, last) {
+                    return Ok(exit);
+                }
+            }
+            sleep(POLL);
+        }
+    }
+}
+
+/// What a note means for the process, if nothing of the program can follow.
+fn over(note: &Value, last: u64) -> Option<Exit> {
+    let is_last = note["id"].as_u64() == Some(last);
+    match note["event"].as_str()? {
+        "done" if is_last => Some(Exit::Done),
+        "refused" if is_last || note["dropped"].as_u64() > Some(0) => Some(Exit::Refused),
+        "aborted" => Some(Exit::Stopped),
+        "faulted" if note["blame"] == "guard" => Some(Exit::Aborted),
+        "faulted" => Some(Exit::DriverFault),
+        "closed" => Some(Exit::NoPeer),
+        _ => None,
+    }
+}

@@ -1,0 +1,314 @@
+//! Laws of smooth motions, checked by sampling alone: no code of the
+//! certificate is used here.
+//!
+//! `SMOOTH_LISTS=10000 cargo test -p trajectory --release --test smooth`
+//! makes the long run.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use trajectory::smooth::{SmoothOptions, SmoothPlan, Windows, plan};
+use trajectory::{ToolCurve, ToolLimits};
+
+/// Small deterministic generator (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+
+    fn power(&mut self, low: f64, high: f64) -> f64 {
+        10_f64.powf(self.between(low, high))
+    }
+
+    fn direction(&mut self) -> Vector3<f64> {
+        let v = Vector3::new(
+            self.between(-1., 1.),
+            self.between(-1., 1.),
+            self.between(-1., 1.),
+        );
+        if v.norm() > 1e-3 {
+            v.normalize()
+        } else {
+            Vector3::x()
+        }
+    }
+}
+
+/// A list of 2 to 60 poses with every degeneracy mixed in.
+fn list(random: &mut Random) -> Vec<Isometry3<f64>> {
+    let count = 2 + (random.next().powi(2) * 59.0) as usize;
+    let (size, turning) = (random.power(-4.0, -0.5), random.next() < 0.5);
+    let spread = random.next();
+    let mut poses = vec![Isometry3::identity()];
+    let mut heading = random.direction();
+    while poses.len() < count {
+        let last = poses[poses.len() - 1];
+        let length = size * (1.0 + spread * (random.power(-2.0, 0.5) - 1.0));
+        match (random.next() * 9.0) as usize {
+            0 => {}                                                            // on, in line
+            1 => heading = -heading,                                           // reversal
+            2 => heading = (-heading + 0.01 * random.direction()).normalize(), // hairpin
+            3 => heading = (heading + 1e-4 * random.direction()).normalize(),  // nearly in line
+            4 => heading = (heading + 0.3 * random.direction()).normalize(),   // bend
+            5 if random.next() < 0.5 => {
+                poses.push(last); // repeated
+                continue;
+            }
+            6 if turning => {
+                // Turn on the spot.
+                let turn = random.direction() * random.between(0.0, 1.5);
+                let rotation = last.rotation * UnitQuaternion::from_scaled_axis(turn);
+                poses.push(Isometry3::from_parts(last.translation, rotation));
+                continue;
+            }
+            _ => heading = random.direction(),
+        }
+        let turn = if turning {
+            random.direction() * random.power(-3.0, 0.0)
+        } else {
+            Vector3::zeros()
+        };
+        let place = last.translation.vector + heading * length;
+        let rotation = last.rotation * UnitQuaternion::from_scaled_axis(turn);
+        poses.push(Isometry3::from_parts(place.into(), rotation));
+    }
+    poses
+}
+
+fn limits(random: &mut Random) -> ToolLimits {
+    let mut scaled = |x: f64| x * random.power(-0.5, 0.5);
+    ToolLimits {
+        speed: scaled(0.5),
+        acceleration: scaled(5.0),
+        jerk: scaled(100.0),
+        angular_speed: scaled(2.0),
+        angular_acceleration: scaled(20.0),
+        angular_jerk: scaled(400.0),
+    }
+}
+
+/// First local closest approach in order, on samples; distances that rise by
+/// less than `slack` have not risen.
+fn passes_in_order(
+    plan: &SmoothPlan,
+    times: &[f64],
+    goals: &[Vector3<f64>],
+    tolerance: f64,
+) -> Result<(), String> {
+    let place = |time: f64| plan.at(time).pose.translation.vector;
+    let slack = 1e-11 + 1e-9 * tolerance;
+    let mut at = 0.0;
+    for (i, goal) in goals.iter().enumerate() {
+        let distance = |time: f64| (place(time) - goal).norm();
+        // Already near at the pass before: that is the pass, unless it gets nearer.
+        let mut fell = distance(at) <= tolerance + slack;
+        let (mut least, mut best, mut bracket) = (distance(at), at, [at, at]);
+        let mut before = at;
+        for time in times.iter().copied().filter(|time| *time > at) {
+            let d = distance(time);
+            if d < least {
+                fell = true;
+                (least, best, bracket) = (d, time, [before, time]);
+            } else if d > least + slack {
+                bracket[1] = time;
+                if fell {
+                    break;
+                }
+                (least, best, bracket) = (d, time, [before, time]);
+            }
+            before = time;
+        }
+        // Between the samples beside the best one it may be closer.
+        for k in 0..=1000 {
+            let time = bracket[0] + (bracket[1] - bracket[0]) * f64::from(k) / 1000.0;
+            if distance(time) < least {
+                (least, best) = (distance(time), time);
+            }
+        }
+        if least > tolerance + slack {
+            let known = plan.passes()[i];
+            return Err(format!(
+                "pose {} passed at {least:e} at {best}, tolerance {tolerance:e}, known {known:?}",
+                i + 1
+            ));
+        }
+        at = best;
+    }
+    Ok(())
+}
+
+/// Checks a plan by sampling poses and differencing them.
+fn check(
+    plan: &SmoothPlan,
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> Result<(), String> {
+    let end = plan.duration();
+    let knots = plan.knots();
+    let mut times = Vec::new();
+    for pair in knots.windows(2) {
+        times.extend((0..24).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / 24.0));
+    }
+    times.push(end);
+    let samples: Vec<_> = times.iter().map(|t| plan.at(*t)).collect();
+    let (first, last) = (plan.at(0.0), plan.at(end));
+    let scale = 1.0
+        + poses
+            .iter()
+            .map(|p| p.translation.vector.norm())
+            .fold(0.0, f64::max);
+    for (sample, pose) in [(&first, &poses[0]), (&last, &poses[poses.len() - 1])] {
+        let off = (sample.pose.translation.vector - pose.translation.vector).norm();
+        if off > 1e-12 * scale
+            || sample.linear[0].norm() > 1e-9
+            || sample.pose.rotation.angle_to(&pose.rotation) > 1e-7
+        {
+            return Err(format!(
+                "end off by {off:e}, speed {:e}",
+                sample.linear[0].norm()
+            ));
+        }
+    }
+    let l = &options.limits;
+    let linear = [l.speed, l.acceleration, l.jerk];
+    let angular = [l.angular_speed, l.angular_acceleration, l.angular_jerk];
+    for (k, pair) in samples.windows(2).enumerate() {
+        let dt = times[k + 1] - times[k];
+        for (name, caps, now, next) in [
+            ("linear", &linear, &pair[0].linear, &pair[1].linear),
+            ("angular", &angular, &pair[0].angular, &pair[1].angular),
+        ] {
+            for order in 0..3 {
+                if now[order].norm() > caps[order] * (1.0 + 1e-6) {
+                    return Err(format!(
+                        "{name} {order} is {} of {} at {}",
+                        now[order].norm(),
+                        caps[order],
+                        times[k]
+                    ));
+                }
+            }
+            // Position, speed and acceleration never jump: each changes by no
+            // more than the next one allows.
+            for order in 0..2 {
+                let step = (next[order] - now[order]).norm();
+                if step > caps[order + 1] * dt * (1.0 + 1e-6) + 1e-7 * caps[order] {
+                    return Err(format!(
+                        "{name} {order} jumps by {step:e} in {dt:e} s at {} of {end}",
+                        times[k]
+                    ));
+                }
+            }
+        }
+        let moved = (pair[1].pose.translation.vector - pair[0].pose.translation.vector).norm();
+        if moved > l.speed * dt * (1.0 + 1e-6) + 1e-12 * scale {
+            return Err(format!("position jumps by {moved:e} at {}", times[k]));
+        }
+        let turned = pair[0].pose.rotation.angle_to(&pair[1].pose.rotation);
+        if turned > l.angular_speed * dt * (1.0 + 1e-6) + 1e-7 {
+            return Err(format!("orientation jumps by {turned:e} at {}", times[k]));
+        }
+    }
+    let goals: Vec<_> = poses[1..poses.len() - 1]
+        .iter()
+        .map(|p| p.translation.vector)
+        .collect();
+    passes_in_order(
+        plan,
+        &times,
+        &goals,
+        options.tolerance * 1.001 + 1e-6 * options.limits.speed * 1e-2,
+    )
+}
+
+fn report(seed: u64) -> Result<[f64; 2], String> {
+    let mut random = Random(seed);
+    let poses = list(&mut random);
+    let limits = limits(&mut random);
+    let tolerance = if random.next() < 0.1 {
+        0.0
+    } else {
+        random.power(-5.0, -1.5)
+    };
+    let options = SmoothOptions::new(tolerance, limits);
+    let plan = plan(&poses, &options).map_err(|error| error.to_string())?;
+    if !plan.certificate().holds() {
+        let bad = plan.passes().iter().find(|pass| !pass.holds());
+        return Err(format!("certificate: {:?} {bad:?}", plan.certificate()));
+    }
+    if plan.duration() > plan.exact_stop() * (1.0 + 1e-9) {
+        return Err(format!(
+            "slower than exact stop: {} {}",
+            plan.duration(),
+            plan.exact_stop()
+        ));
+    }
+    check(&plan, &poses, &options)?;
+    Ok([plan.duration(), plan.exact_stop()])
+}
+
+/// Whatever the list: certified, confirmed by sampling, no slower than stops.
+#[test]
+fn random_lists() {
+    let count = std::env::var("SMOOTH_LISTS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(20);
+    let first = std::env::var("SMOOTH_FIRST")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(0);
+    let (mut bad, mut sums, mut stops) = (Vec::new(), [0.0; 2], 0);
+    for seed in first..first + count {
+        match report(seed) {
+            Ok([motion, stop]) => {
+                sums[0] += motion;
+                sums[1] += stop;
+                stops += u32::from(motion >= stop * (1.0 - 1e-9));
+            }
+            Err(reason) => bad.push((seed, reason)),
+        }
+    }
+    println!(
+        "{count} lists: motion {:.3} s, exact stop {:.3} s, no gain {stops}, bad {}",
+        sums[0],
+        sums[1],
+        bad.len()
+    );
+    for (seed, reason) in bad.iter().take(20) {
+        println!("seed {seed}: {}", &reason[..reason.len().min(600)]);
+    }
+    assert!(bad.is_empty(), "{} of {count} lists failed", bad.len());
+}
+
+/// Windows: the committed time grows, the parts planned first are those
+/// executed, and the whole is as `plan` gives it.
+#[test]
+fn windows_commit_in_order() {
+    let limits = limits(&mut Random(5));
+    let poses: Vec<_> = (0..150)
+        .map(|i| Isometry3::translation(0.02 * f64::from(i), 0.01 * f64::from(i % 3), 0.0))
+        .collect();
+    let options = SmoothOptions::new(0.001, limits);
+    let mut windows = Windows::new(&poses, &options).unwrap();
+    let (mut committed, mut count) = (0.0, 0);
+    while windows.advance() {
+        assert!(windows.committed() > committed);
+        committed = windows.committed();
+        count += 1;
+    }
+    assert!(count > 3);
+    let plan = windows.finish();
+    assert_eq!(plan.duration(), committed);
+    assert!(plan.certificate().holds());
+    check(&plan, &poses, &options).unwrap();
+}
