@@ -12,6 +12,7 @@
 //! their own; the binary `canter` is three lines.
 
 mod client;
+mod arm_motion;
 mod commands;
 mod exit;
 mod failure;
@@ -28,6 +29,7 @@ mod robot;
 mod samples;
 mod simulation;
 mod table;
+mod world_file;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;

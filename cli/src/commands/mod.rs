@@ -15,7 +15,10 @@ mod pause;
 mod plan;
 mod recover;
 mod resume;
+mod plan_check;
+mod plan_run;
 mod robots;
+mod world;
 mod run;
 mod send;
 mod shutdown;
@@ -44,6 +47,9 @@ pub(crate) enum Command {
     Recover(recover::Recover),
     Resume(resume::Resume),
     Robots(robots::Robots),
+    World(world::World),
+    PlanCheck(plan_check::PlanCheck),
+    PlanRun(plan_run::PlanRun),
     Run(run::Run),
     Send(send::Send),
     Shutdown(shutdown::Shutdown),
@@ -69,6 +75,9 @@ impl Command {
             Self::Recover(command) => command.run(),
             Self::Resume(command) => command.run(),
             Self::Robots(command) => command.run(),
+            Self::World(command) => command.run(),
+            Self::PlanCheck(command) => command.run(),
+            Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),

@@ -82,12 +82,31 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        let trajectory = match motion.shape {
-            Shape::Joint => self.plan_joint(motion, start)?,
-            Shape::Straight => self.plan_straight(motion, start)?,
-            Shape::Smooth => self.plan_smooth(motion, start)?,
+        match motion.shape {
+            Shape::Joint => self.certify(motion, self.plan_joint(motion, start)?),
+            Shape::Straight => self.certify(motion, self.plan_straight(motion, start)?),
+            Shape::Smooth => self.smooth_move(motion, start),
+        }
+    }
+
+    /// The smooth motion in the tolerance asked for; where its certificate fails after
+    /// the joints had their say, in a quarter of it, and at last with a stop at each pose.
+    fn smooth_move(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        let attempt = |tolerance: f64| {
+            let tighter = Move { tolerance, ..motion.clone() };
+            self.certify(motion, self.plan_smooth(&tighter, start)?)
         };
-        self.certify(motion, trajectory)
+        attempt(motion.tolerance).or_else(|first| {
+            let uncertified = matches!(first, MotionError::Uncertified(_));
+            if !uncertified || motion.tolerance == 0.0 {
+                return Err(first);
+            }
+            attempt(0.25 * motion.tolerance).or_else(|_| attempt(0.0)).map_err(|_| first)
+        })
     }
 
     /// Slows the motion down, uniformly and by as little as needed, until every
