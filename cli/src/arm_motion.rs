@@ -32,28 +32,42 @@ pub(crate) fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanEr
     robot.mounted = None;
     let down = Isometry3::from_parts([0.0; 3].into(), pointing_down());
     let mut free: Vec<Isometry3<f64>> = Vec::new();
-    for holder in world.objects().filter(|o| o.class == Class::EndEffectorHolder) {
+    for holder in world
+        .objects()
+        .filter(|o| o.class == Class::EndEffectorHolder)
+    {
         if world.children(holder.id).next().is_none() {
             free.push(world.workstation_from(holder.id)? * down);
         }
     }
     for effector in world.objects().filter(|o| o.class.is_a(Class::EndEffector)) {
-        let on_arm = world.effector().is_some_and(|mounted| mounted.id == effector.id);
+        let on_arm = world
+            .effector()
+            .is_some_and(|mounted| mounted.id == effector.id);
         if on_arm {
             robot.mounted = Some(robot.end_effectors.len());
         }
         // The engine knows a holder as the place of one end effector; the one on the arm gets a
         // place that is free.
-        let workstation_from_holder =
-            if on_arm { free.pop() } else { Some(world.workstation_from(effector.id)?) };
+        let workstation_from_holder = if on_arm {
+            free.pop()
+        } else {
+            Some(world.workstation_from(effector.id)?)
+        };
         robot.end_effectors.push(EndEffector {
             name: effector.name.clone(),
             flange_from_tcp: Isometry3::translation(0.0, 0.0, effector.effector_length()),
-            gripper: Some(Gripper { opening: NOMINAL_S, closing: NOMINAL_S }),
+            gripper: Some(Gripper {
+                opening: NOMINAL_S,
+                closing: NOMINAL_S,
+            }),
             workstation_from_holder,
         });
     }
-    let nominal = ToolChanger { opening: NOMINAL_S, closing: NOMINAL_S };
+    let nominal = ToolChanger {
+        opening: NOMINAL_S,
+        closing: NOMINAL_S,
+    };
     robot.tool_changer.get_or_insert(nominal);
     Ok(())
 }
@@ -63,7 +77,10 @@ type Key = ([u64; 7], Option<String>);
 
 fn key(arm: &Isometry3<f64>, tool: Option<&str>) -> Key {
     let (t, r) = (arm.translation, arm.rotation.quaternion());
-    ([t.x, t.y, t.z, r.i, r.j, r.k, r.w].map(f64::to_bits), tool.map(str::to_owned))
+    (
+        [t.x, t.y, t.z, r.i, r.j, r.k, r.w].map(f64::to_bits),
+        tool.map(str::to_owned),
+    )
 }
 
 /// Where a batch ends, by its own account.
@@ -76,7 +93,10 @@ fn end_key(start: &Situation, batch: &Batch) -> Key {
         Some((_, tool)) => tool.as_ref(),
         None => start.tool.as_ref(),
     };
-    key(&arm.unwrap_or(start.arm), tool.map(|tool| tool.name.as_str()))
+    key(
+        &arm.unwrap_or(start.arm),
+        tool.map(|tool| tool.name.as_str()),
+    )
 }
 
 /// A driver that this process runs itself, in step with the engine.
@@ -106,8 +126,13 @@ impl OwnDriver {
                 tracing::error!("simulated driver: {error}");
             }
         };
-        let thread = std::thread::Builder::new().name("driver".into()).spawn(run)?;
-        Ok(Self { stop, thread: Some(thread) })
+        let thread = std::thread::Builder::new()
+            .name("driver".into())
+            .spawn(run)?;
+        Ok(Self {
+            stop,
+            thread: Some(thread),
+        })
     }
 }
 
@@ -138,7 +163,12 @@ impl<const N: usize> ArmMotion<N> {
         if let Some(session) = &session {
             mirror.set_joints(SVector::from_column_slice(&session.start));
         }
-        Ok(Self { mirror, session, known: HashMap::new(), times: HashMap::new() })
+        Ok(Self {
+            mirror,
+            session,
+            known: HashMap::new(),
+            times: HashMap::new(),
+        })
     }
 
     /// The end of the arm in the frame of the workstation (m).
@@ -148,7 +178,10 @@ impl<const N: usize> ArmMotion<N> {
 
     /// The controller as it is in this situation.
     fn controller(&self, start: &Situation) -> Result<Controller<N>, MotionFailure> {
-        let key = key(&start.arm, start.tool.as_ref().map(|tool| tool.name.as_str()));
+        let key = key(
+            &start.arm,
+            start.tool.as_ref().map(|tool| tool.name.as_str()),
+        );
         if let Some(known) = self.known.get(&key) {
             return Ok(known.clone());
         }
@@ -171,7 +204,10 @@ impl<const N: usize> ArmMotion<N> {
                 Ok(step) => ticks += step.ticks,
                 Err(error) => {
                     let reason = format!("{}: {error}", crcl::text::write_command(command));
-                    return Err(MotionFailure { command: index, reason });
+                    return Err(MotionFailure {
+                        command: index,
+                        reason,
+                    });
                 }
             }
         }
@@ -192,7 +228,9 @@ impl<const N: usize> ArmMotion<N> {
         let ids = session
             .submit(program.commands)
             .map_err(|full| failure(0, format!("the queue is full: {full}")))?;
-        let Some(last) = ids.last().copied() else { return Ok(()) };
+        let Some(last) = ids.last().copied() else {
+            return Ok(());
+        };
         let position = |id: u32| ids.iter().position(|known| *known == id).unwrap_or(0);
         let ends = matches!(batch.commands.last(), Some(Command::EndCanon { .. }));
         loop {
@@ -229,7 +267,10 @@ impl<const N: usize> Motion for ArmMotion<N> {
     }
 
     fn predict(&mut self, start: &Situation, batch: &Batch) -> Result<f64, MotionFailure> {
-        let key = key(&start.arm, start.tool.as_ref().map(|tool| tool.name.as_str()));
+        let key = key(
+            &start.arm,
+            start.tool.as_ref().map(|tool| tool.name.as_str()),
+        );
         let key = (key, format!("{:?}", batch.commands));
         if let Some(seconds) = self.times.get(&key)
             && self.known.contains_key(&end_key(start, batch))

@@ -11,8 +11,8 @@
 //! It is a library with one function so that the system tests run the same code as a process of
 //! their own; the binary `canter` is three lines.
 
-mod client;
 mod arm_motion;
+mod client;
 mod commands;
 mod exit;
 mod failure;

@@ -10,10 +10,15 @@ use crate::failure::Failure;
 /// Reads a workstation file (TOML, JSON, NIST's XML) or a database, by its extension.
 pub(crate) fn load(path: &Path) -> Result<Model, Failure> {
     let unreadable = |error: plan::PlanError| {
-        Failure::new(Exit::Unreadable, anyhow::anyhow!("{}: {error}", path.display()))
+        Failure::new(
+            Exit::Unreadable,
+            anyhow::anyhow!("{}: {error}", path.display()),
+        )
     };
     let Some(import) = importer(path) else {
-        return Reader::open(path).and_then(|reader| reader.model()).map_err(unreadable);
+        return Reader::open(path)
+            .and_then(|reader| reader.model())
+            .map_err(unreadable);
     };
     import(&read(path)?).map_err(unreadable)
 }
@@ -38,7 +43,10 @@ pub(crate) fn is_workstation_file(path: &Path) -> bool {
 /// The text of a file.
 pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|error| {
-        Failure::new(Exit::Unreadable, anyhow::anyhow!("{}: {error}", path.display()))
+        Failure::new(
+            Exit::Unreadable,
+            anyhow::anyhow!("{}: {error}", path.display()),
+        )
     })
 }
 
@@ -58,7 +66,11 @@ impl Database {
         } else {
             world.to_owned()
         };
-        let durability = if temporary { Durability::Process } else { Durability::Full };
+        let durability = if temporary {
+            Durability::Process
+        } else {
+            Durability::Full
+        };
         let unreadable = |error| Failure::new(Exit::Unreadable, error);
         if !temporary && !path.exists() {
             let missing = anyhow::anyhow!("{}: there is no such database", path.display());

@@ -8,7 +8,11 @@ use crcl::{ReadOptions, Reading, code, text};
 /// A file of the data folder beside the project; nothing where the folder does not exist.
 fn nist(name: &str) -> Option<Vec<u8>> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    std::fs::read(root.join("../../shared/data/nist/canonical-text").join(name)).ok()
+    std::fs::read(
+        root.join("../../shared/data/nist/canonical-text")
+            .join(name),
+    )
+    .ok()
 }
 
 fn read(name: &str) -> Option<Reading> {
@@ -33,12 +37,27 @@ fn sound_programs_have_no_findings() {
 
 #[test]
 fn commands_with_errors() {
-    let Some(reading) = read("commandsWithErrors") else { return };
-    let found: Vec<_> = reading.findings.iter().map(|f| (f.code, f.message.as_str())).collect();
+    let Some(reading) = read("commandsWithErrors") else {
+        return;
+    };
+    let found: Vec<_> = reading
+        .findings
+        .iter()
+        .map(|f| (f.code, f.message.as_str()))
+        .collect();
     let deserved = [
-        (code::FRACTION, "0.8 percent is very little: the range is 0 to 100"),
-        (code::FRACTION, "0.75 percent is very little: the range is 0 to 100"),
-        (code::PERCENT, "a percentage must be 0 to 100 percent, got -110"),
+        (
+            code::FRACTION,
+            "0.8 percent is very little: the range is 0 to 100",
+        ),
+        (
+            code::FRACTION,
+            "0.75 percent is very little: the range is 0 to 100",
+        ),
+        (
+            code::PERCENT,
+            "a percentage must be 0 to 100 percent, got -110",
+        ),
         (code::ARGUMENT_TYPE, "a pose is a point and two axes"),
     ];
     assert_eq!(found, deserved);

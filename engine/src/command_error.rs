@@ -53,7 +53,11 @@ pub struct CommandError {
 
 impl CommandError {
     pub(crate) fn new(class: ErrorClass, message: impl Into<String>) -> Self {
-        Self { class, message: message.into(), help: None }
+        Self {
+            class,
+            message: message.into(),
+            help: None,
+        }
     }
 
     pub(crate) fn range(message: impl Into<String>) -> Self {

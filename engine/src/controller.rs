@@ -51,10 +51,23 @@ impl<const N: usize> Controller<N> {
             limits.clone(),
             robot.joint_names(),
         );
-        let modal = Modal::new(robot.motion_limits(), robot.workstation_from_base, tooling, length);
+        let modal = Modal::new(
+            robot.motion_limits(),
+            robot.workstation_from_base,
+            tooling,
+            length,
+        );
         let joints = vector(&robot.home);
         let joint_names = robot.joint_names();
-        Ok(Self { workstation_from_flange, limits, joint_names, modal, planner, joints, rate_hz })
+        Ok(Self {
+            workstation_from_flange,
+            limits,
+            joint_names,
+            modal,
+            planner,
+            joints,
+            rate_hz,
+        })
     }
 
     /// Joints at the end of the last step.
@@ -107,20 +120,35 @@ impl<const N: usize> Controller<N> {
         let step = match task {
             Task::Move(motion) => {
                 let planned = self.planner.plan(&motion, &self.joints).map_err(|error| {
-                    CommandError::new(ErrorClass::Motion, error.to_string())
-                        .with_help(error.help())
+                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
                 })?;
                 self.joints = planned.end;
                 let ticks = self.ticks(planned.trajectory.duration());
-                Step { task: Task::Move(motion), planned: Some(planned), ticks }
+                Step {
+                    task: Task::Move(motion),
+                    planned: Some(planned),
+                    ticks,
+                }
             }
-            Task::Dwell { seconds } => Step { ticks: self.ticks(seconds), planned: None, task },
+            Task::Dwell { seconds } => Step {
+                ticks: self.ticks(seconds),
+                planned: None,
+                task,
+            },
             Task::Tool(action) => {
                 let time = self.modal.tooling().nominal_time(action);
                 self.change_tool();
-                Step { ticks: self.ticks(time), planned: None, task }
+                Step {
+                    ticks: self.ticks(time),
+                    planned: None,
+                    task,
+                }
             }
-            _ => Step { ticks: 0, planned: None, task },
+            _ => Step {
+                ticks: 0,
+                planned: None,
+                task,
+            },
         };
         Ok(step)
     }

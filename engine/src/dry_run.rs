@@ -253,7 +253,11 @@ fn planned_command<const N: usize>(
         Some(planned) => (planned.trajectory, Some(planned.certificate)),
         None => (Trajectory::new(Vec::new()), None),
     };
-    let motion = ArmMotion { trajectory, rest: before, chain: controller.chain().clone() };
+    let motion = ArmMotion {
+        trajectory,
+        rest: before,
+        chain: controller.chain().clone(),
+    };
     PlannedCommand {
         index: 0,
         line: 0,
@@ -331,11 +335,20 @@ EndCanon(0)
             assert!(plan.refusals.is_empty(), "{robot}: {:?}", plan.refusals);
             assert_eq!(plan.commands.len(), 10);
             for command in plan.commands.iter().filter_map(|c| c.certificate.as_ref()) {
-                assert!(command.peaks.largest() <= 1.0 + 1e-9, "{robot}: {command:?}");
+                assert!(
+                    command.peaks.largest() <= 1.0 + 1e-9,
+                    "{robot}: {command:?}"
+                );
             }
-            println!("{robot} {} s planned in {} s", plan.duration_s, plan.planning_s);
+            println!(
+                "{robot} {} s planned in {} s",
+                plan.duration_s, plan.planning_s
+            );
             for command in &plan.commands {
-                println!("{} {} {} {:?}", command.name, command.duration_s, command.planning_s, command.certificate);
+                println!(
+                    "{} {} {} {:?}",
+                    command.name, command.duration_s, command.planning_s, command.certificate
+                );
             }
         }
     }

@@ -11,8 +11,8 @@
 pub mod command_error;
 pub mod conformance;
 pub mod controller;
-mod dof;
 pub mod doctor;
+mod dof;
 pub mod dry_run;
 pub mod executor;
 pub mod modal;

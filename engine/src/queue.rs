@@ -43,7 +43,11 @@ impl Queue {
     /// An empty queue for at most `capacity` commands.
     #[must_use]
     pub fn new(capacity: usize) -> Self {
-        Self { commands: VecDeque::with_capacity(capacity), capacity, next_id: 1 }
+        Self {
+            commands: VecDeque::with_capacity(capacity),
+            capacity,
+            next_id: 1,
+        }
     }
 
     /// Appends a command and returns its number.
@@ -52,7 +56,9 @@ impl Queue {
     /// [`Full`], and the queue is as before.
     pub fn push(&mut self, located: Located) -> Result<u32, Full> {
         if self.commands.len() >= self.capacity {
-            return Err(Full { capacity: self.capacity });
+            return Err(Full {
+                capacity: self.capacity,
+            });
         }
         let id = self.next_id;
         self.next_id += 1;

@@ -256,22 +256,34 @@ impl Robot {
     /// Names of the joints, root first.
     #[must_use]
     pub fn joint_names(&self) -> Vec<String> {
-        self.model.joints.iter().map(|joint| joint.name.clone()).collect()
+        self.model
+            .joints
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect()
     }
 
     /// End effectors and holders as they are at the start: the gripper of
     /// the mounted end effector is open, all others are in their holders.
     #[must_use]
     pub fn tooling(&self) -> Tooling {
-        let holders = self.end_effectors.iter().enumerate().filter_map(|(index, tool)| {
-            Some(Holder {
-                name: tool.name.clone(),
-                workstation_from_flange: tool.workstation_from_holder?,
-                holds: (self.mounted != Some(index)).then_some(index),
-            })
-        });
+        let holders = self
+            .end_effectors
+            .iter()
+            .enumerate()
+            .filter_map(|(index, tool)| {
+                Some(Holder {
+                    name: tool.name.clone(),
+                    workstation_from_flange: tool.workstation_from_holder?,
+                    holds: (self.mounted != Some(index)).then_some(index),
+                })
+            });
         Tooling {
-            holders: if self.tool_changer.is_some() { holders.collect() } else { Vec::new() },
+            holders: if self.tool_changer.is_some() {
+                holders.collect()
+            } else {
+                Vec::new()
+            },
             end_effectors: self.end_effectors.clone(),
             mounted: self.mounted,
             gripper_open: self.mounted.map(|_| true),

@@ -42,7 +42,8 @@ impl Tooling {
     /// the mounted end effector, or the arm's end itself.
     #[must_use]
     pub fn flange_from_tool(&self) -> Isometry3<f64> {
-        self.mounted_tool().map_or_else(Isometry3::identity, |tool| tool.flange_from_tcp)
+        self.mounted_tool()
+            .map_or_else(Isometry3::identity, |tool| tool.flange_from_tcp)
     }
 
     /// Nominal time of an action in the present state, s.
@@ -114,7 +115,10 @@ impl Tooling {
             let name = &self.end_effectors[other].name;
             return Err(CommandError::new(
                 ErrorClass::ToolChange,
-                format!("holder {:?} already holds {name:?}", self.holders[holder].name),
+                format!(
+                    "holder {:?} already holds {name:?}",
+                    self.holders[holder].name
+                ),
             ));
         }
         self.holders[holder].holds = Some(tool);
@@ -174,7 +178,10 @@ impl Tooling {
                     self.holders[index].name
                 ),
             )),
-            None => Err(CommandError::new(ErrorClass::ToolChange, "the station has no holder")),
+            None => Err(CommandError::new(
+                ErrorClass::ToolChange,
+                "the station has no holder",
+            )),
         }
     }
 }
@@ -187,7 +194,10 @@ mod tests {
         let gripper = EndEffector {
             name: "gripper".into(),
             flange_from_tcp: Isometry3::translation(0.0, 0.0, 0.1),
-            gripper: Some(crate::robot::Gripper { opening: 0.2, closing: 0.2 }),
+            gripper: Some(crate::robot::Gripper {
+                opening: 0.2,
+                closing: 0.2,
+            }),
             workstation_from_holder: None,
         };
         let holder = Holder {
@@ -201,7 +211,10 @@ mod tests {
             mounted: Some(0),
             gripper_open: Some(true),
             changer_open: false,
-            changer: Some(ToolChanger { opening: 0.5, closing: 0.5 }),
+            changer: Some(ToolChanger {
+                opening: 0.5,
+                closing: 0.5,
+            }),
         }
     }
 
@@ -221,8 +234,9 @@ mod tests {
     fn nothing_is_dropped_away_from_a_holder() {
         let mut tools = tooling();
         let before = tools.clone();
-        let error =
-            tools.apply(ToolAction::OpenToolChanger, &Isometry3::identity()).unwrap_err();
+        let error = tools
+            .apply(ToolAction::OpenToolChanger, &Isometry3::identity())
+            .unwrap_err();
         assert_eq!(error.class, ErrorClass::ToolChange);
         assert!(error.message.contains("1000.0 mm"), "{error}");
         assert_eq!(tools, before);

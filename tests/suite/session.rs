@@ -43,7 +43,10 @@ impl Driver {
         let thread = std::thread::spawn(move || {
             driver_sim::run(options, &seen).unwrap();
         });
-        Self { stop, thread: Some(thread) }
+        Self {
+            stop,
+            thread: Some(thread),
+        }
     }
 }
 
@@ -56,7 +59,9 @@ impl Drop for Driver {
 
 /// Runs the program to its end and returns what was reported and recorded.
 fn run(robot: &Robot, clock: Clock, name: &str) -> (Vec<Note>, Vec<RunSample>) {
-    let arm: Arm = format!("test-{}/{name}", std::process::id()).parse().unwrap();
+    let arm: Arm = format!("test-{}/{name}", std::process::id())
+        .parse()
+        .unwrap();
     let _driver = Driver::start(robot, &arm);
     let mut config = SessionConfig::new(arm);
     config.clock = clock;
@@ -67,7 +72,15 @@ fn run(robot: &Robot, clock: Clock, name: &str) -> (Vec<Note>, Vec<RunSample>) {
     let mut notes = Vec::new();
     for _ in 0..600 {
         notes.extend(session.note(Duration::from_millis(100)));
-        let over = |note: &Note| matches!(note, Note::Done { name: "EndCanon", .. } | Note::Faulted { .. });
+        let over = |note: &Note| {
+            matches!(
+                note,
+                Note::Done {
+                    name: "EndCanon",
+                    ..
+                } | Note::Faulted { .. }
+            )
+        };
         if notes.iter().any(over) {
             break;
         }
@@ -87,7 +100,10 @@ fn planned(robot: &Robot) -> Vec<PlanSample> {
 /// Every setpoint of every move is the one of the dry run, in order, none left out.
 fn assert_equal_to_plan(run: &[RunSample], plan: &[PlanSample]) {
     for command in 0..12_u32 {
-        let dry: Vec<_> = plan.iter().filter(|s| s.command == command as usize).collect();
+        let dry: Vec<_> = plan
+            .iter()
+            .filter(|s| s.command == command as usize)
+            .collect();
         let moves = dry.windows(2).any(|pair| pair[0].q != pair[1].q);
         if !moves {
             continue;
@@ -101,7 +117,11 @@ fn assert_equal_to_plan(run: &[RunSample], plan: &[PlanSample]) {
         assert!(ran >= due, "command {command}: {ran} of {due} setpoints");
         for (wet, dry) in wet.iter().zip(&dry) {
             for (a, b) in wet.q.iter().zip(&dry.q) {
-                assert!((a - b).abs() < 1e-9, "command {command} at {} s", wet.path_time);
+                assert!(
+                    (a - b).abs() < 1e-9,
+                    "command {command} at {} s",
+                    wet.path_time
+                );
             }
         }
     }

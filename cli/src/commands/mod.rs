@@ -13,17 +13,17 @@ mod man;
 mod override_speed;
 mod pause;
 mod plan;
-mod recover;
-mod resume;
 mod plan_check;
 mod plan_run;
+mod recover;
+mod resume;
 mod robots;
-mod world;
 mod run;
 mod send;
 mod shutdown;
 mod status;
 mod stop;
+mod world;
 
 use clap::Subcommand;
 

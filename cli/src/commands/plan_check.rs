@@ -41,7 +41,11 @@ impl PlanCheck {
         } else {
             self.print(&source, &reading.plan, &findings)?;
         }
-        Ok(if has_errors(&findings) { Exit::Refused } else { Exit::Done })
+        Ok(if has_errors(&findings) {
+            Exit::Refused
+        } else {
+            Exit::Done
+        })
     }
 
     fn print_json(&self, source: &str, plan: &Plan, findings: &[Finding]) -> io::Result<()> {

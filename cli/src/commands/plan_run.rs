@@ -89,9 +89,20 @@ impl PlanRun {
         let mut robot = load(&self.robot)?;
         let (database, writer) = Database::open(&self.world, self.dry_run)?;
         equip(&mut robot, &writer.model().map_err(refused)?).map_err(refused)?;
-        let _driver = if self.sim { Some(OwnDriver::start(&robot, &self.arm)?) } else { None };
-        let session = if self.dry_run { None } else { Some(self.session(&robot)?) };
-        with_joints!(robot.dof(), execute(self, &robot, session, &database, writer))
+        let _driver = if self.sim {
+            Some(OwnDriver::start(&robot, &self.arm)?)
+        } else {
+            None
+        };
+        let session = if self.dry_run {
+            None
+        } else {
+            Some(self.session(&robot)?)
+        };
+        with_joints!(
+            robot.dof(),
+            execute(self, &robot, session, &database, writer)
+        )
     }
 
     fn session(&self, robot: &Robot) -> Result<Session, Failure> {
@@ -115,12 +126,20 @@ impl PlanRun {
     }
 
     fn robot_options(&self) -> RobotOptions {
-        RobotOptions { percent: Some(self.speed), ..RobotOptions::default() }
+        RobotOptions {
+            percent: Some(self.speed),
+            ..RobotOptions::default()
+        }
     }
 
     fn observe(&self, event: &Event) {
         match event {
-            Event::Statement { name, line, number, seconds } if self.verbose => {
+            Event::Statement {
+                name,
+                line,
+                number,
+                seconds,
+            } if self.verbose => {
                 output::note(&format!("{number}: line {line}, {name}, {seconds:.3} s"));
             }
             Event::Kit(number) => output::note(&format!("kit {number} is finished")),
@@ -157,13 +176,20 @@ impl PlanRun {
             },
             choose_order: !self.written_order,
         };
-        let cell = Cell { writer, reader, motion, factotum: &mut factotum };
+        let cell = Cell {
+            writer,
+            reader,
+            motion,
+            factotum: &mut factotum,
+        };
         let mut controller = match source {
             Some(source) => Controller::start(cell, source, &self.parameters()?, &stock, options),
             None => Controller::resume(cell, options),
         }
         .map_err(refused)?;
-        let report = controller.run(&mut |event| self.observe(event)).map_err(refused)?;
+        let report = controller
+            .run(&mut |event| self.observe(event))
+            .map_err(refused)?;
         self.print(&report)?;
         Ok(match report.code {
             0 => Exit::Done,
@@ -179,18 +205,31 @@ impl PlanRun {
         let mut out = io::stdout().lock();
         let c = &report.counters;
         if let Some(reason) = &report.reason {
-            writeln!(out, "{}: {reason} (EndCanon({}))", report.outcome, report.code)?;
+            writeln!(
+                out,
+                "{}: {reason} (EndCanon({}))",
+                report.outcome, report.code
+            )?;
         }
         writeln!(
             out,
             "{} kits: {} statements, {} commands, {} pick-ups, {} put-downs, {} moves above, {} end effector changes, {} factotum calls",
-            c.kits, c.statements, c.commands, c.pick_ups, c.put_downs, c.moves_above,
-            c.end_effector_changes, c.factotum_calls
+            c.kits,
+            c.statements,
+            c.commands,
+            c.pick_ups,
+            c.put_downs,
+            c.moves_above,
+            c.end_effector_changes,
+            c.factotum_calls
         )?;
         writeln!(
             out,
             "{:.3} s of motion, {:.3} s gained by chosen orders, {:.3} s by the clock on the wall, {} warnings",
-            c.motion_s, c.gained_s, report.wall_s, report.warnings.len()
+            c.motion_s,
+            c.gained_s,
+            report.wall_s,
+            report.warnings.len()
         )
     }
 
@@ -223,7 +262,11 @@ impl PlanRun {
                 writeln!(out, "{}: {reason}", report.outcome)?;
             }
             let (steps, commands) = (report.steps, report.commands);
-            writeln!(out, "{steps} steps, {commands} commands, {:.3} s of motion", report.motion_s)?;
+            writeln!(
+                out,
+                "{steps} steps, {commands} commands, {:.3} s of motion",
+                report.motion_s
+            )?;
         }
         Ok(match report.code {
             0 => Exit::Done,
@@ -256,5 +299,7 @@ fn is_pddl(source: &str) -> bool {
     let code = |line: &&str| !line.is_empty() && !line.starts_with(';');
     let first = source.lines().map(str::trim).find(code).unwrap_or_default();
     first.starts_with('(')
-        || first.split_once(':').is_some_and(|(time, _)| time.trim().parse::<f64>().is_ok())
+        || first
+            .split_once(':')
+            .is_some_and(|(time, _)| time.trim().parse::<f64>().is_ok())
 }

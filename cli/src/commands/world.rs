@@ -65,7 +65,11 @@ impl World {
             }
             What::Export { world, json } => {
                 let model = world_file::load(world)?;
-                let text = if *json { export_json(&model) } else { export_toml(&model) };
+                let text = if *json {
+                    export_json(&model)
+                } else {
+                    export_toml(&model)
+                };
                 let text = text.map_err(|error| Failure::new(Exit::Unreadable, error))?;
                 io::stdout().lock().write_all(text.as_bytes())?;
                 Ok(Exit::Done)
@@ -75,11 +79,15 @@ impl World {
 }
 
 fn show(model: &Model) -> Result<Exit, Failure> {
-    let workstation = model.workstation().map_err(|error| Failure::new(Exit::Refused, error))?;
+    let workstation = model
+        .workstation()
+        .map_err(|error| Failure::new(Exit::Refused, error))?;
     let mut out = BufWriter::new(io::stdout().lock());
     let mut open: Vec<(ObjectId, usize)> = vec![(workstation.id, 0)];
     while let Some((id, depth)) = open.pop() {
-        let Ok(object) = model.object(id) else { continue };
+        let Ok(object) = model.object(id) else {
+            continue;
+        };
         let place = match model.workstation_from(id) {
             Ok(pose) => {
                 let t = pose.translation;
@@ -87,10 +95,20 @@ fn show(model: &Model) -> Result<Exit, Failure> {
             }
             Err(_) => format!("{} it", object.location.relation.name()),
         };
-        let sku = object.sku().map(|sku| format!(" {sku}")).unwrap_or_default();
+        let sku = object
+            .sku()
+            .map(|sku| format!(" {sku}"))
+            .unwrap_or_default();
         let indent = depth * 2;
-        writeln!(out, "{:indent$}{} [{}{sku}] {place}", "", object.name, object.class)?;
-        let mut children: Vec<_> = model.children(id).map(|child| (child.id, depth + 1)).collect();
+        writeln!(
+            out,
+            "{:indent$}{} [{}{sku}] {place}",
+            "", object.name, object.class
+        )?;
+        let mut children: Vec<_> = model
+            .children(id)
+            .map(|child| (child.id, depth + 1))
+            .collect();
         children.reverse();
         open.extend(children);
     }
@@ -100,7 +118,9 @@ fn show(model: &Model) -> Result<Exit, Failure> {
 
 fn report(model: &Model, json: bool) -> Result<Exit, Failure> {
     let concerns = check(model);
-    let bad = concerns.iter().any(|concern| concern.severity == Severity::Error);
+    let bad = concerns
+        .iter()
+        .any(|concern| concern.severity == Severity::Error);
     if json {
         let list: Vec<_> = concerns
             .iter()
@@ -112,7 +132,11 @@ fn report(model: &Model, json: bool) -> Result<Exit, Failure> {
     } else {
         let mut out = io::stdout().lock();
         for concern in &concerns {
-            let severity = if concern.severity == Severity::Error { "error" } else { "warning" };
+            let severity = if concern.severity == Severity::Error {
+                "error"
+            } else {
+                "warning"
+            };
             writeln!(out, "{severity}: {}: {}", concern.subject, concern.message)?;
         }
         let verdict = if bad { "not consistent" } else { "consistent" };

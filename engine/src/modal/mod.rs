@@ -120,7 +120,9 @@ impl Modal {
             }
             Command::Message { text } => Ok(Task::Message { text: text.clone() }),
             Command::Dwell { seconds } => Ok(Task::Dwell { seconds: *seconds }),
-            Command::StopMotion { emergency } => Ok(Task::Stop { emergency: *emergency != 0 }),
+            Command::StopMotion { emergency } => Ok(Task::Stop {
+                emergency: *emergency != 0,
+            }),
             Command::OpenGripper => self.tool(ToolAction::OpenGripper, workstation_from_flange),
             Command::CloseGripper => self.tool(ToolAction::CloseGripper, workstation_from_flange),
             Command::OpenToolChanger => {
@@ -129,12 +131,16 @@ impl Modal {
             Command::CloseToolChanger => {
                 self.tool(ToolAction::CloseToolChanger, workstation_from_flange)
             }
-            Command::MoveTo { pose } => {
-                self.motion(Shape::Joint, std::slice::from_ref(pose), workstation_from_flange)
-            }
-            Command::MoveStraightTo { pose } => {
-                self.motion(Shape::Straight, std::slice::from_ref(pose), workstation_from_flange)
-            }
+            Command::MoveTo { pose } => self.motion(
+                Shape::Joint,
+                std::slice::from_ref(pose),
+                workstation_from_flange,
+            ),
+            Command::MoveStraightTo { pose } => self.motion(
+                Shape::Straight,
+                std::slice::from_ref(pose),
+                workstation_from_flange,
+            ),
             Command::MoveSmoothlyTo { poses } | Command::MoveThroughTo { poses } => {
                 self.motion(Shape::Smooth, poses, workstation_from_flange)
             }
@@ -158,8 +164,10 @@ impl Modal {
             }
         }
         if self.state == CanonState::Ready && matches!(command, Command::InitCanon) {
-            return Err(CommandError::sequence("InitCanon in a program that has begun already")
-                .with_help("end the running program with EndCanon(0) first"));
+            return Err(
+                CommandError::sequence("InitCanon in a program that has begun already")
+                    .with_help("end the running program with EndCanon(0) first"),
+            );
         }
         Ok(())
     }
@@ -195,7 +203,12 @@ impl Modal {
             })
             .collect::<Result<_, _>>()?;
         let tolerance = self.settings.intermediate_point;
-        Ok(Task::Move(Move { shape, poses, tolerance, limits }))
+        Ok(Task::Move(Move {
+            shape,
+            poses,
+            tolerance,
+            limits,
+        }))
     }
 
     fn set(&mut self, command: &Command) -> Result<Task, CommandError> {
@@ -237,12 +250,20 @@ mod tests {
     }
 
     fn modal() -> Modal {
-        Modal::new(maxima(), Isometry3::identity(), Tooling::default(), LengthUnit::default())
+        Modal::new(
+            maxima(),
+            Isometry3::identity(),
+            Tooling::default(),
+            LengthUnit::default(),
+        )
     }
 
     fn run(modal: &mut Modal, commands: &[Command]) -> Result<Vec<Task>, CommandError> {
         let flange = Isometry3::identity();
-        commands.iter().map(|command| modal.resolve(command, &flange)).collect()
+        commands
+            .iter()
+            .map(|command| modal.resolve(command, &flange))
+            .collect()
     }
 
     #[test]
@@ -264,7 +285,9 @@ mod tests {
             &mut modal,
             &[
                 Command::InitCanon,
-                Command::SetLengthUnits { unit: LengthUnit::Inch },
+                Command::SetLengthUnits {
+                    unit: LengthUnit::Inch,
+                },
                 Command::SetAbsoluteSpeed { value: 10.0 },
                 Command::EndCanon { reason: 0 },
                 Command::InitCanon,
@@ -296,8 +319,14 @@ mod tests {
             z_axis: [0.0, 0.0, 1.0],
             x_axis: [1.0, 0.0, 0.0],
         };
-        run(&mut modal, &[Command::InitCanon, Command::SetRelativeSpeed { percent: 0.0 }])
-            .unwrap();
+        run(
+            &mut modal,
+            &[
+                Command::InitCanon,
+                Command::SetRelativeSpeed { percent: 0.0 },
+            ],
+        )
+        .unwrap();
         assert!(run(&mut modal, &[Command::MoveTo { pose }]).is_err());
     }
 

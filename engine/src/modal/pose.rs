@@ -19,10 +19,17 @@ pub fn isometry(
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
     let position = Vector3::from(pose.point()) * length.metres();
     if let Some(&value) = position.iter().find(|value| !value.is_finite()) {
-        return Err(ValueError::NotFinite { quantity: "a coordinate in metres", value }.into());
+        return Err(ValueError::NotFinite {
+            quantity: "a coordinate in metres",
+            value,
+        }
+        .into());
     }
     let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
-    Ok(Isometry3::from_parts(Translation3::from(position), rotation))
+    Ok(Isometry3::from_parts(
+        Translation3::from(position),
+        rotation,
+    ))
 }
 
 #[cfg(test)]

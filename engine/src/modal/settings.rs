@@ -70,8 +70,7 @@ impl Settings {
             }
             Command::SetAbsoluteAcceleration { value } => {
                 let asked = value * length;
-                self.acceleration =
-                    absolute("acceleration", asked, maxima.acceleration, "m/s2")?;
+                self.acceleration = absolute("acceleration", asked, maxima.acceleration, "m/s2")?;
             }
             Command::SetRelativeSpeed { percent } => {
                 self.speed = (percent / 100.0) * maxima.speed;
@@ -101,8 +100,10 @@ fn positive(what: &str, value: f64, help: &str) -> Result<(), CommandError> {
     if value > 0.0 {
         return Ok(());
     }
-    Err(CommandError::range(format!("{what} is zero, so the move would never end"))
-        .with_help(format!("set it with {help}")))
+    Err(
+        CommandError::range(format!("{what} is zero, so the move would never end"))
+            .with_help(format!("set it with {help}")),
+    )
 }
 
 fn absolute(what: &str, value: f64, maximum: f64, unit: &str) -> Result<f64, CommandError> {

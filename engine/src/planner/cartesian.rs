@@ -37,8 +37,11 @@ impl<const N: usize> Planner<N> {
         }
         let line = Line::new(from, goal);
         let points = self.followed(&line, start, &|_| 1)?;
-        let options =
-            TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
+        let options = TimingOptions {
+            start: Boundary::Rest,
+            end: Boundary::Rest,
+            ..Default::default()
+        };
         let path = joint_path(&line, &points)?;
         time_path(&path, &self.limits, &motion.limits, &options)
             .map(|timed| timed.trajectory)
@@ -55,12 +58,17 @@ impl<const N: usize> Planner<N> {
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         let plan = smooth::plan(&poses, &options)
             .map_err(|error| MotionError::Smooth(error.to_string()))?;
-        let towards = |u: f64| 1 + plan.passes().iter().take_while(|pass| pass.time <= u).count();
+        let towards = |u: f64| {
+            1 + plan
+                .passes()
+                .iter()
+                .take_while(|pass| pass.time <= u)
+                .count()
+        };
         let points = self.followed(&plan, start, &towards)?;
         let direct = Trajectory::new(pieces(&points));
         let samples = certificate::tool_samples(self.chain(), &direct);
-        let stretch =
-            certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
+        let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
         if stretch <= 1.0 + 1e-4 {
             return Ok(direct);
         }
@@ -105,8 +113,16 @@ impl<const N: usize> Planner<N> {
         towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
         let tool = |u: f64| {
-            let ToolPoint { pose, linear, angular } = curve.at(u);
-            TwistPoint { pose, linear, angular }
+            let ToolPoint {
+                pose,
+                linear,
+                angular,
+            } = curve.at(u);
+            TwistPoint {
+                pose,
+                linear,
+                angular,
+            }
         };
         let options = follow::FollowOptions::default();
         follow::follow(&self.solver, &tool, grid, start, &options)
@@ -119,7 +135,9 @@ impl<const N: usize> Planner<N> {
         end: f64,
         towards: &dyn Fn(f64) -> usize,
     ) -> MotionError {
-        let joint = error.joint.map_or_else(String::new, |joint| self.joint_name(joint));
+        let joint = error
+            .joint
+            .map_or_else(String::new, |joint| self.joint_name(joint));
         let cause = match (error.cause, error.joint) {
             (FollowCause::Limit, Some(index)) => format!(
                 "joint {joint} would pass its limit by {}",
@@ -132,18 +150,30 @@ impl<const N: usize> Planner<N> {
             (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
             (_, _) => error.to_string(),
         };
-        MotionError::Blocked { pose: towards(error.u), percent: 100.0 * error.u / end, cause }
+        MotionError::Blocked {
+            pose: towards(error.u),
+            percent: 100.0 * error.u / end,
+            cause,
+        }
     }
 }
 
 fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {
     let [position, velocity, acceleration, jerk] = point.q;
-    Sample { position, velocity, acceleration, jerk }
+    Sample {
+        position,
+        velocity,
+        acceleration,
+        jerk,
+    }
 }
 
 /// Quintics between followed points, in the parameter of the curve.
 fn pieces<const N: usize>(points: &[FollowPoint<N>]) -> Vec<Piece<N>> {
-    points.windows(2).map(|pair| piece(&pair[0], &pair[1])).collect()
+    points
+        .windows(2)
+        .map(|pair| piece(&pair[0], &pair[1]))
+        .collect()
 }
 
 fn piece<const N: usize>(from: &FollowPoint<N>, to: &FollowPoint<N>) -> Piece<N> {
@@ -154,7 +184,10 @@ fn joint_path<'a, const N: usize>(
     curve: &'a dyn ToolCurve,
     points: &[FollowPoint<N>],
 ) -> Result<HermitePath<N, &'a dyn ToolCurve>, MotionError> {
-    let points = points.iter().map(|point| (point.u, JointPoint { q: point.q })).collect();
+    let points = points
+        .iter()
+        .map(|point| (point.u, JointPoint { q: point.q }))
+        .collect();
     HermitePath::new(points, curve)
         .ok_or_else(|| MotionError::Timing("the way has fewer than two points".into()))
 }

@@ -45,12 +45,15 @@ impl Peaks {
     #[must_use]
     pub fn stretch(&self) -> f64 {
         let most = |ratios: &[f64]| ratios.iter().copied().fold(0.0, f64::max);
-        let speed =
-            most(&self.joint_velocity).max(self.tool_speed).max(self.tool_angular_speed);
+        let speed = most(&self.joint_velocity)
+            .max(self.tool_speed)
+            .max(self.tool_angular_speed);
         let acceleration = most(&self.joint_acceleration)
             .max(self.tool_acceleration)
             .max(self.tool_angular_acceleration);
-        speed.max(acceleration.sqrt()).max(most(&self.joint_jerk).cbrt())
+        speed
+            .max(acceleration.sqrt())
+            .max(most(&self.joint_jerk).cbrt())
     }
 
     /// The largest ratio of all.
@@ -154,9 +157,8 @@ pub(super) fn peaks<const N: usize>(
     let ratios = |peak: &SVector<f64, N>, limit: &SVector<f64, N>| {
         peak.component_div(limit).as_slice().to_vec()
     };
-    let most = |of: fn(&ToolSample) -> f64, limit: f64| {
-        tool.iter().map(of).fold(0.0, f64::max) / limit
-    };
+    let most =
+        |of: fn(&ToolSample) -> f64, limit: f64| tool.iter().map(of).fold(0.0, f64::max) / limit;
     Peaks {
         joint_velocity: ratios(&joint.velocity, &joints.velocity),
         joint_acceleration: ratios(&joint.acceleration, &joints.acceleration),
@@ -190,7 +192,11 @@ pub(super) fn way<const N: usize>(
     let straight = motion.shape == Shape::Straight;
     let straightness_m = straight.then(|| straightness(samples));
     let end = chain.forward(&trajectory.sample(trajectory.duration()).position);
-    let gap = motion.poses.last().map(|goal| goal.inv_mul(&end)).unwrap_or_default();
+    let gap = motion
+        .poses
+        .last()
+        .map(|goal| goal.inv_mul(&end))
+        .unwrap_or_default();
     Way {
         poses,
         in_order,
@@ -201,11 +207,17 @@ pub(super) fn way<const N: usize>(
 }
 
 fn straightness(samples: &[ToolSample]) -> f64 {
-    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return 0.0 };
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return 0.0;
+    };
     let origin = first.pose.translation.vector;
     let direction = last.pose.translation.vector - origin;
     let length = direction.norm();
-    let along = if length > 0.0 { direction / length } else { Vector3::zeros() };
+    let along = if length > 0.0 {
+        direction / length
+    } else {
+        Vector3::zeros()
+    };
     let off = |sample: &ToolSample| {
         let way = sample.pose.translation.vector - origin;
         (way - along * way.dot(&along)).norm()
@@ -228,7 +240,10 @@ fn passes<const N: usize>(
         let target = pose.translation.vector;
         let distance = |i: usize| (samples[i].pose.translation.vector - target).norm();
         let at = first_approach(from, samples.len(), motion.tolerance, distance);
-        let window = (samples[at.saturating_sub(1)].time, samples[(at + 1).min(samples.len() - 1)].time);
+        let window = (
+            samples[at.saturating_sub(1)].time,
+            samples[(at + 1).min(samples.len() - 1)].time,
+        );
         let near = |t: f64| {
             let pose = chain.forward(&trajectory.sample(t).position);
             (pose.translation.vector - target).norm()
@@ -262,7 +277,11 @@ fn first_approach(
         let falls_before = i == from || here <= distance(i - 1);
         let rises_after = i + 1 == count || here < distance(i + 1);
         // Between samples the approach may be nearer than at them, hence the slack.
-        let reach = if i + 1 < count { (distance(i + 1) - here).abs() } else { 0.0 };
+        let reach = if i + 1 < count {
+            (distance(i + 1) - here).abs()
+        } else {
+            0.0
+        };
         if falls_before && rises_after && here <= tolerance.max(EXACT) + reach {
             return i;
         }
@@ -290,5 +309,9 @@ fn closest((mut low, mut high): (f64, f64), distance: impl Fn(f64) -> f64) -> (f
             at_right = distance(right);
         }
     }
-    if at_left <= at_right { (left, at_left) } else { (right, at_right) }
+    if at_left <= at_right {
+        (left, at_left)
+    } else {
+        (right, at_right)
+    }
 }

@@ -27,7 +27,11 @@ impl<const N: usize> Planner<N> {
         let mut refusal = None;
         for goal in &goals {
             match self.joint_move(motion, start, goal) {
-                Ok(found) if best.as_ref().is_none_or(|b| found.duration() < b.duration()) => {
+                Ok(found)
+                    if best
+                        .as_ref()
+                        .is_none_or(|b| found.duration() < b.duration()) =>
+                {
                     best = Some(found);
                 }
                 Ok(_) => {}
@@ -43,8 +47,12 @@ impl<const N: usize> Planner<N> {
         pose: &Isometry3<f64>,
         start: &SVector<f64, N>,
     ) -> Result<Vec<SVector<f64, N>>, MotionError> {
-        let mut goals: Vec<SVector<f64, N>> =
-            self.solver.solve_all(pose).iter().map(|branch| branch.q).collect();
+        let mut goals: Vec<SVector<f64, N>> = self
+            .solver
+            .solve_all(pose)
+            .iter()
+            .map(|branch| branch.q)
+            .collect();
         match self.solver.nearest(pose, start) {
             Ok(solution) => goals.push(solution.q),
             Err(report) if goals.is_empty() => return Err(self.refusal(1, &report)),
@@ -55,7 +63,10 @@ impl<const N: usize> Planner<N> {
 
     /// Time for the slowest joint at constant velocity, s: cheap, and a good order.
     fn effort(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
-        (goal - start).abs().component_div(&self.limits.velocity).max()
+        (goal - start)
+            .abs()
+            .component_div(&self.limits.velocity)
+            .max()
     }
 
     fn joint_move(
@@ -106,8 +117,11 @@ impl<const N: usize> Planner<N> {
         let chain = self.chain();
         let tool = |joint: &trajectory::JointPoint<N>| tool_point(chain, joint);
         let line = JointLine::new(*start, *goal, tool);
-        let options =
-            TimingOptions { start: Boundary::Rest, end: Boundary::Rest, ..Default::default() };
+        let options = TimingOptions {
+            start: Boundary::Rest,
+            end: Boundary::Rest,
+            ..Default::default()
+        };
         time_path(&line, &self.limits, &motion.limits, &options)
             .map(|timed| timed.trajectory)
             .map_err(|error| MotionError::Timing(error.to_string()))
@@ -116,17 +130,19 @@ impl<const N: usize> Planner<N> {
     /// The report of the solver in the words of a command.
     fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
         match report.obstacle {
-            Obstacle::OutOfReach { distance } => {
-                MotionError::OutOfReach { pose, millimetres: distance * 1e3 }
-            }
+            Obstacle::OutOfReach { distance } => MotionError::OutOfReach {
+                pose,
+                millimetres: distance * 1e3,
+            },
             Obstacle::AtLimit { joint, beyond } => MotionError::BeyondLimit {
                 pose,
                 joint: self.joint_name(joint),
                 beyond: self.amount(joint, beyond),
             },
-            Obstacle::Orientation { angle } => {
-                MotionError::Orientation { pose, degrees: angle.to_degrees() }
-            }
+            Obstacle::Orientation { angle } => MotionError::Orientation {
+                pose,
+                degrees: angle.to_degrees(),
+            },
             _ => MotionError::Unsolved {
                 pose,
                 millimetres: report.position_error * 1e3,
@@ -151,5 +167,9 @@ fn tool_point<const N: usize>(chain: &Chain<N>, joint: &JointPoint<N>) -> ToolPo
         jacobian * dddq + change * ddq * 2.0 + second * dq,
     ];
     let part = |row: usize| twists.map(|twist| twist.fixed_rows::<3>(row).into_owned());
-    ToolPoint { pose, linear: part(0), angular: part(3) }
+    ToolPoint {
+        pose,
+        linear: part(0),
+        angular: part(3),
+    }
 }

@@ -51,7 +51,12 @@ impl<const N: usize> Planner<N> {
         joint_names: Vec<String>,
     ) -> Self {
         let solver = Solver::new(chain.clone().with_tool(&flange_from_tool));
-        Self { solver, limits, joint_names, flange_from_tool }
+        Self {
+            solver,
+            limits,
+            joint_names,
+            flange_from_tool,
+        }
     }
 
     /// The tool that this planner was made for.
@@ -97,7 +102,10 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         let attempt = |tolerance: f64| {
-            let tighter = Move { tolerance, ..motion.clone() };
+            let tighter = Move {
+                tolerance,
+                ..motion.clone()
+            };
             self.certify(motion, self.plan_smooth(&tighter, start)?)
         };
         attempt(motion.tolerance).or_else(|first| {
@@ -105,7 +113,9 @@ impl<const N: usize> Planner<N> {
             if !uncertified || motion.tolerance == 0.0 {
                 return Err(first);
             }
-            attempt(0.25 * motion.tolerance).or_else(|_| attempt(0.0)).map_err(|_| first)
+            attempt(0.25 * motion.tolerance)
+                .or_else(|_| attempt(0.0))
+                .map_err(|_| first)
         })
     }
 
@@ -132,13 +142,21 @@ impl<const N: usize> Planner<N> {
         };
         check(&certificate, motion)?;
         let end = trajectory.sample(trajectory.duration()).position;
-        Ok(PlannedMove { trajectory, certificate, end })
+        Ok(PlannedMove {
+            trajectory,
+            certificate,
+            end,
+        })
     }
 
     fn within_limits(&self, trajectory: Trajectory<N>, limits: &ToolLimits) -> Trajectory<N> {
         let samples = certificate::tool_samples(self.chain(), &trajectory);
         let stretch = certificate::peaks(&trajectory, &samples, &self.limits, limits).stretch();
-        if stretch <= 1.0 { trajectory } else { trajectory.stretched(stretch) }
+        if stretch <= 1.0 {
+            trajectory
+        } else {
+            trajectory.stretched(stretch)
+        }
     }
 
     fn margin(&self, trajectory: &Trajectory<N>) -> f64 {
@@ -149,7 +167,10 @@ impl<const N: usize> Planner<N> {
     }
 
     fn joint_name(&self, joint: usize) -> String {
-        self.joint_names.get(joint).cloned().unwrap_or_else(|| format!("{}", joint + 1))
+        self.joint_names
+            .get(joint)
+            .cloned()
+            .unwrap_or_else(|| format!("{}", joint + 1))
     }
 
     /// A joint quantity with the unit that people read.
@@ -182,11 +203,16 @@ fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), MotionError
         return fault("the straight line is not straight within 0.01 mm".into());
     }
     if certificate.end_deviation_m > ARRIVED.0 || certificate.end_angle_rad > ARRIVED.1 {
-        return fault(format!("it ends {:.6} mm off", certificate.end_deviation_m * 1e3));
+        return fault(format!(
+            "it ends {:.6} mm off",
+            certificate.end_deviation_m * 1e3
+        ));
     }
     if certificate.joint_margin < -ROUNDING {
         let beyond = -certificate.joint_margin;
-        return fault(format!("a joint goes {beyond:.3e} beyond its position limit"));
+        return fault(format!(
+            "a joint goes {beyond:.3e} beyond its position limit"
+        ));
     }
     Ok(())
 }

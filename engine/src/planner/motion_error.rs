@@ -45,7 +45,9 @@ pub enum MotionError {
         degrees: f64,
     },
     /// The way to the pose leaves what the arm can do.
-    #[error("the way cannot be followed at {percent:.1} % of its length, towards pose {pose}: {cause}")]
+    #[error(
+        "the way cannot be followed at {percent:.1} % of its length, towards pose {pose}: {cause}"
+    )]
     Blocked {
         /// Pose that the arm was on its way to.
         pose: usize,
@@ -71,7 +73,9 @@ impl MotionError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::OutOfReach { .. } => "move the pose nearer to the arm; check units and frame",
-            Self::BeyondLimit { .. } | Self::Orientation { .. } => "turn the tool, or move the pose",
+            Self::BeyondLimit { .. } | Self::Orientation { .. } => {
+                "turn the tool, or move the pose"
+            }
             Self::Unsolved { .. } => "check the pose with `canter ik`",
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"

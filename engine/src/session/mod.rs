@@ -162,13 +162,31 @@ impl Session {
             .name("planner".to_owned())
             .stack_size(16 << 20)
             .spawn(move || {
-                let ends = worker::Ends { orders: receiver, notes: tell, shared: seen };
+                let ends = worker::Ends {
+                    orders: receiver,
+                    notes: tell,
+                    shared: seen,
+                };
                 with_dof!(robot.dof(), N => worker::run::<N>(&robot, &config, ends, &begin));
             })
-            .map_err(|cause| SessionError::Thread { cause: cause.to_string() })?;
+            .map_err(|cause| SessionError::Thread {
+                cause: cause.to_string(),
+            })?;
         let begun = begun.recv().unwrap_or(Err(SessionError::Closed))?;
-        let Begun { warning, driver, start } = begun;
-        Ok(Self { orders, notes, shared, worker: Some(worker), warning, driver, start })
+        let Begun {
+            warning,
+            driver,
+            start,
+        } = begun;
+        Ok(Self {
+            orders,
+            notes,
+            shared,
+            worker: Some(worker),
+            warning,
+            driver,
+            start,
+        })
     }
 
     /// Appends commands to the queue: all of them or none.
@@ -209,13 +227,23 @@ impl Session {
     /// Where the session is.
     #[must_use]
     pub fn status(&self) -> Status {
-        self.shared.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.shared
+            .status
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// What was recorded since the last call.
     #[must_use]
     pub fn samples(&self) -> Vec<RunSample> {
-        std::mem::take(&mut *self.shared.samples.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(
+            &mut *self
+                .shared
+                .samples
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner),
+        )
     }
 
     /// Stops the arm on the path, says goodbye to the driver and ends both threads.

@@ -149,8 +149,7 @@ impl<const N: usize> Worker<'_, N> {
         self.read_orders();
         self.read_reports();
         self.report_done();
-        if self.flight.len() < AHEAD && self.work.is_empty() && !self.held && self.fault.is_none()
-        {
+        if self.flight.len() < AHEAD && self.work.is_empty() && !self.held && self.fault.is_none() {
             self.take_next();
         }
         self.feed();
@@ -185,7 +184,9 @@ impl<const N: usize> Worker<'_, N> {
 
     fn submit(&mut self, commands: Vec<crcl::Located>) -> Result<Vec<u32>, Full> {
         if self.queue.len() + commands.len() > self.config.capacity {
-            return Err(Full { capacity: self.config.capacity });
+            return Err(Full {
+                capacity: self.config.capacity,
+            });
         }
         let mut ids = Vec::with_capacity(commands.len());
         for located in commands {
@@ -193,7 +194,9 @@ impl<const N: usize> Worker<'_, N> {
                 && !self.flight.is_empty()
             {
                 // A stop does not wait behind what it is to stop.
-                self.control(Control::Stop { fast: emergency != 0 });
+                self.control(Control::Stop {
+                    fast: emergency != 0,
+                });
             }
             ids.push(self.queue.push(located)?);
         }
@@ -209,7 +212,9 @@ impl<const N: usize> Worker<'_, N> {
 
     /// Takes the next command off the queue and turns it into work.
     fn take_next(&mut self) {
-        let Some(queued) = self.queue.pop() else { return };
+        let Some(queued) = self.queue.pop() else {
+            return;
+        };
         let command = &queued.located.command;
         let mut flight = InFlight {
             id: queued.id,
@@ -240,7 +245,13 @@ impl<const N: usize> Worker<'_, N> {
                     FailurePolicy::Skip => 0,
                 };
                 let (id, line, name) = (flight.id, flight.line, flight.name);
-                flight.says = Some(Note::Refused { id, line, name, error, dropped });
+                flight.says = Some(Note::Refused {
+                    id,
+                    line,
+                    name,
+                    error,
+                    dropped,
+                });
                 flight.refused = true;
                 flight.finished = Some(0);
             }
@@ -256,7 +267,11 @@ impl<const N: usize> Worker<'_, N> {
             Task::End { reason } => flight.says = Some(Note::Ended { reason }),
             Task::Dwell { .. } if step.ticks > 0 => {
                 let piece = Piece::hold(*self.controller.joints(), flight.planned_s);
-                self.work.push_back(Work::Motion(Segment { piece, command, last: true }));
+                self.work.push_back(Work::Motion(Segment {
+                    piece,
+                    command,
+                    last: true,
+                }));
                 return;
             }
             Task::Tool(action) => {
@@ -266,10 +281,17 @@ impl<const N: usize> Worker<'_, N> {
             }
             _ => {}
         }
-        let pieces = step.planned.as_ref().map_or(&[][..], |planned| planned.trajectory.pieces());
+        let pieces = step
+            .planned
+            .as_ref()
+            .map_or(&[][..], |planned| planned.trajectory.pieces());
         for (index, piece) in pieces.iter().enumerate() {
             let last = index + 1 == pieces.len();
-            self.work.push_back(Work::Motion(Segment { piece: *piece, command, last }));
+            self.work.push_back(Work::Motion(Segment {
+                piece: *piece,
+                command,
+                last,
+            }));
         }
         if pieces.is_empty() {
             flight.finished = Some(0);
@@ -301,13 +323,21 @@ impl<const N: usize> Worker<'_, N> {
     fn on_event(&mut self, event: Event) {
         match event {
             Event::Started { command, tick } => {
-                let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) else { return };
+                let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) else {
+                    return;
+                };
                 flight.started = Some(tick);
                 let (id, line, name) = (flight.id, flight.line, flight.name);
                 let planned_s = flight.planned_s;
                 // What came before has ended, and is reported before.
                 self.report_done();
-                self.say(Note::Started { id, line, name, planned_s, tick });
+                self.say(Note::Started {
+                    id,
+                    line,
+                    name,
+                    planned_s,
+                    tick,
+                });
             }
             Event::Finished { command, tick } => {
                 if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
@@ -324,7 +354,12 @@ impl<const N: usize> Worker<'_, N> {
                 let (blame, reason) = (blame(&fault), fault.to_string());
                 let dropped = self.drop_all();
                 self.fault = Some(reason.clone());
-                self.say(Note::Faulted { blame, reason, tick, dropped });
+                self.say(Note::Faulted {
+                    blame,
+                    reason,
+                    tick,
+                    dropped,
+                });
             }
             Event::Recovered { .. } => {
                 let dropped = self.drop_all();
@@ -350,8 +385,14 @@ impl<const N: usize> Worker<'_, N> {
 
     /// Reports, in order, every command that has ended.
     fn report_done(&mut self) {
-        while self.flight.front().is_some_and(|flight| flight.finished.is_some()) {
-            let Some(flight) = self.flight.pop_front() else { return };
+        while self
+            .flight
+            .front()
+            .is_some_and(|flight| flight.finished.is_some())
+        {
+            let Some(flight) = self.flight.pop_front() else {
+                return;
+            };
             if let Some(note) = flight.says {
                 self.say(note);
             }
@@ -364,12 +405,20 @@ impl<const N: usize> Worker<'_, N> {
                 _ => 0,
             };
             let (id, line, name) = (flight.id, flight.line, flight.name);
-            self.say(Note::Done { id, line, name, ticks });
+            self.say(Note::Done {
+                id,
+                line,
+                name,
+                ticks,
+            });
         }
     }
 
     fn record(&self, sample: &Recorded<N>) {
-        let flight = self.flight.iter().find(|flight| flight.id == sample.command);
+        let flight = self
+            .flight
+            .iter()
+            .find(|flight| flight.id == sample.command);
         let chain = flight.map_or(&self.chain, |flight| &flight.chain);
         let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
         let measured = SVector::from(sample.measured);
@@ -385,13 +434,20 @@ impl<const N: usize> Worker<'_, N> {
             measured_pose: chain.forward(&measured),
         };
         let samples = &self.ends.shared.samples;
-        samples.lock().unwrap_or_else(PoisonError::into_inner).push(recorded);
+        samples
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(recorded);
     }
 
     fn write_status(&self, robot: &Robot, driver: &str) {
         let now = self.remote.measured();
-        let mut status =
-            self.ends.shared.status.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut status = self
+            .ends
+            .shared
+            .status
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         self.config.arm.to_string().clone_into(&mut status.arm);
         robot.name.clone_into(&mut status.robot);
         driver.clone_into(&mut status.driver);
@@ -422,7 +478,12 @@ fn tool_order(command: u32, action: ToolAction, nominal: f64) -> ToolOrder {
         ToolAction::OpenToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Open),
         ToolAction::CloseToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Close),
     };
-    ToolOrder { command, tool, action, timeout: nominal + TOOL_PATIENCE }
+    ToolOrder {
+        command,
+        tool,
+        action,
+        timeout: nominal + TOOL_PATIENCE,
+    }
 }
 
 fn blame(fault: &Fault) -> Blame {
