@@ -354,6 +354,15 @@ EndCanon(0)
     }
 
     #[test]
+    fn a_long_path_of_a_redundant_arm_begins_where_the_arm_is() {
+        let robot = crate::robot::load("panda").unwrap();
+        let text = include_str!("../../examples/long_smooth_path.canon");
+        let program = crcl::text::read(text, &crcl::ReadOptions::default()).program;
+        let plan = plan_program(&robot, &program, &PlanOptions::default()).unwrap();
+        assert!(plan.refusals.is_empty(), "{:?}", plan.refusals);
+    }
+
+    #[test]
     fn two_dry_runs_are_equal() {
         let (a, b) = (planned("ur5e"), planned("ur5e"));
         assert!(a.samples(0.01).eq(b.samples(0.01)));

@@ -49,6 +49,9 @@ pub struct FollowOptions {
     pub accuracy: f64,
     /// Most points, those that are added included.
     pub most_points: usize,
+    /// Whether the spare motion of an arm with more than six joints rests at both ends: so
+    /// where the parameter is a time and the tool itself rests there.
+    pub still_ends: bool,
 }
 
 impl Default for FollowOptions {
@@ -56,6 +59,7 @@ impl Default for FollowOptions {
         Self {
             accuracy: 1e-7,
             most_points: 50_000,
+            still_ends: false,
         }
     }
 }

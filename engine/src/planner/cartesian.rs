@@ -36,7 +36,7 @@ impl<const N: usize> Planner<N> {
             return Ok(Trajectory::new(Vec::new()));
         }
         let line = Line::new(from, goal);
-        let points = self.followed(&line, start, &|_| 1)?;
+        let points = self.followed((&line, false), start, &|_| 1)?;
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
@@ -65,7 +65,7 @@ impl<const N: usize> Planner<N> {
                 .take_while(|pass| pass.time <= u)
                 .count()
         };
-        let points = self.followed(&plan, start, &towards)?;
+        let points = self.followed((&plan, true), start, &towards)?;
         let direct = Trajectory::new(pieces(&points));
         let samples = certificate::tool_samples(self.chain(), &direct);
         let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
@@ -90,43 +90,50 @@ impl<const N: usize> Planner<N> {
     /// enough that a quintic between its points stays on the curve.
     fn followed(
         &self,
-        curve: &dyn ToolCurve,
+        (curve, still_ends): (&dyn ToolCurve, bool),
         start: &SVector<f64, N>,
         towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let mut points = self.solved(curve, &first_grid(curve), start, towards)?;
+        let way = Way {
+            curve,
+            still_ends,
+            towards,
+        };
+        let mut points = self.solved(&way, &first_grid(curve), start)?;
         for _ in 0..REFINEMENTS {
             let finer = refined(self.chain(), &points, curve);
             if finer.len() == points.len() || finer.len() > MOST_POINTS {
                 break;
             }
-            points = self.solved(curve, &finer, start, towards)?;
+            points = self.solved(&way, &finer, start)?;
         }
         Ok(points)
     }
 
     fn solved(
         &self,
-        curve: &dyn ToolCurve,
+        way: &Way<'_>,
         grid: &[f64],
         start: &SVector<f64, N>,
-        towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
         let tool = |u: f64| {
             let ToolPoint {
                 pose,
                 linear,
                 angular,
-            } = curve.at(u);
+            } = way.curve.at(u);
             TwistPoint {
                 pose,
                 linear,
                 angular,
             }
         };
-        let options = follow::FollowOptions::default();
+        let options = follow::FollowOptions {
+            still_ends: way.still_ends,
+            ..Default::default()
+        };
         follow::follow(&self.solver, &tool, grid, start, &options)
-            .map_err(|error| self.blocked(&error, curve.end(), towards))
+            .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
     fn blocked(
@@ -156,6 +163,14 @@ impl<const N: usize> Planner<N> {
             cause,
         }
     }
+}
+
+/// A curve of the tool, whether it rests at both ends in its own parameter, and the
+/// pose of the command that a parameter is on the way to.
+struct Way<'a> {
+    curve: &'a dyn ToolCurve,
+    still_ends: bool,
+    towards: &'a dyn Fn(f64) -> usize,
 }
 
 fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {

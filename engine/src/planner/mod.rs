@@ -88,8 +88,8 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         match motion.shape {
-            Shape::Joint => self.certify(motion, self.plan_joint(motion, start)?),
-            Shape::Straight => self.certify(motion, self.plan_straight(motion, start)?),
+            Shape::Joint => self.certify(motion, start, self.plan_joint(motion, start)?),
+            Shape::Straight => self.certify(motion, start, self.plan_straight(motion, start)?),
             Shape::Smooth => self.smooth_move(motion, start),
         }
     }
@@ -106,7 +106,7 @@ impl<const N: usize> Planner<N> {
                 tolerance,
                 ..motion.clone()
             };
-            self.certify(motion, self.plan_smooth(&tighter, start)?)
+            self.certify(motion, start, self.plan_smooth(&tighter, start)?)
         };
         attempt(motion.tolerance).or_else(|first| {
             let uncertified = matches!(first, MotionError::Uncertified(_));
@@ -124,8 +124,10 @@ impl<const N: usize> Planner<N> {
     fn certify(
         &self,
         motion: &Move,
+        start: &SVector<f64, N>,
         trajectory: Trajectory<N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        check_smooth(&trajectory, start)?;
         let trajectory = self.within_limits(trajectory, &motion.limits);
         let samples = certificate::tool_samples(self.chain(), &trajectory);
         let peaks = certificate::peaks(&trajectory, &samples, &self.limits, &motion.limits);
@@ -180,6 +182,38 @@ impl<const N: usize> Planner<N> {
             _ => format!("{:.2} degrees", value.to_degrees()),
         }
     }
+}
+
+/// Largest jump of a joint between two pieces, and from the start, rad or m.
+const JUMP: f64 = 1e-9;
+
+/// Position may not jump anywhere, and nothing may move at either end; velocity
+/// and acceleration follow from the limits of the pieces.
+fn check_smooth<const N: usize>(
+    trajectory: &Trajectory<N>,
+    start: &SVector<f64, N>,
+) -> Result<(), MotionError> {
+    let fault = |what: String| Err(MotionError::Uncertified(what));
+    let mut last = realtime::Sample::rest(*start);
+    for (index, piece) in trajectory.pieces().iter().enumerate() {
+        let first = piece.sample(0.0);
+        let jump = (first.position - last.position).amax();
+        if !jump.is_finite() || jump > JUMP {
+            return fault(format!(
+                "piece {index} begins {jump:.1e} from where the arm is"
+            ));
+        }
+        let jump = (first.velocity - last.velocity).amax();
+        if !jump.is_finite() || jump > 1e-6 {
+            return fault(format!("the velocity jumps by {jump:.1e} at piece {index}"));
+        }
+        last = piece.sample(piece.duration);
+    }
+    let speed = last.velocity.amax();
+    if !speed.is_finite() || speed > 1e-6 {
+        return fault(format!("it ends at a velocity of {speed:.1e}"));
+    }
+    Ok(())
 }
 
 /// Largest deviation from a straight line, m.

@@ -44,7 +44,8 @@ pub(super) fn search<const N: usize>(
         .enumerate()
         .map(|(i, column)| {
             let offset = (*column as f64 - SIDE as f64) * STEP;
-            (i as f64 / LAYERS as f64, offset)
+            let [progress, ..] = still.progress(i as f64 / LAYERS as f64);
+            (progress, offset)
         })
         .collect();
     let base = still.at(still.from)[0];
@@ -161,8 +162,8 @@ fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
     Some(way)
 }
 
-/// Least-squares polynomial of a degree up to 5 through points `(x, offset)`, with
-/// offset zero at x = 0, added to `base`.
+/// Least-squares polynomial of a degree up to 5 through points `(progress, offset)`, with
+/// offset zero at the start, added to `base`.
 fn fit(points: &[(f64, f64)], base: f64, degree: usize) -> Option<Course> {
     let mut normal = SMatrix::<f64, 5, 5>::identity();
     let mut right = SVector::<f64, 5>::zeros();

@@ -22,6 +22,7 @@ pub(super) struct Spare<const N: usize> {
     pub(super) from: f64,
     pub(super) span: f64,
     u: f64,
+    still_ends: bool,
 }
 
 impl<const N: usize> Spare<N> {
@@ -33,6 +34,7 @@ impl<const N: usize> Spare<N> {
             from: 0.0,
             span: 1.0,
             u: 0.0,
+            still_ends: false,
         }
     }
 
@@ -49,23 +51,50 @@ impl<const N: usize> Spare<N> {
 
     /// Value of each course at `u`.
     pub(super) fn at(&self, u: f64) -> [f64; 2] {
-        let x = (u - self.from) / self.span;
+        let [w, ..] = self.progress((u - self.from) / self.span);
         self.courses
-            .map(|course| course.iter().rev().fold(0.0, |sum, c| sum * x + c))
+            .map(|course| course.iter().rev().fold(0.0, |sum, c| sum * w + c))
     }
 
-    /// First to third derivative of each course to `u`.
+    /// Progress of the courses and its first three derivatives at `x` from 0 to 1: `x`
+    /// itself, or the shape `10 x^3 - 15 x^4 + 6 x^5`, which rests at both ends.
+    pub(super) fn progress(&self, x: f64) -> [f64; 4] {
+        if !self.still_ends {
+            return [x, 1.0, 0.0, 0.0];
+        }
+        let x = x.clamp(0.0, 1.0);
+        let y = 1.0 - x;
+        [
+            x * x * x * (10.0 - 15.0 * x + 6.0 * x * x),
+            30.0 * x * x * y * y,
+            60.0 * x * y * (1.0 - 2.0 * x),
+            60.0 * (1.0 - 6.0 * x * y),
+        ]
+    }
+
+    /// First to third derivative of each course to `u`, by the chain rule through its progress.
     pub(super) fn rates(&self) -> [[f64; 3]; 2] {
-        let x = (self.u - self.from) / self.span;
+        let [w, w1, w2, w3] = self.progress((self.u - self.from) / self.span);
         self.courses.map(|course| {
             let mut c = course;
-            std::array::from_fn(|_| {
+            let [r1, r2, r3]: [f64; 3] = std::array::from_fn(|_| {
                 for k in 0..5 {
-                    c[k] = c[k + 1] * (k as f64 + 1.0) / self.span;
+                    c[k] = c[k + 1] * (k as f64 + 1.0);
                 }
                 c[5] = 0.0;
-                c.iter().rev().fold(0.0, |sum, c| sum * x + c)
-            })
+                c.iter().rev().fold(0.0, |sum, c| sum * w + c)
+            });
+            let to_x = [
+                r1 * w1,
+                r2 * w1 * w1 + r1 * w2,
+                r3 * w1 * w1 * w1 + 3.0 * r2 * w1 * w2 + r1 * w3,
+            ];
+            let span = self.span;
+            [
+                to_x[0] / span,
+                to_x[1] / (span * span),
+                to_x[2] / (span * span * span),
+            ]
         })
     }
 }
@@ -91,6 +120,7 @@ pub(super) fn resolve<const N: usize>(
         from,
         span: to - from,
         u: from,
+        still_ends: task.options.still_ends,
     };
     let first = task.trace(start, &still);
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
