@@ -3,6 +3,7 @@
 //!
 //! Each peer is measured in the same run, in turns with ours. Last come lines
 //! `ratio <name> <ours/peer>`.
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -362,11 +363,10 @@ fn ping(ratios: &mut Vec<(String, f64)>) {
         ..Setpoint::default()
     };
     let ours = trips(TRIPS, |sequence| {
-        link.send(Setpoint {
-            sequence,
-            published_ns: ipc::now_ns(),
-            ..setpoint
-        });
+        let mut next = setpoint;
+        next.sequence = sequence;
+        next.published_ns = ipc::now_ns();
+        link.send(next);
         let end = Instant::now() + Duration::from_secs(1);
         loop {
             if let Some(state) = link.last_state()

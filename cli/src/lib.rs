@@ -52,7 +52,7 @@ struct Arguments {
 
 /// Runs the process: parses the arguments, runs the command, reports a failure on standard error.
 ///
-/// The exit codes are part of the command line's contract, see [`Exit`].
+/// The exit codes are part of the command line's contract, see `exit.rs`.
 pub fn main() -> ExitCode {
     logging::start();
     let arguments = match Arguments::try_parse() {

@@ -209,7 +209,8 @@ impl ProgramFile {
                     && finding.span.start < refusal.span.end
                     && refusal.span.start < finding.span.end.max(finding.span.start + 1)
             });
-            if !known && !(explained && refusal.error.class == ErrorClass::Sequence) {
+            let repeats = explained && refusal.error.class == ErrorClass::Sequence;
+            if !(known || repeats) {
                 findings.push(finding(refusal));
             }
         }

@@ -47,6 +47,12 @@ pub struct Clause {
 /// What a clause comes to: what was seen, as good or as bad.
 type Seen = Result<String, String>;
 
+/// A clause and how it is tried.
+type Named<F> = (&'static str, F);
+
+/// One trial with an open session.
+type Trial = fn(&mut Player) -> Seen;
+
 /// Tests the driver of `arm`, which has `joints` joints. Takes about ten seconds.
 ///
 /// # Errors
@@ -60,14 +66,14 @@ pub fn test_driver(arm: &Arm, joints: usize) -> Result<Vec<Clause>, IpcError> {
         "handshake",
         Ok(format!("session {:#x}", player.ack.session)),
     )];
-    let requests: [(&'static str, fn(&mut Hello)); 4] = [
+    let requests: [Named<fn(&mut Hello)>; 4] = [
         ("wrong protocol is refused", |hello| hello.protocol += 1),
         ("wrong layout is refused", |hello| hello.schema ^= 1),
         ("wrong joint count is refused", |hello| hello.joints += 1),
         ("wrong period is refused", |hello| hello.period_ns = 1),
     ];
     clauses.extend(requests.map(|(name, change)| judge(name, player.refuses(change))));
-    let sessions: [(&'static str, fn(&mut Player) -> Seen); 11] = [
+    let sessions: [Named<Trial>; 11] = [
         ("states come at the rate", Player::rate),
         ("a setpoint of another session is ignored", Player::foreign),
         ("becomes active by holding", Player::holds),

@@ -48,7 +48,7 @@ impl<const N: usize> Controller<N> {
         let planner = Planner::new(
             &workstation_from_flange,
             tooling.flange_from_tool(),
-            limits.clone(),
+            limits,
             robot.joint_names(),
         );
         let modal = Modal::new(
@@ -165,7 +165,7 @@ impl<const N: usize> Controller<N> {
             self.planner = Planner::new(
                 &self.workstation_from_flange,
                 flange_from_tool,
-                self.limits.clone(),
+                self.limits,
                 self.joint_names.clone(),
             );
         }

@@ -256,7 +256,7 @@ fn planned_command<const N: usize>(
     let motion = ArmMotion {
         trajectory,
         rest: before,
-        chain: controller.chain().clone(),
+        chain: *controller.chain(),
     };
     PlannedCommand {
         index: 0,

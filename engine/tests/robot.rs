@@ -1,4 +1,6 @@
 //! Robot folders: the shipped ones, broken ones, imported ones.
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use engine::robot::{self, RobotError};
 use nalgebra::{SMatrix, Vector3};

@@ -349,7 +349,9 @@ fn a_hog_of_the_processors() {
                     low_latency: false,
                 });
                 let end = Instant::now() + Duration::from_millis(400);
-                while Instant::now() < end && !stop.load(std::sync::atomic::Ordering::Relaxed) {}
+                while Instant::now() < end && !stop.load(std::sync::atomic::Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
             });
         }
     });

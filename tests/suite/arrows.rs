@@ -150,7 +150,7 @@ fn fences_inside_crates_hold() {
     let urdf = root().join("kinematics/src/urdf.rs");
     for path in sources("kinematics/src") {
         let text = fs::read_to_string(&path).unwrap();
-        let names_k = text.lines().any(|line| names_crate_k(line));
+        let names_k = text.lines().any(names_crate_k);
         assert!(!names_k || path == urdf, "{} names k", path.display());
     }
     let realtime = fs::read_to_string(root().join("realtime/src/lib.rs")).unwrap();

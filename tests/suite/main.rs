@@ -1,4 +1,5 @@
 //! All system tests as one binary: one link step instead of one a file.
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 mod arrows;

@@ -58,13 +58,13 @@ impl Drop for Driver {
 }
 
 /// Runs the program to its end and returns what was reported and recorded.
-fn run(robot: &Robot, clock: Clock, name: &str) -> (Vec<Note>, Vec<RunSample>) {
+fn run(robot: &Robot, name: &str) -> (Vec<Note>, Vec<RunSample>) {
     let arm: Arm = format!("test-{}/{name}", std::process::id())
         .parse()
         .unwrap();
     let _driver = Driver::start(robot, &arm);
     let mut config = SessionConfig::new(arm);
-    config.clock = clock;
+    config.clock = Clock::LockStep;
     config.record = true;
     let session = Session::start(robot, &config).unwrap();
     let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
@@ -140,7 +140,7 @@ fn names_done(notes: &[Note]) -> Vec<&'static str> {
 #[test]
 fn a_program_runs_in_step_with_the_driver() {
     let robot = engine::robot::load("ur5e").unwrap();
-    let (notes, samples) = run(&robot, Clock::LockStep, "step");
+    let (notes, samples) = run(&robot, "step");
     assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
     assert_equal_to_plan(&samples, &planned(&robot));
     let off = |s: &RunSample| {
@@ -149,12 +149,4 @@ fn a_program_runs_in_step_with_the_driver() {
     };
     let worst = samples.iter().map(off).fold(0.0, f64::max);
     assert!(worst < 2e-3, "the driver is {worst} m off its setpoint");
-}
-
-#[test]
-fn a_program_runs_by_the_clock() {
-    let robot = engine::robot::load("ur5e").unwrap();
-    let (notes, samples) = run(&robot, Clock::Wall, "wall");
-    assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
-    assert_equal_to_plan(&samples, &planned(&robot));
 }

@@ -194,7 +194,7 @@ mod tests {
             coefficients in prop::array::uniform6(-2.0..2.0_f64),
             duration in 0.01..3.0_f64,
         ) {
-            let coefficients = coefficients.map(|c| SVector::<f64, 1>::new(c));
+            let coefficients = coefficients.map(SVector::<f64, 1>::new);
             let motion = Trajectory::new(vec![Piece { duration, coefficients }]);
             let (peaks, (low, high)) = (motion.peaks(), motion.position_range());
             let (mut velocity, mut acceleration, mut jerk) = (0.0_f64, 0.0_f64, 0.0_f64);

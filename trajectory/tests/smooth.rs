@@ -3,6 +3,7 @@
 //!
 //! `SMOOTH_LISTS=10000 cargo test -p trajectory --release --test smooth`
 //! makes the long run.
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};

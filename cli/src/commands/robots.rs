@@ -182,6 +182,7 @@ fn description(robot: &Robot, home: &Isometry3<f64>) -> Value {
     })
 }
 
+#[allow(clippy::too_many_lines, reason = "a table, printed from top to bottom")]
 fn table(robot: &Robot, home: &Isometry3<f64>) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let (joints, tool) = (&robot.joints, &robot.tool);

@@ -87,7 +87,7 @@ impl Run {
             signalled: 0,
             deadline: None,
         }
-        .to_the_end(&program)
+        .finish_program(&program)
     }
 }
 
@@ -103,7 +103,7 @@ struct Running {
 }
 
 impl Running {
-    fn to_the_end(mut self, program: &ProgramFile) -> Result<Exit, Failure> {
+    fn finish_program(mut self, program: &ProgramFile) -> Result<Exit, Failure> {
         let commands = program.program().commands.clone();
         let count = commands.len();
         let ids = self

@@ -50,7 +50,7 @@ impl<const N: usize> Planner<N> {
         limits: JointLimits<N>,
         joint_names: Vec<String>,
     ) -> Self {
-        let solver = Solver::new(chain.clone().with_tool(&flange_from_tool));
+        let solver = Solver::new(chain.with_tool(&flange_from_tool));
         Self {
             solver,
             limits,
@@ -224,7 +224,7 @@ const ARRIVED: (f64, f64) = (1e-6, 1e-6);
 fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), MotionError> {
     let fault = |what: String| Err(MotionError::Uncertified(what));
     let largest = certificate.peaks.largest();
-    if !(largest <= 1.0 + ROUNDING) {
+    if largest.is_nan() || largest > 1.0 + ROUNDING {
         return fault(format!("a limit is exceeded {largest:.6} times"));
     }
     if !certificate.in_order {

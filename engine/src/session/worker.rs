@@ -128,7 +128,7 @@ fn start<'a, const N: usize>(
     let worker = Worker {
         config,
         queue: Queue::new(config.capacity),
-        chain: controller.chain().clone(),
+        chain: *controller.chain(),
         controller,
         feeder,
         monitor,
@@ -221,7 +221,7 @@ impl<const N: usize> Worker<'_, N> {
             line: queued.located.line,
             name: command.name(),
             planned_s: 0.0,
-            chain: self.controller.chain().clone(),
+            chain: *self.controller.chain(),
             started: None,
             finished: None,
             says: None,

@@ -83,11 +83,7 @@ impl ActionTable {
 
     fn find(&self, step: &PlanStep) -> Result<&Entry, String> {
         let mut arities = Vec::new();
-        for entry in self
-            .action
-            .iter()
-            .filter(|e| e.names.iter().any(|n| *n == step.name))
-        {
+        for entry in self.action.iter().filter(|e| e.names.contains(&step.name)) {
             if entry.arguments.len() == step.objects.len() {
                 return Ok(entry);
             }

@@ -50,6 +50,10 @@ pub fn read_plan(source: &str) -> Result<Vec<PlanStep>, PddlError> {
     Ok(steps)
 }
 
+#[allow(
+    clippy::too_many_lines,
+    reason = "one line of a plan, read from left to right"
+)]
 fn read_line(
     source: &str,
     start: usize,

@@ -415,6 +415,10 @@ impl<'a> Controller<'a> {
         self.move_only(&batch)
     }
 
+    #[allow(
+        clippy::too_many_lines,
+        reason = "the order of one step is its meaning"
+    )]
     fn step(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<(), PlanError> {
         // Late binding: the interpreter reads the world before each step.
         if self.reader.revision()? != self.model.revision {

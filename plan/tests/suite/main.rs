@@ -1,4 +1,5 @@
 //! Tests of plans and the world model, one binary.
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bad_plans;
