@@ -1,19 +1,25 @@
 #!/usr/bin/env bash
-# All of CI. Run it before you push; it needs nothing but Rust and a C and C++ compiler.
+# All checks; run it before you push. `./check.sh tests` runs the tests alone, as CI does.
+# It needs nothing but Rust and a C and C++ compiler.
 # With cargo-nextest installed the tests run in parallel processes, without it as usual.
 set -euo pipefail
 cd "$(dirname "$0")"
 
 step() { printf '\n== %s\n' "$*"; "$@"; }
 
-step cargo fmt --all --check
-step cargo clippy --workspace --all-targets --locked -- -D warnings
-RUSTDOCFLAGS="-D warnings" step cargo doc --workspace --no-deps --locked
+if [ "${1-}" != tests ]; then
+    step cargo fmt --all --check
+    step cargo clippy --workspace --all-targets --locked -- -D warnings
+    RUSTDOCFLAGS="-D warnings" step cargo doc --workspace --no-deps --locked
+fi
 if cargo nextest --version >/dev/null 2>&1; then
     step cargo nextest run --workspace --locked
     step cargo test --workspace --doc --locked
 else
     step cargo test --workspace --locked
+fi
+if [ "${1-}" = tests ]; then
+    exit
 fi
 if command -v cargo-deny >/dev/null 2>&1; then
     step cargo deny --offline check bans licenses sources

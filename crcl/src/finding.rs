@@ -27,7 +27,7 @@ pub struct Note {
 
 /// One fault or doubt about a program: what is wrong, where, and what would put it right.
 ///
-/// [`crate::report`] renders findings for people and for machines.
+/// The crate's `render` shows findings for people and for machines.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// Error or warning.

@@ -57,19 +57,18 @@ impl<const N: usize> Spare<N> {
     }
 
     /// Progress of the courses and its first three derivatives at `x` from 0 to 1: `x`
-    /// itself, or the shape `10 x^3 - 15 x^4 + 6 x^5`, which rests at both ends.
+    /// itself, or a shape that rises from rest in the first [`EASE`] of the way, goes on
+    /// evenly and comes to rest in the last.
     pub(super) fn progress(&self, x: f64) -> [f64; 4] {
         if !self.still_ends {
             return [x, 1.0, 0.0, 0.0];
         }
         let x = x.clamp(0.0, 1.0);
-        let y = 1.0 - x;
-        [
-            x * x * x * (10.0 - 15.0 * x + 6.0 * x * x),
-            30.0 * x * x * y * y,
-            60.0 * x * y * (1.0 - 2.0 * x),
-            60.0 * (1.0 - 6.0 * x * y),
-        ]
+        if x <= 0.5 {
+            return eased(x);
+        }
+        let [w, w1, w2, w3] = eased(1.0 - x);
+        [1.0 - w, w1, -w2, w3]
     }
 
     /// First to third derivative of each course to `u`, by the chain rule through its progress.
@@ -97,6 +96,25 @@ impl<const N: usize> Spare<N> {
             ]
         })
     }
+}
+
+/// Part of the way in which a course gets going, where it begins at rest.
+const EASE: f64 = 0.2;
+
+/// First half of an eased progress: its rate is `10 t^3 - 15 t^4 + 6 t^5` of what it
+/// becomes, `t` from 0 to 1 over [`EASE`].
+fn eased(x: f64) -> [f64; 4] {
+    let even = 1.0 / (1.0 - EASE);
+    if x >= EASE {
+        return [even * (x - 0.5 * EASE), even, 0.0, 0.0];
+    }
+    let t = x / EASE;
+    [
+        even * EASE * t.powi(4) * (2.5 - 3.0 * t + t * t),
+        even * t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t),
+        even / EASE * 30.0 * (t * (1.0 - t)).powi(2),
+        even / (EASE * EASE) * 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t),
+    ]
 }
 
 /// Distance from a limit, rad or m, that counts as well inside.
