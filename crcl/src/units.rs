@@ -46,7 +46,7 @@ impl LengthUnit {
     /// How many metres one of this unit is.
     ///
     /// ```
-    /// assert_eq!(12.0 * crcl::LengthUnit::Inch.metres(), 0.3048);
+    /// assert!((12.0 * crcl::LengthUnit::Inch.metres() - 0.3048).abs() < 1e-15);
     /// ```
     pub fn metres(self) -> f64 {
         match self {
