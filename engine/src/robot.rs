@@ -152,6 +152,20 @@ pub fn load(name_or_folder: &str) -> Result<Robot, RobotError> {
     }
 }
 
+/// Reads a robot from the texts of its two files, without touching the disk.
+///
+/// # Errors
+/// [`RobotError`]; faults name file, line and column.
+pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
+    file::Files {
+        name,
+        place: Path::new(name),
+        urdf,
+        toml,
+    }
+    .read()
+}
+
 fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
     let read = |file: &str| {
         let path = folder.join(file);

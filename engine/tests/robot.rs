@@ -175,3 +175,47 @@ fn a_urdf_is_imported() {
     assert!(robot::import(Path::new("none.urdf"), &folder, None).is_err());
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+/// Damaged `robot.toml` files: an answer or an error, never a panic.
+#[test]
+fn damaged_files_are_answered() {
+    let (urdf, toml) = (shipped("robot.urdf"), shipped("robot.toml"));
+    let count = std::env::var("CANTER_FUZZ_CASES")
+        .ok()
+        .and_then(|count| count.parse().ok());
+    let mut state = 51_u64;
+    let mut draw = |below: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below.max(1)
+    };
+    let pieces = [
+        "nan",
+        "inf",
+        "-1",
+        "[[",
+        "]",
+        "=",
+        "\"",
+        "#",
+        "1e999",
+        "\u{0}",
+        "mounted = 3\n",
+    ];
+    let (mut read, mut refused) = (0, 0);
+    for _ in 0..count.unwrap_or(1000) {
+        let mut bytes = toml.as_bytes().to_vec();
+        for _ in 0..=draw(4) {
+            let from = draw(bytes.len());
+            let to = (from + draw(12)).min(bytes.len());
+            bytes.splice(from..to, pieces[draw(pieces.len())].bytes());
+        }
+        match robot::parse("fuzz", &urdf, &String::from_utf8_lossy(&bytes)) {
+            Ok(robot) => read += usize::from(robot.dof() == 6),
+            Err(error) => refused += usize::from(!error.to_string().is_empty()),
+        }
+    }
+    assert_eq!(read + refused, count.unwrap_or(1000));
+    assert!(read > 0 && refused > 0, "{read} read, {refused} refused");
+}
