@@ -14,7 +14,7 @@ use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{DriverChoice, Host, HostOptions};
+use crate::host::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::output;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
@@ -37,6 +37,8 @@ pub(crate) struct Run {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    #[command(flatten)]
+    refusal: RefusalOption,
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
@@ -66,9 +68,12 @@ impl Run {
             }
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-        let mut host = self
-            .host
-            .start(&robot, self.robot.place(), program.default_length())?;
+        let mut host = self.host.start(
+            &robot,
+            self.robot.place(),
+            program.default_length(),
+            self.refusal.policy(),
+        )?;
         host.own("canter run");
         let sink = self.samples.as_ref().map(|path| {
             let file =
