@@ -79,7 +79,8 @@ pub struct Verdict {
     /// Highest joint speed over the first and over the last sampling interval, as a ratio to what
     /// a motion from rest can reach in it.
     pub rest: [f64; 2],
-    /// What is wrong, in words with numbers; empty if nothing is.
+    /// What is wrong, in words with numbers; empty if nothing is. Joints and poses are counted
+    /// from 1 here.
     pub findings: Vec<String>,
 }
 
@@ -115,7 +116,7 @@ const ALLOWED: f64 = 1.0 + 1e-6;
 ///     resolution: 1e-12,
 /// });
 /// assert!(!verdict.holds());
-/// assert!(verdict.findings[0].contains("velocity of joint 0"));
+/// assert!(verdict.findings[0].contains("velocity of joint 1"));
 /// ```
 pub fn verify<const N: usize>(samples: &[Recorded<N>], wanted: &Wanted<'_, N>) -> Verdict {
     let mut verdict = Verdict {
@@ -182,7 +183,8 @@ fn findings<const N: usize>(verdict: &Verdict, wanted: &Wanted<'_, N>) -> Vec<St
             ..
         } = pass;
         findings.push(format!(
-            "pose {index} is not passed in order within tolerance: {deviation:.3e} m, {angle:.3e} rad"
+            "pose {} is not passed in order within tolerance: {deviation:.3e} m, {angle:.3e} rad",
+            index + 1
         ));
     }
     if wanted

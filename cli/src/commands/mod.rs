@@ -3,6 +3,7 @@
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
 mod abort;
+mod bench;
 mod check;
 mod completions;
 mod driver;
@@ -23,6 +24,7 @@ mod send;
 mod shutdown;
 mod status;
 mod stop;
+mod verify;
 mod world;
 
 use clap::Subcommand;
@@ -34,6 +36,7 @@ use crate::failure::Failure;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Abort(abort::Abort),
+    Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
     Driver(driver::Driver),
@@ -55,6 +58,7 @@ pub(crate) enum Command {
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
     Stop(stop::Stop),
+    Verify(verify::Verify),
 }
 
 impl Command {
@@ -62,6 +66,7 @@ impl Command {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
+            Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Driver(command) => command.run(),
@@ -83,6 +88,7 @@ impl Command {
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
+            Self::Verify(command) => command.run(),
         }
     }
 }

@@ -30,6 +30,21 @@ pub struct PlannedMove<const N: usize> {
     pub certificate: MoveCertificate,
     /// Joints at the end, at rest.
     pub end: SVector<f64, N>,
+    /// For a smooth move: how its way was found.
+    pub blend: Option<Blend>,
+}
+
+/// How the way of a smooth move was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Radius of the balls it was planned for, m: at most that of the command.
+    pub tolerance: f64,
+    /// Greatest distance from the leg / half width of the corridor.
+    pub corridor_ratio: f64,
+    /// Greatest jerk of the tool / limit, linear or angular, before the joints slow it down.
+    pub jerk_ratio: f64,
+    /// Parts that are not the time-optimal spline.
+    pub fallbacks: usize,
 }
 
 /// Plans moves of one arm with one tool.
@@ -101,12 +116,17 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        let attempt = |tolerance: f64| {
+        let attempt = |tolerance: f64| -> Result<_, MotionError> {
             let tighter = Move {
                 tolerance,
                 ..motion.clone()
             };
-            self.certify(motion, start, self.plan_smooth(&tighter, start)?)
+            let (trajectory, blend) = self.plan_smooth(&tighter, start)?;
+            let planned = self.certify(motion, start, trajectory)?;
+            Ok(PlannedMove {
+                blend: Some(blend),
+                ..planned
+            })
         };
         attempt(motion.tolerance).or_else(|first| {
             let uncertified = matches!(first, MotionError::Uncertified(_));
@@ -148,6 +168,7 @@ impl<const N: usize> Planner<N> {
             trajectory,
             certificate,
             end,
+            blend: None,
         })
     }
 
