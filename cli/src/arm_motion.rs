@@ -3,12 +3,13 @@
 
 use std::io;
 
-use crcl::LengthUnit;
+use crcl::{Command, LengthUnit, Pose};
+use engine::command_error::CommandError;
 use engine::controller::Controller;
 use engine::robot::Robot;
 use nalgebra::{Isometry3, SVector};
-use plan::run::{Batch, Motion, MotionFailure, Situation};
-use plan::world::Change;
+use plan::run::{Batch, Motion, MotionFailure, Situation, canonical};
+use plan::world::{Change, from_axes};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -43,6 +44,109 @@ fn end_key(start: &Situation, batch: &Batch) -> Key {
         &arm.unwrap_or(start.arm),
         tool.map(|tool| tool.name.as_str()),
     )
+}
+
+/// Time (s) from one look at a free way to the next.
+const LOOK: f64 = 0.01;
+
+/// How far (m) a free way may go below its lower end: half of the distance that is kept while
+/// travelling.
+const DIP: f64 = 0.02;
+
+/// Most parts that a straight way is made in.
+const MOST_PARTS: usize = 8;
+
+/// A batch that can be executed.
+struct Planned<const N: usize> {
+    /// The controller afterwards.
+    end: Controller<N>,
+    seconds: f64,
+    /// The commands as they are executed.
+    commands: Vec<Command>,
+}
+
+/// Plans a command; the commands that do it with their servo ticks.
+fn steps<const N: usize>(
+    controller: &mut Controller<N>,
+    command: &Command,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    match command {
+        Command::MoveTo { pose } => travel(controller, pose),
+        Command::MoveStraightTo { pose } => straight(controller, pose),
+        _ => Ok(vec![(command.clone(), controller.step(command)?.ticks)]),
+    }
+}
+
+/// A free way between two places above the workstation, unless the arm would come down on it: then
+/// a straight one.
+fn travel<const N: usize>(
+    controller: &mut Controller<N>,
+    pose: &Pose,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    let command = Command::MoveTo { pose: *pose };
+    let mut trial = controller.clone();
+    let lower_end = |trial: &Controller<N>| {
+        let (from, to) = (controller.pose(), trial.pose());
+        from.translation.z.min(to.translation.z)
+    };
+    let step = trial.step(&command)?;
+    let Some(planned) = &step.planned else {
+        return Ok(vec![(command, step.ticks)]);
+    };
+    let moments = (planned.trajectory.duration() / LOOK).ceil() as usize;
+    let lowest = (0..=moments)
+        .map(|moment| planned.trajectory.sample(moment as f64 * LOOK).position)
+        .map(|joints| trial.chain().forward(&joints).translation.z)
+        .fold(f64::INFINITY, f64::min);
+    if lowest < lower_end(&trial) - DIP {
+        return straight(controller, pose);
+    }
+    *controller = trial;
+    Ok(vec![(command, step.ticks)])
+}
+
+/// A straight way. One that an arm with a spare joint cannot go at once is made in parts, with a
+/// rest between them, in which the arm chooses its posture anew.
+fn straight<const N: usize>(
+    controller: &mut Controller<N>,
+    pose: &Pose,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    let command = Command::MoveStraightTo { pose: *pose };
+    let whole = match controller.step(&command) {
+        Ok(step) => return Ok(vec![(command, step.ticks)]),
+        Err(error) => error,
+    };
+    let Pose::Axes {
+        point,
+        z_axis,
+        x_axis,
+    } = pose
+    else {
+        return Err(whole);
+    };
+    let Ok(goal) = from_axes(*point, *x_axis, *z_axis) else {
+        return Err(whole);
+    };
+    let start = controller.pose();
+    let mut parts = 2;
+    while N > 6 && parts <= MOST_PARTS {
+        let mut trial = controller.clone();
+        let part = |number: usize| {
+            let share = number as f64 / parts as f64;
+            let between = start.try_lerp_slerp(&goal, share, 1e-9).unwrap_or(goal);
+            let pose = canonical(if number == parts { &goal } else { &between });
+            let command = Command::MoveStraightTo { pose };
+            let ticks = trial.step(&command)?.ticks;
+            Ok((command, ticks))
+        };
+        let done: Result<Vec<_>, CommandError> = (1..=parts).map(part).collect();
+        if let Ok(done) = done {
+            *controller = trial;
+            return Ok(done);
+        }
+        parts *= 2;
+    }
+    Err(whole)
 }
 
 /// An arm of `N` joints.
@@ -114,23 +218,28 @@ impl<const N: usize> ArmMotion<N> {
         Err(MotionFailure::new(0, "the arm is not where the world says"))
     }
 
-    /// Plans a batch; the controller afterwards and the time (s).
+    /// Plans a batch from where a controller is.
     fn plan(
         &self,
         mut controller: Controller<N>,
         batch: &Batch,
-    ) -> Result<(Controller<N>, f64), MotionFailure> {
-        let mut ticks = 0;
+    ) -> Result<Planned<N>, MotionFailure> {
+        let (mut ticks, mut commands) = (0, Vec::new());
         for (index, command) in batch.commands.iter().enumerate() {
-            match controller.step(command) {
-                Ok(step) => ticks += step.ticks,
-                Err(error) => {
-                    let reason = format!("{}: {error}", crcl::text::write_command(command));
-                    return Err(MotionFailure::new(index, reason));
-                }
+            let parts = steps(&mut controller, command).map_err(|error| {
+                let reason = format!("{}: {error}", crcl::text::write_command(command));
+                MotionFailure::new(index, reason)
+            })?;
+            for (part, length) in parts {
+                ticks += length;
+                commands.push(part);
             }
         }
-        Ok((controller, ticks as f64 / self.rate_hz))
+        Ok(Planned {
+            end: controller,
+            seconds: ticks as f64 / self.rate_hz,
+            commands,
+        })
     }
 
     fn remember(&mut self, start: &Situation, batch: &Batch, end: Controller<N>) {
@@ -144,9 +253,13 @@ impl<const N: usize> Motion for ArmMotion<N> {
     }
 
     fn execute(&mut self, start: &Situation, batch: &Batch) -> Result<f64, MotionFailure> {
-        let (end, seconds) = self.plan(self.mirror.clone(), batch)?;
+        let Planned {
+            end,
+            seconds,
+            commands,
+        } = self.plan(self.mirror.clone(), batch)?;
         if let Some(arm) = &mut self.arm {
-            arm.execute(&batch.commands)?;
+            arm.execute(&commands)?;
         }
         self.mirror = end.clone();
         self.remember(start, batch, end);
@@ -165,7 +278,7 @@ impl<const N: usize> Motion for ArmMotion<N> {
             return Ok(seconds);
         }
         let controller = self.controller(start)?;
-        let (end, seconds) = self.plan(controller, batch)?;
+        let Planned { end, seconds, .. } = self.plan(controller, batch)?;
         self.remember(start, batch, end);
         self.times.insert(key, seconds);
         Ok(seconds)
