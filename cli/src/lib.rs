@@ -21,6 +21,7 @@ mod host;
 mod logging;
 mod moving_arm;
 mod output;
+mod pddl_file;
 mod picture;
 mod plan_report;
 mod plot;

@@ -6,7 +6,9 @@ mod arrows;
 mod bad_inputs;
 mod canter;
 mod command_line;
+mod killed_plans;
 mod planned_motions;
+mod plans;
 mod runs;
 mod session;
 

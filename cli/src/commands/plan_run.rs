@@ -7,7 +7,6 @@ use engine::dry_run::FailurePolicy;
 use engine::robot::Robot;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, PulledReport, pull};
-use plan::pddl::ActionTable;
 use plan::run::{
     Cell, Controller, Event, Motion, Policy, Program, Report, RobotOptions, RunOptions,
     SimulatedFactotum, Stock, parameters, prepare,
@@ -20,6 +19,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host::HostOptions;
 use crate::moving_arm::MovingArm;
+use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::robot::{RobotOption, with_joints};
 use crate::world_file::Database;
@@ -46,6 +46,9 @@ pub(crate) struct PlanRun {
     /// Value of a parameter of the plan
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
+    /// How often the factotum brings what meets a requirement; without this, always
+    #[arg(long, value_name = "REQUIREMENT=TIMES")]
+    stock: Vec<String>,
     /// Plan all motion, move nothing, leave the world as it is
     #[arg(long)]
     dry_run: bool,
@@ -93,7 +96,7 @@ impl PlanRun {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let mut robot = self.robot.load()?;
         let source = self.plan.as_deref().map(world_file::read).transpose()?;
-        let parameters = self.parameters()?;
+        let (parameters, limits) = (self.parameters()?, self.limits()?);
         let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
         let model = writer.model().map_err(refused)?;
         self.check(source.as_deref(), &parameters, &model)?;
@@ -107,6 +110,7 @@ impl PlanRun {
             command: self,
             source,
             parameters,
+            limits,
             database,
             writer,
         };
@@ -139,14 +143,20 @@ impl PlanRun {
     }
 
     fn parameters(&self) -> Result<BTreeMap<String, String>, Failure> {
-        let pair = |text: &String| {
-            let (name, value) = text.split_once('=').ok_or_else(|| {
-                let message = anyhow::anyhow!("--set {text}: expected NAME=VALUE");
-                Failure::new(Exit::Usage, message)
-            })?;
-            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        pairs("--set", &self.set)
+    }
+
+    /// How often the factotum still brings something.
+    fn limits(&self) -> Result<BTreeMap<String, usize>, Failure> {
+        let number = |(name, times): (String, String)| match times.parse() {
+            Ok(times) => Ok((name, times)),
+            Err(_) => {
+                let message = anyhow::anyhow!("--stock {name}={times}: expected a number of times");
+                Err(Failure::new(Exit::Usage, message))
+            }
         };
-        self.set.iter().map(pair).collect()
+        let pairs = pairs("--stock", &self.stock)?;
+        pairs.into_iter().map(number).collect()
     }
 
     fn options(&self, robot: &Robot) -> RunOptions {
@@ -191,12 +201,25 @@ impl PlanRun {
     }
 }
 
+/// Values by name, from NAME=VALUE.
+fn pairs(option: &str, texts: &[String]) -> Result<BTreeMap<String, String>, Failure> {
+    let pair = |text: &String| {
+        let (name, value) = text.split_once('=').ok_or_else(|| {
+            let message = anyhow::anyhow!("{option} {text}: expected NAME=VALUE");
+            Failure::new(Exit::Usage, message)
+        })?;
+        Ok((name.trim().to_owned(), value.trim().to_owned()))
+    };
+    texts.iter().map(pair).collect()
+}
+
 /// A plan with all it needs but an arm.
 struct Task<'a> {
     command: &'a PlanRun,
     /// Text of the plan; none when a run is resumed.
     source: Option<String>,
     parameters: BTreeMap<String, String>,
+    limits: BTreeMap<String, usize>,
     database: Database,
     writer: Writer,
 }
@@ -207,6 +230,7 @@ impl Task<'_> {
             command,
             source,
             parameters,
+            limits,
             database,
             writer,
         } = self;
@@ -223,6 +247,7 @@ impl Task<'_> {
             }
         };
         let mut factotum = SimulatedFactotum::new(stock.clone());
+        factotum.limits = limits;
         let cell = Cell {
             reader: Reader::open(&database.path)?,
             writer,
@@ -239,10 +264,7 @@ impl Task<'_> {
 
     fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<PulledReport, Failure> {
         let command = self.command;
-        let mut table = ActionTable::own().map_err(refused)?;
-        if let Some(more) = &command.actions {
-            table = table.with(&world_file::read(more)?).map_err(refused)?;
-        }
+        let table = action_table(command.actions.as_deref())?;
         let options = command.robot_options(robot);
         let mut interpreter = PddlInterpreter::new(&self.database.path, table, options);
         let name = command.plan.as_ref().map(|path| path.display().to_string());
@@ -277,14 +299,4 @@ fn execute<const N: usize>(
         "interrupted" => Exit::Stopped,
         _ => blame.unwrap_or(Exit::Refused),
     })
-}
-
-/// A PDDL plan starts, after comments, with a parenthesis or a time.
-fn is_pddl(source: &str) -> bool {
-    let code = |line: &&str| !line.is_empty() && !line.starts_with(';');
-    let first = source.lines().map(str::trim).find(code).unwrap_or_default();
-    first.starts_with('(')
-        || first
-            .split_once(':')
-            .is_some_and(|(time, _)| time.trim().parse::<f64>().is_ok())
 }
