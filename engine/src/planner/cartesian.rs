@@ -159,11 +159,11 @@ impl<const N: usize> Planner<N> {
             .map_or_else(String::new, |joint| self.joint_name(joint));
         let cause = match (error.cause, error.joint) {
             (FollowCause::Limit, Some(index)) => format!(
-                "joint {joint} would pass its limit by {}",
+                "{joint} would pass its limit by {}",
                 self.amount(index, error.amount)
             ),
             (FollowCause::Singular, _) => format!(
-                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                "a singular pose, where {joint} would have to jump (smallest singular value {:.1e})",
                 error.amount
             ),
             (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),

@@ -189,11 +189,13 @@ impl<const N: usize> Planner<N> {
         below.min(above)
     }
 
+    /// A joint as a message calls it: by its name, with the word joint in it.
     fn joint_name(&self, joint: usize) -> String {
-        self.joint_names
-            .get(joint)
-            .cloned()
-            .unwrap_or_else(|| format!("{}", joint + 1))
+        match self.joint_names.get(joint) {
+            Some(name) if name.to_lowercase().contains("joint") => name.clone(),
+            Some(name) => format!("joint {name}"),
+            None => format!("joint {}", joint + 1),
+        }
     }
 
     /// A joint quantity with the unit that people read.
