@@ -245,7 +245,7 @@ fn driver(arm: &str, options: &[&str]) -> Engine {
 #[test]
 fn an_arm_that_does_not_follow_is_stopped_by_the_guard() {
     let arm = arm("sluggish");
-    let _driver = driver(&arm, &["--frequency", "4"]);
+    let _driver = driver(&arm, &["--delay", "150"]);
     let ran = canter([
         "run", EXAMPLE, "-r", "ur5e", "--driver", "external", "--arm", &arm,
     ]);
