@@ -4,8 +4,10 @@
 
 mod arrows;
 mod bad_inputs;
+mod benchmarks;
 mod canter;
 mod command_line;
+mod documents;
 mod killed_plans;
 mod planned_motions;
 mod plans;

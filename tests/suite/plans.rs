@@ -465,7 +465,7 @@ fn a_place_out_of_reach_changes_nothing() {
     );
     let reason = report["reason"].as_str().unwrap();
     assert!(
-        reason.contains("RobotMoveAbove") && reason.contains("reach"),
+        reason.starts_with("RobotMoveAbove") && reason.contains("MoveStraightTo ({{1.3"),
         "{reason}"
     );
     let world = world(&database);

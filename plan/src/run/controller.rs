@@ -71,7 +71,8 @@ pub struct Controller<'a> {
     run: i64,
     resumed: bool,
     warnings: Vec<String>,
-    interrupted: Option<String>,
+    /// Why the run is left where it is, to be resumed: outcome, code, reason.
+    left: Option<(&'static str, i64, String)>,
 }
 
 /// What a motion or an errand did.
@@ -176,7 +177,7 @@ impl<'a> Controller<'a> {
             run,
             resumed,
             warnings,
-            interrupted: None,
+            left: None,
         })
     }
 
@@ -189,7 +190,8 @@ impl<'a> Controller<'a> {
         let stored = cell.writer.last_run()?.ok_or_else(missing)?;
         if let Some(outcome) = &stored.outcome {
             return Err(PlanError::Resume(format!(
-                "the last run has ended: {outcome}"
+                "the last run has ended ({})",
+                outcome.trim_matches('"')
             )));
         }
         let model = cell.reader.model()?;
@@ -217,7 +219,7 @@ impl<'a> Controller<'a> {
             run,
             resumed,
             warnings,
-            interrupted: None,
+            left: None,
         })
     }
 
@@ -239,20 +241,25 @@ impl<'a> Controller<'a> {
     /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
     pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<Report, PlanError> {
         let began = Instant::now();
-        if let Err(failure) = self.open() {
-            self.give_up(failure.into(), "at the start")?;
+        match self.open() {
+            // An arm that cannot be brought back now may be helped, and the run goes on later.
+            Err(failure) if self.resumed && !failure.stopped => {
+                self.left = Some(("failed", 3, format!("at the start: {failure}")));
+            }
+            Err(failure) => self.give_up(failure.into(), "at the start")?,
+            Ok(()) => {}
         }
-        while self.state.outcome.is_none() && self.interrupted.is_none() {
+        while self.state.outcome.is_none() && self.left.is_none() {
             self.step(observer)?;
         }
-        let (outcome, code, reason) = match (&self.interrupted, &self.state.outcome) {
-            (Some(reason), _) => ("interrupted", 0, Some(reason.clone())),
+        let (outcome, code, reason) = match (&self.left, &self.state.outcome) {
+            (Some((outcome, code, reason)), _) => (*outcome, *code, Some(reason.clone())),
             (None, Some(Outcome::Failed { code, reason })) => {
                 ("failed", *code, Some(reason.clone()))
             }
             (None, _) => ("stopped", 0, None),
         };
-        if self.interrupted.is_none() {
+        if outcome != "interrupted" {
             let mut closing = Batch::default();
             closing.push(Command::EndCanon { reason: code });
             if let Err(failure) = self.motion.execute(&situation(&self.model)?, &closing) {
@@ -411,7 +418,7 @@ impl<'a> Controller<'a> {
                 self.end(Outcome::Failed { code, reason })
             }
             Trouble::Stopped(reason) => {
-                self.interrupted = Some(format!("{mark}: {reason}"));
+                self.left = Some(("interrupted", 0, format!("{mark}: {reason}")));
                 Ok(())
             }
         }
