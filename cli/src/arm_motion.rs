@@ -290,7 +290,7 @@ impl<const N: usize> Motion for ArmMotion<N> {
             return true;
         };
         let recovered = arm.recover();
-        let joints = arm.joints();
+        let joints = arm.setpoint();
         if joints.len() == N {
             self.mirror.set_joints(SVector::from_column_slice(&joints));
         }

@@ -72,7 +72,7 @@ impl MovingArm {
     }
 
     /// Joint positions of the last setpoint, rad or m.
-    pub(crate) fn joints(&self) -> Vec<f64> {
+    pub(crate) fn setpoint(&self) -> Vec<f64> {
         self.host.session.status().setpoint
     }
 
