@@ -4,8 +4,10 @@
 
 mod arrows;
 mod bad_inputs;
+mod benchmarks;
 mod canter;
 mod command_line;
+mod documents;
 mod planned_motions;
 mod runs;
 mod session;

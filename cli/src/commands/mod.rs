@@ -3,8 +3,10 @@
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
 mod abort;
+mod bench;
 mod check;
 mod completions;
+mod convert;
 mod driver;
 mod engine;
 mod fk;
@@ -19,10 +21,12 @@ mod recover;
 mod resume;
 mod robots;
 mod run;
+mod schema;
 mod send;
 mod shutdown;
 mod status;
 mod stop;
+mod verify;
 mod world;
 
 use clap::Subcommand;
@@ -34,8 +38,10 @@ use crate::failure::Failure;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Abort(abort::Abort),
+    Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
+    Convert(convert::Convert),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
@@ -51,10 +57,12 @@ pub(crate) enum Command {
     PlanCheck(plan_check::PlanCheck),
     PlanRun(plan_run::PlanRun),
     Run(run::Run),
+    Schema(schema::Schema),
     Send(send::Send),
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
     Stop(stop::Stop),
+    Verify(verify::Verify),
 }
 
 impl Command {
@@ -62,8 +70,10 @@ impl Command {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
+            Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Convert(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
@@ -79,10 +89,12 @@ impl Command {
             Self::PlanCheck(command) => command.run(),
             Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
+            Self::Verify(command) => command.run(),
         }
     }
 }
