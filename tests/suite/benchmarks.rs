@@ -125,6 +125,23 @@ fn a_planned_motion_verifies_and_a_changed_one_does_not() {
         std::fs::write(&csv, text).unwrap();
         canter(["verify", csv_argument, program, "-r", "ur5e"])
     };
+    // So is what a run has published.
+    let run = [
+        "run",
+        "examples/round_an_obstacle.canon",
+        "-r",
+        "panda",
+        "--lock-step",
+        "--samples",
+        csv_argument,
+        "--arm",
+    ];
+    let arm = format!("test{}/verified", std::process::id());
+    let ran = canter(run.iter().chain([&arm.as_str()]));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let ran = canter(["verify", csv_argument, run[1], "-r", "panda"]);
+    assert_eq!(ran.code, 0, "{}", ran.stdout);
+
     let lines: Vec<&str> = text.lines().collect();
     let middle = lines.len() / 2;
     let shortened: Vec<_> = lines[..middle].to_vec();

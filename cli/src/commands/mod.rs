@@ -6,6 +6,7 @@ mod abort;
 mod bench;
 mod check;
 mod completions;
+mod convert;
 mod driver;
 mod engine;
 mod fk;
@@ -20,6 +21,7 @@ mod recover;
 mod resume;
 mod robots;
 mod run;
+mod schema;
 mod send;
 mod shutdown;
 mod status;
@@ -39,6 +41,7 @@ pub(crate) enum Command {
     Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
+    Convert(convert::Convert),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
@@ -54,6 +57,7 @@ pub(crate) enum Command {
     PlanCheck(plan_check::PlanCheck),
     PlanRun(plan_run::PlanRun),
     Run(run::Run),
+    Schema(schema::Schema),
     Send(send::Send),
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
@@ -69,6 +73,7 @@ impl Command {
             Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Convert(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
@@ -84,6 +89,7 @@ impl Command {
             Self::PlanCheck(command) => command.run(),
             Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),
