@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bad_plans;
+mod c_caller;
 mod fixtures;
 mod fuzz;
 mod killed;
