@@ -424,6 +424,13 @@ fn a_refill_that_fails_ends_the_plan() {
     assert_kits(&world(&database), 4);
     let shown = canter(["world", "show", keep]);
     assert!(shown.stdout.contains("(EndCanon(4))"), "{}", shown.stdout);
+    // When there are supplies again the run goes on.
+    let whole = folder.path().join("whole.db");
+    let start = ["plan-run", "--resume", "-r", "ur5e", "--world", keep];
+    let end = ["--dry-run", "--keep", whole.to_str().unwrap()];
+    let ran = canter(start.iter().chain(&end));
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+    assert_kits(&world(&whole), 5);
 }
 
 /// A motion that cannot be made ends the plan before the arm moves, and changes nothing.

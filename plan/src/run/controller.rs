@@ -181,23 +181,29 @@ impl<'a> Controller<'a> {
         })
     }
 
-    /// Prepares to go on with the last run of the database, after it was killed.
+    /// Prepares to go on with the last run of the database: one that was killed or interrupted, or
+    /// in which the arm or the factotum failed.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when there is none, or it has ended.
     pub fn resume(cell: Cell<'a>, options: RunOptions) -> Result<Self, PlanError> {
         let missing = || PlanError::Resume("the database knows no run".into());
+        let broken = |error: serde_json::Error| PlanError::Resume(error.to_string());
         let stored = cell.writer.last_run()?.ok_or_else(missing)?;
-        if let Some(outcome) = &stored.outcome {
-            return Err(PlanError::Resume(format!(
-                "the last run has ended ({})",
-                outcome.trim_matches('"')
-            )));
+        let mut state: State = serde_json::from_str(&stored.state).map_err(broken)?;
+        match state.outcome.take() {
+            None => {}
+            Some(outcome) if outcome.can_be_resumed() => {}
+            Some(Outcome::Stopped) => {
+                return Err(PlanError::Resume("the last run came to its end".into()));
+            }
+            Some(Outcome::Failed { reason, .. }) => {
+                let why = format!("the last run gave up: {reason}");
+                return Err(PlanError::Resume(why));
+            }
         }
         let model = cell.reader.model()?;
         let program = Program::new(read(&stored.source).plan);
-        let state: State = serde_json::from_str(&stored.state)
-            .map_err(|error| PlanError::Resume(error.to_string()))?;
         let Cell {
             writer,
             reader,

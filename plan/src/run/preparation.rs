@@ -51,10 +51,13 @@ pub fn parameters(
     let mut values = BTreeMap::new();
     for parameter in &program.plan.parameters {
         let name = &parameter.name;
-        let text = given
-            .get(name)
-            .ok_or_else(|| fail(name, "it has no value".into()))?;
         let kind = Type::from_name(&parameter.class).unwrap_or(Type::Text);
+        let text = given.get(name).ok_or_else(|| {
+            fail(
+                name,
+                format!("no value was given; it is {}", kind.describe()),
+            )
+        })?;
         let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
         let value = match (kind, number) {
             (Type::Number { whole, least }, Some(number))

@@ -23,6 +23,14 @@ pub enum Outcome {
     },
 }
 
+impl Outcome {
+    /// Whether the arm or the factotum failed, not the plan: then the step can be tried again.
+    #[must_use]
+    pub fn can_be_resumed(&self) -> bool {
+        matches!(self, Self::Failed { code: 3 | 4, .. })
+    }
+}
+
 /// A list that is being executed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Frame {

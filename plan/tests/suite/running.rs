@@ -324,6 +324,55 @@ fn no_change_without_its_motion() {
     }
 }
 
+/// A run that the arm failed in goes on where it was, to the same end; one that ended does not.
+#[test]
+fn a_failed_run_is_resumed() {
+    let good = Trial::own(1).run();
+    for at in [10, 25, 40, 60] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("world.db");
+        let trial = Trial::own(1);
+        let mut writer = Writer::open(&path, Durability::Process).unwrap();
+        writer.replace(&trial.world).unwrap();
+        let stock = Stock::of(
+            &trial.world,
+            &prepare(&trial.source, &trial.world).unwrap().0.plan,
+        );
+        let mut motion = trial.motion;
+        motion.failures = vec![at];
+        let mut factotum = SimulatedFactotum::new(stock.clone());
+        let cell = Cell {
+            writer,
+            reader: Reader::open(&path).unwrap(),
+            motion: &mut motion,
+            factotum: &mut factotum,
+        };
+        let given = BTreeMap::from([("NumberOfKitsToMake".to_owned(), "1".to_owned())]);
+        let options = RunOptions::default();
+        let start = Controller::start(cell, &trial.source, &given, &stock, options.clone());
+        let failed = start.unwrap().run(&mut |_| {}).unwrap();
+        assert_eq!((failed.outcome, failed.code), ("failed", 3), "{failed:#?}");
+        let mut resume = || {
+            let cell = Cell {
+                writer: Writer::open(&path, Durability::Process).unwrap(),
+                reader: Reader::open(&path).unwrap(),
+                motion: &mut motion,
+                factotum: &mut factotum,
+            };
+            Controller::resume(cell, options.clone()).map(|mut run| run.run(&mut |_| {}).unwrap())
+        };
+        let report = resume().unwrap();
+        assert_eq!(
+            (report.outcome, report.counters.pick_ups),
+            ("stopped", 6),
+            "{report:#?}"
+        );
+        crate::world::assert_same(&good.world, &read_world(&path));
+        let again = resume().unwrap_err().to_string();
+        assert!(again.contains("came to its end"), "{again}");
+    }
+}
+
 /// With repair, the same failures cost time and nothing else.
 #[test]
 fn failures_are_repaired() {
