@@ -5,10 +5,12 @@
 mod abort;
 mod check;
 mod completions;
+mod doctor;
 mod driver;
 mod engine;
 mod fk;
 mod ik;
+mod jog;
 mod man;
 mod override_speed;
 mod pause;
@@ -36,10 +38,12 @@ pub(crate) enum Command {
     Abort(abort::Abort),
     Check(check::Check),
     Completions(completions::Completions),
+    Doctor(doctor::Doctor),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
     Ik(ik::Ik),
+    Jog(jog::Jog),
     Man(man::Man),
     Override(override_speed::Override),
     Pause(pause::Pause),
@@ -64,10 +68,12 @@ impl Command {
             Self::Abort(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
+            Self::Jog(command) => command.run(),
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),

@@ -56,7 +56,7 @@ impl Run {
         }
         // The simulated arm starts where the dry run does, so that what is refused later is known
         // before anything moves. Where another arm stands is known to its driver only.
-        if self.host.driver == DriverChoice::Sim {
+        if self.host.driver != DriverChoice::External {
             let plan = program.plan(&robot, self.host.rate, FailurePolicy::Abort)?;
             plan.refusals
                 .iter()

@@ -52,6 +52,7 @@ pub struct Driver {
     missed: u64,
     missed_ever: u64,
     noise: Noise,
+    reported: State,
 }
 
 impl Driver {
@@ -82,6 +83,7 @@ impl Driver {
             missed: 0,
             missed_ever: 0,
             noise: Noise::new(options.seed),
+            reported: State::default(),
             options,
         })
     }
@@ -119,6 +121,12 @@ impl Driver {
     /// The watchdog of the session under way (ns).
     pub fn watchdog_ns(&self) -> Option<u64> {
         self.session.as_ref().map(|session| session.watchdog_ns)
+    }
+
+    /// Whether a setpoint belongs to the session under way.
+    pub fn is_of_session(&self, setpoint: &Setpoint) -> bool {
+        let session = self.session.as_ref();
+        session.is_some_and(|session| session.number == setpoint.session)
     }
 
     /// How many joints there are.
@@ -268,6 +276,24 @@ impl Driver {
         self.waiting.push_back(*setpoint);
     }
 
+    /// Answers a sign of life: in lock-step a setpoint of the period that was before. Nothing
+    /// moves; the answer is the last state with a number of its own.
+    pub fn sign_of_life(&mut self, setpoint: &Setpoint) -> Option<State> {
+        let repeats = self.is_of_session(setpoint)
+            && setpoint.tick == self.last.tick
+            && setpoint.flags & (SetpointFlags::GOODBYE | SetpointFlags::STOP_REQUEST) == 0
+            && self.last.sequence > 0
+            && setpoint.sequence > self.last.sequence;
+        if !repeats {
+            return None;
+        }
+        self.last.sequence = setpoint.sequence;
+        self.sequence += 1;
+        self.reported.sequence = self.sequence;
+        self.reported.setpoint_sequence = setpoint.sequence;
+        Some(self.reported)
+    }
+
     /// The first joint whose setpoint is out of range, too fast, or further away than the joint
     /// can have come in `elapsed` (s).
     fn unreachable_joint(&self, setpoint: &Setpoint, elapsed: f64) -> Option<usize> {
@@ -310,6 +336,7 @@ impl Driver {
             self.options.damping,
         ];
         let state = self.report(now_ns);
+        self.reported = state;
         for (servo, reference) in self.servos.iter_mut().zip(&self.references) {
             servo.control(reference, control);
         }

@@ -12,6 +12,9 @@ use crate::{Driver, Options, SimError};
 /// The period without a session (ns).
 const IDLE_NS: u64 = 2_000_000;
 
+/// How many times lock-step looks for a setpoint before it sleeps between looks.
+const SPINS: u32 = 4000;
+
 /// How long lock-step waits for the engine before the arm counts as left alone (ns).
 const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
 
@@ -112,6 +115,10 @@ fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &At
         let Some(setpoint) = wait_for_setpoint(link, driver, stop) else {
             return periods;
         };
+        if let Some(state) = driver.sign_of_life(&setpoint) {
+            link.send(state);
+            continue;
+        }
         virtual_ns = virtual_ns.max(setpoint.tick.saturating_mul(period));
         driver.receive(&setpoint, virtual_ns);
         log.write(&setpoint, driver, virtual_ns);
@@ -134,15 +141,18 @@ fn wait_for_setpoint(
     let mut turns = 0_u32;
     loop {
         if let Some(setpoint) = link.next_setpoint() {
-            return Some(setpoint);
+            // One that was under way when the session began releases no state.
+            if driver.is_of_session(&setpoint) {
+                return Some(setpoint);
+            }
+            continue;
         }
         turns = turns.saturating_add(1);
-        if turns < 2000 {
+        // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
+        if turns < SPINS {
             core::hint::spin_loop();
-        } else if turns < 4000 {
-            thread::yield_now();
         } else {
-            thread::sleep(Duration::from_micros(50));
+            thread::sleep(Duration::from_micros(20));
             let sessions = driver.sessions();
             answer_greeting(link, driver);
             if driver.sessions() != sessions || stop.load(Ordering::Relaxed) {

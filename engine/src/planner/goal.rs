@@ -69,7 +69,7 @@ impl<const N: usize> Planner<N> {
             .max()
     }
 
-    fn joint_move(
+    pub(super) fn joint_move(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
