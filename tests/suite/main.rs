@@ -6,9 +6,11 @@ mod arrows;
 mod bad_inputs;
 mod canter;
 mod command_line;
+mod drivers;
 mod planned_motions;
 mod runs;
 mod session;
+mod soak;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
 #[test]

@@ -87,10 +87,10 @@ impl Sim {
     }
 }
 
-fn failure(error: driver_sim::SimError) -> Failure {
+fn failure(error: driver_sim::DriverError) -> Failure {
     let exit = match &error {
-        driver_sim::SimError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
-        driver_sim::SimError::Ipc(_) => Exit::NoPeer,
+        driver_sim::DriverError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
+        driver_sim::DriverError::Ipc(_) => Exit::NoPeer,
         _ => Exit::Usage,
     };
     Failure::new(exit, error)
