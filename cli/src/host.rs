@@ -76,6 +76,11 @@ impl From<OnRefusal> for FailurePolicy {
 }
 
 impl HostOptions {
+    /// What happens when a command cannot be executed.
+    pub(crate) fn on_refusal(&self) -> FailurePolicy {
+        self.on_refusal.into()
+    }
+
     /// Starts driver (if it is ours) and session, opens the channels for clients.
     ///
     /// # Errors

@@ -18,9 +18,11 @@ pub mod executor;
 pub mod modal;
 pub mod planner;
 pub mod queue;
+pub mod recorded;
 pub mod robot;
 pub mod session;
 pub mod task;
 pub mod tooling;
+pub mod trial;
 
 use dof::with_dof;

@@ -413,6 +413,8 @@ fn the_header_is_that_of_the_types() {
 fn a_c_compiler_agrees() {
     let folder = std::env::temp_dir().join(format!("canter-header-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
+    // The one that belongs to the types, whatever the file says: that is the other test's.
+    std::fs::write(folder.join("canter_driver.h"), header()).unwrap();
     let mut source = String::from(
         "#include \"canter_driver.h\"\n#include <stdio.h>\n\
          #define SHOW(m, f) printf(#m \".\" #f \" %zu %zu\\n\", offsetof(m, f), sizeof(((m *)0)->f))\n\
@@ -427,8 +429,7 @@ fn a_c_compiler_agrees() {
     let (file, program) = (folder.join("layout.c"), folder.join("layout"));
     std::fs::write(&file, source).unwrap();
     let compiled = Command::new("cc")
-        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-I"])
-        .arg(drivers().join("c"))
+        .args(["-std=c11", "-Wall", "-Wextra", "-Werror"])
         .arg(&file)
         .arg("-o")
         .arg(&program)

@@ -23,6 +23,7 @@ use closed::{Branching, Closed, Raw};
 use goal::Target;
 use nalgebra::{Isometry3, SMatrix, SVector};
 use numeric::{Descent, Landing, Stop};
+use std::f64::consts::PI;
 
 /// Restarts before a goal counts as not reached.
 const RESTARTS: u32 = 600;
@@ -194,6 +195,24 @@ impl<const N: usize> Solver<N> {
         self.closed
             .as_ref()
             .map_or(0.0, |closed| closed.parameter(q))
+    }
+
+    /// Values (rad) of the free parameter, `count` of them evenly over its range: what to
+    /// ask [`Solver::solve_all_at`] for to see every way of a seven-joint arm to reach a
+    /// pose. One value where there is no free parameter.
+    #[must_use]
+    pub fn parameters(&self, count: usize) -> Vec<f64> {
+        let range = self.closed.as_ref().and_then(|closed| {
+            let joint = closed.given::<N>();
+            let (low, high) = joint.map_or((-PI, PI), |i| numeric::window(&self.chain, i));
+            closed.spare().then_some((low, high))
+        });
+        let Some((low, high)) = range else {
+            return vec![0.0];
+        };
+        (0..count)
+            .map(|i| low + (high - low) * (i as f64 + 0.5) / count as f64)
+            .collect()
     }
 
     /// Distance (m) and angle (rad) of the tool at `q` from a pose.

@@ -8,7 +8,6 @@
 //! |---|---|
 //! | [`urdf`] | reads a URDF, checks it, finds the chain of joints from root to tip |
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
-#![doc = ""]
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
 //! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
 //! | [`measure`] | manipulability, singular values, condition number |

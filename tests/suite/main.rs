@@ -4,9 +4,11 @@
 
 mod arrows;
 mod bad_inputs;
+mod benchmarks;
 mod canter;
 mod command_line;
 mod drivers;
+mod documents;
 mod planned_motions;
 mod runs;
 mod session;

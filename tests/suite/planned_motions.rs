@@ -76,12 +76,12 @@ macro_rules! robots {
     };
 }
 
-robots! { ur5e ur10e panda iiwa7 iiwa14 }
+robots! { ur5e ur10e panda fr3 iiwa7 iiwa14 }
 
 /// Arms that are smaller or stand elsewhere do what they reach, and that correctly.
 #[test]
 fn every_other_robot() {
-    let named = ["ur5e", "ur10e", "panda", "iiwa7", "iiwa14"];
+    let named = ["ur5e", "ur10e", "panda", "fr3", "iiwa7", "iiwa14"];
     for robot in engine::robot::list() {
         if !named.contains(&robot) {
             check(robot);

@@ -3,9 +3,14 @@
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 
 mod abort;
+mod bench;
 mod check;
 mod completions;
+<<<<<<< HEAD
 mod doctor;
+=======
+mod convert;
+>>>>>>> main
 mod driver;
 mod engine;
 mod fk;
@@ -21,10 +26,12 @@ mod recover;
 mod resume;
 mod robots;
 mod run;
+mod schema;
 mod send;
 mod shutdown;
 mod status;
 mod stop;
+mod verify;
 mod world;
 
 use clap::Subcommand;
@@ -36,9 +43,14 @@ use crate::failure::Failure;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Abort(abort::Abort),
+    Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
+<<<<<<< HEAD
     Doctor(doctor::Doctor),
+=======
+    Convert(convert::Convert),
+>>>>>>> main
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
@@ -55,10 +67,12 @@ pub(crate) enum Command {
     PlanCheck(plan_check::PlanCheck),
     PlanRun(plan_run::PlanRun),
     Run(run::Run),
+    Schema(schema::Schema),
     Send(send::Send),
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
     Stop(stop::Stop),
+    Verify(verify::Verify),
 }
 
 impl Command {
@@ -66,9 +80,14 @@ impl Command {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
+            Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+<<<<<<< HEAD
             Self::Doctor(command) => command.run(),
+=======
+            Self::Convert(command) => command.run(),
+>>>>>>> main
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
@@ -85,10 +104,12 @@ impl Command {
             Self::PlanCheck(command) => command.run(),
             Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
+            Self::Verify(command) => command.run(),
         }
     }
 }

@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 use engine::dry_run::FailurePolicy;
 use engine::executor::Control;
+use engine::robot::Robot;
 use engine::session::{Blame, Note};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -54,6 +55,7 @@ impl Run {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
+<<<<<<< HEAD
         // The simulated arm starts where the dry run does, so that what is refused later is known
         // before anything moves. Where another arm stands is known to its driver only.
         if self.host.driver != DriverChoice::External {
@@ -64,12 +66,22 @@ impl Run {
             if !plan.refusals.is_empty() {
                 return Ok(Exit::Refused);
             }
+=======
+        // The simulated arm starts where the dry run does, so that a program that cannot be
+        // executed starts nothing. Where another arm stands is known to its driver only.
+        if self.host.driver == DriverChoice::Sim && !self.can_be_done(&program, &robot, None)? {
+            return Ok(Exit::Refused);
+>>>>>>> main
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
         let mut host = self
             .host
             .start(&robot, self.robot.place(), program.default_length())?;
         host.own("canter run");
+        let start = Some(host.session.start.clone());
+        if self.host.driver != DriverChoice::Sim && !self.can_be_done(&program, &robot, start)? {
+            return Ok(Exit::Refused);
+        }
         let sink = self.samples.as_ref().map(|path| {
             let file =
                 File::create(path).with_context(|| format!("cannot write {}", path.display()));
@@ -88,6 +100,24 @@ impl Run {
             deadline: None,
         }
         .finish_program(&program)
+    }
+}
+
+impl Run {
+    /// Plans the whole program from `start`, or from home, and reports what is refused; tells
+    /// whether it may be run. With a policy that lives with refusals it always may.
+    fn can_be_done(
+        &self,
+        program: &ProgramFile,
+        robot: &Robot,
+        start: Option<Vec<f64>>,
+    ) -> Result<bool, Failure> {
+        let policy = self.host.on_refusal();
+        let plan = program.plan(robot, (self.host.rate, start), policy)?;
+        for refusal in &plan.refusals {
+            program.report_refusal(refusal);
+        }
+        Ok(plan.refusals.is_empty() || policy != FailurePolicy::Abort)
     }
 }
 
@@ -214,6 +244,11 @@ impl Running {
         let status = self.host.session.status();
         let driver = self.host.session.driver.clone();
         let tracking = self.recording.worst();
+        let exit = match exit {
+            // The end was reached, but not everything on the way was done.
+            Exit::Done if done < count => Exit::Refused,
+            exit => exit,
+        };
         let duration = self.recording.duration();
         drop(self.host);
         self.recording.finish()?;

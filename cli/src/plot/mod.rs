@@ -1,10 +1,13 @@
 //! A planned motion as a picture: joint quantities as parts of their limits over time, and the
 //! way of the tool from above and from the side.
 
+mod bars;
 mod scale;
 mod strips;
 mod svg;
 mod views;
+
+pub(crate) use bars::{Bar, bars};
 
 use svg::{Anchor, Svg};
 

@@ -1,7 +1,7 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
-use kinematics::Chain;
 use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
+use kinematics::{Chain, Obstacle};
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 use trajectory::{
@@ -9,7 +9,7 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{MotionError, Planner, certificate};
+use super::{Blend, MotionError, Planner, certificate};
 use crate::task::Move;
 
 /// Longest way of the tool between two solved points, m.
@@ -52,12 +52,23 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
+    ) -> Result<(Trajectory<N>, Blend), MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         let plan = smooth::plan(&poses, &options)
             .map_err(|error| MotionError::Smooth(error.to_string()))?;
+        let blend = Blend {
+            tolerance: motion.tolerance,
+            exact_stop: plan.exact_stop(),
+            corridor_ratio: plan.certificate().corridor.ratio,
+            jerk_ratio: plan
+                .certificate()
+                .jerk
+                .ratio
+                .max(plan.certificate().angular_jerk.ratio),
+            fallbacks: plan.fallbacks(),
+        };
         let towards = |u: f64| {
             1 + plan
                 .passes()
@@ -70,7 +81,7 @@ impl<const N: usize> Planner<N> {
         let samples = certificate::tool_samples(self.chain(), &direct);
         let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
         if stretch <= 1.0 + 1e-4 {
-            return Ok(direct);
+            return Ok((direct, blend));
         }
         let slow = direct.stretched(stretch);
         let options = TimingOptions {
@@ -81,8 +92,10 @@ impl<const N: usize> Planner<N> {
         };
         let path = joint_path(&plan, &points)?;
         match time_path(&path, &self.limits, &motion.limits, &options) {
-            Ok(timed) if timed.trajectory.duration() < slow.duration() => Ok(timed.trajectory),
-            _ => Ok(slow),
+            Ok(timed) if timed.trajectory.duration() < slow.duration() => {
+                Ok((timed.trajectory, blend))
+            }
+            _ => Ok((slow, blend)),
         }
     }
 
@@ -147,12 +160,17 @@ impl<const N: usize> Planner<N> {
             .map_or_else(String::new, |joint| self.joint_name(joint));
         let cause = match (error.cause, error.joint) {
             (FollowCause::Limit, Some(index)) => format!(
-                "joint {joint} would pass its limit by {}",
+                "{joint} would pass its limit by {}",
                 self.amount(index, error.amount)
             ),
             (FollowCause::Singular, _) => format!(
-                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                "a singular pose, where {joint} would have to jump (smallest singular value {:.1e})",
                 error.amount
+            ),
+            (FollowCause::Unreachable(Obstacle::AtLimit { joint, beyond }), _) => format!(
+                "{} would have to go {} beyond its limit",
+                self.joint_name(joint),
+                self.amount(joint, beyond)
             ),
             (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
             (_, _) => error.to_string(),

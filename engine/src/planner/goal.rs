@@ -12,6 +12,14 @@ use crate::task::Move;
 
 /// How many configurations are planned in full, the most promising first.
 const TRIED: usize = 4;
+/// Values of the free parameter of a seven-joint arm that are looked at.
+const SWEEP: usize = 48;
+/// Configurations of a seven-joint arm count as one when no joint differs by more, rad.
+const ALIKE: f64 = 0.3;
+/// Distance from a limit, rad, from which a seven-joint arm moves on with ease.
+const ROOM: f64 = 0.35;
+/// Smallest singular value (lengths in units of 0.3 m) from which it does.
+const NIMBLE: f64 = 0.15;
 
 impl<const N: usize> Planner<N> {
     pub(super) fn plan_joint(
@@ -22,23 +30,33 @@ impl<const N: usize> Planner<N> {
         let pose = motion.poses.first().copied().unwrap_or_default();
         let mut goals = self.configurations(&pose, start)?;
         goals.sort_by(|a, b| self.effort(start, a).total_cmp(&self.effort(start, b)));
+        if N > 6 {
+            let mut apart: Vec<SVector<f64, N>> = Vec::new();
+            for goal in goals {
+                if apart.iter().all(|other| (other - goal).amax() > ALIKE) {
+                    apart.push(goal);
+                }
+            }
+            goals = apart;
+        }
         goals.truncate(TRIED);
-        let mut best: Option<Trajectory<N>> = None;
+        let mut best: Option<(f64, Trajectory<N>)> = None;
         let mut refusal = None;
         for goal in &goals {
             match self.joint_move(motion, start, goal) {
                 Ok(found)
                     if best
                         .as_ref()
-                        .is_none_or(|b| found.duration() < b.duration()) =>
+                        .is_none_or(|(least, _)| found.duration() / self.ease(goal) < *least) =>
                 {
-                    best = Some(found);
+                    best = Some((found.duration() / self.ease(goal), found));
                 }
                 Ok(_) => {}
                 Err(error) => refusal = Some(error),
             }
         }
-        best.ok_or_else(|| refusal.unwrap_or_else(|| MotionError::Timing("no goal".into())))
+        best.map(|(_, found)| found)
+            .ok_or_else(|| refusal.unwrap_or_else(|| MotionError::Timing("no goal".into())))
     }
 
     /// All known configurations that reach a pose within the joint limits.
@@ -58,15 +76,34 @@ impl<const N: usize> Planner<N> {
             Err(report) if goals.is_empty() => return Err(self.refusal(1, &report)),
             Err(_) => {}
         }
+        if N > 6 {
+            for parameter in self.solver.parameters(SWEEP) {
+                let branches = self.solver.solve_all_at(pose, parameter, start);
+                goals.extend(branches.iter().map(|branch| branch.q));
+            }
+        }
         Ok(goals)
     }
 
-    /// Time for the slowest joint at constant velocity, s: cheap, and a good order.
+    /// Time for the slowest joint at constant velocity, s: cheap, and a good order. Longer
+    /// for goals from which the arm would not move on with ease.
     fn effort(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
-        (goal - start)
-            .abs()
-            .component_div(&self.limits.velocity)
-            .max()
+        let way = (goal - start).abs().component_div(&self.limits.velocity);
+        way.max() / self.ease(goal)
+    }
+
+    /// How well a seven-joint arm can move on from a configuration: 1 well, towards 0 at a
+    /// limit or a singular pose, which its spare joint could have avoided. 1 for other arms.
+    fn ease(&self, q: &SVector<f64, N>) -> f64 {
+        if N <= 6 {
+            return 1.0;
+        }
+        let chain = self.chain();
+        let room = (0..N)
+            .map(|i| (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]))
+            .fold(f64::INFINITY, f64::min);
+        let smallest = kinematics::measure::dexterity(chain, q).smallest;
+        (room / ROOM).min(smallest / NIMBLE).clamp(1e-3, 1.0)
     }
 
     pub(super) fn joint_move(

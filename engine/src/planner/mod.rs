@@ -32,6 +32,23 @@ pub struct PlannedMove<const N: usize> {
     pub certificate: MoveCertificate,
     /// Joints at the end, at rest.
     pub end: SVector<f64, N>,
+    /// For a smooth move: how its way was found.
+    pub blend: Option<Blend>,
+}
+
+/// How the way of a smooth move was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Radius of the balls it was planned for, m: at most that of the command.
+    pub tolerance: f64,
+    /// Time with a stop at each pose, for a tool without an arm, s: no arm is faster.
+    pub exact_stop: f64,
+    /// Greatest distance from the leg / half width of the corridor.
+    pub corridor_ratio: f64,
+    /// Greatest jerk of the tool / limit, linear or angular, before the joints slow it down.
+    pub jerk_ratio: f64,
+    /// Parts that are not the time-optimal spline.
+    pub fallbacks: usize,
 }
 
 /// Plans moves of one arm with one tool.
@@ -98,27 +115,40 @@ impl<const N: usize> Planner<N> {
 
     /// The smooth motion in the tolerance asked for; where its certificate fails after
     /// the joints had their say, in a quarter of it, and at last with a stop at each pose.
+    /// Never slower than with a stop at each pose.
     fn smooth_move(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        let attempt = |tolerance: f64| {
+        let attempt = |tolerance: f64| -> Result<_, MotionError> {
             let tighter = Move {
                 tolerance,
                 ..motion.clone()
             };
-            self.certify(motion, start, self.plan_smooth(&tighter, start)?)
+            let (trajectory, blend) = self.plan_smooth(&tighter, start)?;
+            let planned = self.certify(motion, start, trajectory)?;
+            Ok(PlannedMove {
+                blend: Some(blend),
+                ..planned
+            })
         };
-        attempt(motion.tolerance).or_else(|first| {
-            let uncertified = matches!(first, MotionError::Uncertified(_));
-            if !uncertified || motion.tolerance == 0.0 {
-                return Err(first);
+        let slower = |planned: &PlannedMove<N>, than: f64| planned.trajectory.duration() > than;
+        match attempt(motion.tolerance) {
+            Ok(planned) if slower(&planned, planned.blend.map_or(0.0, |b| b.exact_stop)) => {
+                let stops = attempt(0.0).ok();
+                let faster = stops.filter(|stops| slower(&planned, stops.trajectory.duration()));
+                Ok(faster.unwrap_or(planned))
             }
-            attempt(0.25 * motion.tolerance)
-                .or_else(|_| attempt(0.0))
-                .map_err(|_| first)
-        })
+            Err(first)
+                if matches!(first, MotionError::Uncertified(_)) && motion.tolerance > 0.0 =>
+            {
+                attempt(0.25 * motion.tolerance)
+                    .or_else(|_| attempt(0.0))
+                    .map_err(|_| first)
+            }
+            other => other,
+        }
     }
 
     /// Slows the motion down, uniformly and by as little as needed, until every
@@ -150,6 +180,7 @@ impl<const N: usize> Planner<N> {
             trajectory,
             certificate,
             end,
+            blend: None,
         })
     }
 
@@ -170,11 +201,13 @@ impl<const N: usize> Planner<N> {
         below.min(above)
     }
 
+    /// A joint as a message calls it: by its name, with the word joint in it.
     fn joint_name(&self, joint: usize) -> String {
-        self.joint_names
-            .get(joint)
-            .cloned()
-            .unwrap_or_else(|| format!("{}", joint + 1))
+        match self.joint_names.get(joint) {
+            Some(name) if name.to_lowercase().contains("joint") => name.clone(),
+            Some(name) => format!("joint {name}"),
+            None => format!("joint {}", joint + 1),
+        }
     }
 
     /// A joint quantity with the unit that people read.

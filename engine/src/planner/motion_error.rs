@@ -15,11 +15,11 @@ pub enum MotionError {
         millimetres: f64,
     },
     /// The pose is reached only beyond a joint limit.
-    #[error("pose {pose} needs joint {joint} {beyond} beyond its limit")]
+    #[error("pose {pose} needs {joint} {beyond} beyond its limit")]
     BeyondLimit {
         /// Which pose of the command.
         pose: usize,
-        /// Name of the joint.
+        /// The joint, as people call it.
         joint: String,
         /// How far beyond, with its unit.
         beyond: String,

@@ -40,6 +40,15 @@ impl Closed {
         !matches!(self.class.form, Form::Six(_))
     }
 
+    /// The joint that is the free parameter, if one is.
+    pub(crate) fn given<const N: usize>(&self) -> Option<usize> {
+        match &self.class.form {
+            Form::Six(_) | Form::Swivel(_) => None,
+            Form::Last(..) => Some(N - 1),
+            Form::First(..) => Some(0),
+        }
+    }
+
     /// One line for people.
     pub(crate) fn name(&self) -> &'static str {
         use super::six::Shape;

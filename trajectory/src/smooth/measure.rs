@@ -5,11 +5,11 @@ use std::time::Instant;
 use nalgebra::Isometry3;
 
 use super::options::SmoothOptions;
+use super::plan::plan;
 use super::windows::Windows;
 
 /// What planning one list of poses gave: a row of `canter bench motion`.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct Measure {
     /// Number of poses, the start included.
     pub poses: usize,
@@ -40,6 +40,28 @@ pub struct Measure {
     pub reason: Option<String>,
 }
 
+impl Measure {
+    /// A list of so many poses that could not be planned, and why.
+    #[must_use]
+    pub fn unplanned(poses: usize, reason: String) -> Self {
+        Self {
+            poses,
+            motion: None,
+            exact_stop: None,
+            planning: 0.0,
+            first: 0.0,
+            deviation_ratio: 0.0,
+            corridor_ratio: 0.0,
+            velocity_ratio: 0.0,
+            acceleration_ratio: 0.0,
+            jerk_ratio: 0.0,
+            certified: false,
+            fallbacks: 0,
+            reason: Some(reason),
+        }
+    }
+}
+
 /// Plans one list of poses in pure tool space and measures the result. Poses
 /// in m; the first is the start.
 ///
@@ -54,34 +76,20 @@ pub struct Measure {
 #[must_use]
 pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
     let clock = Instant::now();
-    let mut first = 0.0;
-    let plan = Windows::new(poses, options).map(|mut windows| {
+    if let Ok(mut windows) = Windows::new(poses, options) {
         windows.advance();
-        first = clock.elapsed().as_secs_f64();
-        windows.finish()
-    });
+    }
+    let first = clock.elapsed().as_secs_f64();
+    let clock = Instant::now();
+    let plan = plan(poses, options);
     let planning = clock.elapsed().as_secs_f64();
-    let empty = Measure {
-        poses: poses.len(),
-        motion: None,
-        exact_stop: None,
-        planning,
-        first,
-        deviation_ratio: 0.0,
-        corridor_ratio: 0.0,
-        velocity_ratio: 0.0,
-        acceleration_ratio: 0.0,
-        jerk_ratio: 0.0,
-        certified: false,
-        fallbacks: 0,
-        reason: None,
-    };
     let plan = match plan {
         Ok(plan) => plan,
         Err(error) => {
             return Measure {
-                reason: Some(error.to_string()),
-                ..empty
+                planning,
+                first: planning,
+                ..Measure::unplanned(poses.len(), error.to_string())
             };
         }
     };
@@ -110,6 +118,9 @@ pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
         jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
         certified: certificate.holds(),
         fallbacks: plan.fallbacks(),
-        ..empty
+        poses: poses.len(),
+        planning,
+        first,
+        reason: None,
     }
 }

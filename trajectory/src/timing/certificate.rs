@@ -27,12 +27,13 @@ pub enum Limit {
     Rate,
 }
 
+/// For people: joints are counted from 1.
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::JointVelocity(joint) => write!(f, "velocity of joint {joint}"),
-            Self::JointAcceleration(joint) => write!(f, "acceleration of joint {joint}"),
-            Self::JointJerk(joint) => write!(f, "jerk of joint {joint}"),
+            Self::JointVelocity(joint) => write!(f, "velocity of joint {}", joint + 1),
+            Self::JointAcceleration(joint) => write!(f, "acceleration of joint {}", joint + 1),
+            Self::JointJerk(joint) => write!(f, "jerk of joint {}", joint + 1),
             Self::ToolSpeed => f.write_str("tool speed"),
             Self::ToolAcceleration => f.write_str("tool acceleration"),
             Self::ToolJerk => f.write_str("tool jerk"),

@@ -1,0 +1,213 @@
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use engine::robot::Robot;
+use serde::Serialize;
+use trajectory::smooth::{self, Measure, SmoothOptions};
+
+use super::suite::{self, Suite};
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::plot::{self, Bar};
+use crate::{output, robot};
+
+/// Smooth motions through pose lists: motion time beside exact stop, planning time, certificate
+///
+/// Without a robot the controlled point moves freely. With one, each list is laid before it with
+/// its middle where the tool is at home, and planned by the planner that runs programs. The
+/// planning time is the shortest of three, so that the machine's stalls do not count.
+#[derive(Args, Debug)]
+pub(crate) struct Motion {
+    /// JSON file with cases: P positions in mm, Q unit quaternions w,x,y,z or null, tol in mm,
+    /// V, A, J limits of the tool in mm/s, mm/s2, mm/s3; the first pose is the start
+    #[arg(value_name = "FILE.json")]
+    file: PathBuf,
+    /// Plan for this robot: shipped, or a folder with robot.urdf and robot.toml
+    #[arg(short, long, value_name = "R")]
+    robot: Option<String>,
+    /// Draw motion times beside exact stop as SVG
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    schema: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robot: Option<String>,
+    cases: Vec<Case>,
+}
+
+#[derive(Serialize)]
+struct Case {
+    name: String,
+    poses: usize,
+    motion_s: Option<f64>,
+    exact_stop_s: Option<f64>,
+    planning_s: f64,
+    first_motion_s: f64,
+    deviation_ratio: f64,
+    corridor_ratio: f64,
+    velocity_ratio: f64,
+    acceleration_ratio: f64,
+    jerk_ratio: f64,
+    certified: bool,
+    fallbacks: usize,
+    reason: Option<String>,
+}
+
+impl Motion {
+    /// Measures every case and prints them; the exit code says whether all could be planned.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        let suite = self.read()?;
+        let robot = self.robot.as_deref().map(robot::load).transpose()?;
+        let mut cases = Vec::with_capacity(suite.cases.0.len());
+        for (name, case) in &suite.cases.0 {
+            let row = measure(case, robot.as_ref())?;
+            cases.push(named(name, row));
+        }
+        let report = Report {
+            schema: 1,
+            robot: robot.map(|robot| robot.name),
+            cases,
+        };
+        if self.json {
+            output::json(&report)?;
+        } else {
+            table(&report)?;
+        }
+        if let Some(path) = &self.plot {
+            let picture = plot::bars(&self.file.display().to_string(), &bars(&report));
+            fs::write(path, picture)
+                .with_context(|| format!("cannot write {}", path.display()))
+                .map_err(|cause| Failure::new(Exit::Unreadable, cause))?;
+        }
+        let sound = report.cases.iter().all(|case| case.certified);
+        Ok(if sound { Exit::Done } else { Exit::Refused })
+    }
+
+    fn read(&self) -> Result<Suite, Failure> {
+        let unreadable = |cause: anyhow::Error| Failure::new(Exit::Unreadable, cause);
+        let context = || format!("cannot read {}", self.file.display());
+        let text = fs::read_to_string(&self.file)
+            .with_context(context)
+            .map_err(unreadable)?;
+        serde_json::from_str(&text)
+            .with_context(context)
+            .map_err(unreadable)
+    }
+}
+
+/// How often a case is planned; the result is the same each time.
+const PASSES: usize = 3;
+
+/// One case, planned and measured; a fault of the case is a reason.
+fn measure(case: &serde_json::Value, robot: Option<&Robot>) -> Result<Measure, Failure> {
+    let trial = match suite::trial(case) {
+        Ok(trial) => trial,
+        Err(reason) => return Ok(Measure::unplanned(0, reason)),
+    };
+    let once = || match robot {
+        None => {
+            let options = SmoothOptions::new(trial.tolerance, trial.limits);
+            Ok(smooth::measure(&trial.poses, &options))
+        }
+        Some(robot) => trial
+            .measure(robot)
+            .map_err(|error| Failure::new(Exit::Unreadable, error)),
+    };
+    let mut best = once()?;
+    for _ in 1..PASSES {
+        let row = once()?;
+        if row.planning < best.planning {
+            best = row;
+        }
+    }
+    Ok(best)
+}
+
+fn named(name: &str, row: Measure) -> Case {
+    Case {
+        name: name.to_owned(),
+        poses: row.poses,
+        motion_s: row.motion,
+        exact_stop_s: row.exact_stop,
+        planning_s: row.planning,
+        first_motion_s: row.first,
+        deviation_ratio: row.deviation_ratio,
+        corridor_ratio: row.corridor_ratio,
+        velocity_ratio: row.velocity_ratio,
+        acceleration_ratio: row.acceleration_ratio,
+        jerk_ratio: row.jerk_ratio,
+        certified: row.certified,
+        fallbacks: row.fallbacks,
+        reason: row.reason,
+    }
+}
+
+fn table(report: &Report) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    let width = report.cases.iter().map(|case| case.name.chars().count());
+    let width = width.max().unwrap_or(0).max(4);
+    writeln!(
+        out,
+        "{:width$} {:>6} {:>9} {:>9} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}  certified",
+        "case",
+        "poses",
+        "motion s",
+        "stop s",
+        "ratio",
+        "plan ms",
+        "deviation",
+        "corridor",
+        "velocity",
+        "accel.",
+        "jerk"
+    )?;
+    for case in &report.cases {
+        let (Some(motion), Some(stop)) = (case.motion_s, case.exact_stop_s.or(case.motion_s))
+        else {
+            let reason = case.reason.as_deref().unwrap_or("no reason");
+            writeln!(
+                out,
+                "{:width$} {:6} no motion: {reason}",
+                case.name, case.poses
+            )?;
+            continue;
+        };
+        let certified = match (case.certified, case.fallbacks) {
+            (true, 0) => "yes".to_owned(),
+            (true, count) => format!("yes, {count} fallbacks"),
+            (false, _) => "NO".to_owned(),
+        };
+        writeln!(
+            out,
+            "{:width$} {:6} {motion:9.4} {stop:9.4} {:6.3} {:9.2} {:9.4} {:8.4} {:8.4} {:8.4} {:8.4}  {certified}",
+            case.name,
+            case.poses,
+            motion / stop,
+            case.planning_s * 1e3,
+            case.deviation_ratio,
+            case.corridor_ratio,
+            case.velocity_ratio,
+            case.acceleration_ratio,
+            case.jerk_ratio,
+        )?;
+    }
+    Ok(())
+}
+
+fn bars(report: &Report) -> Vec<Bar> {
+    let bar = |case: &Case| Bar {
+        name: case.name.clone(),
+        value: case.motion_s,
+        reference: case.exact_stop_s,
+    };
+    report.cases.iter().map(bar).collect()
+}

@@ -1,0 +1,217 @@
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
+
+use anyhow::{Context, anyhow};
+use clap::Args;
+use engine::recorded::{CommandVerdict, ProgramVerdict, Row, verify_program};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::output;
+use crate::program::ProgramArgument;
+use crate::robot::RobotOption;
+
+/// Check a recorded motion against its program, from the samples alone
+///
+/// Takes what `canter plan --samples` or `canter run --samples` wrote and proves from differences
+/// of the samples whether joint and tool limits, tolerances, their order, straight lines and rest
+/// at the ends were kept. It shares no code with the planner.
+#[derive(Args, Debug)]
+pub(crate) struct Verify {
+    /// CSV file of samples; `-` is standard input
+    #[arg(value_name = "SAMPLES.csv")]
+    samples: String,
+    #[command(flatten)]
+    program: ProgramArgument,
+    #[command(flatten)]
+    robot: RobotOption,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Verify {
+    /// Checks and prints; findings are the exit code [`Exit::Refused`].
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        let robot = self.robot.load()?;
+        let program = self.program.read()?;
+        if program.exit() != Exit::Done {
+            program.report();
+            return Ok(program.exit());
+        }
+        let rows = read(&self.samples, robot.dof())?;
+        let verdict = verify_program(&robot, program.program(), program.default_length(), &rows)
+            .map_err(|error| Failure::new(Exit::Unreadable, error))?;
+        if self.json {
+            output::json(&verdict)?;
+        } else {
+            table(&verdict)?;
+        }
+        Ok(if verdict.holds {
+            Exit::Done
+        } else {
+            Exit::Refused
+        })
+    }
+}
+
+/// Rows of a sample file, found by the names of its columns.
+fn read(path: &str, joints: usize) -> Result<Vec<Row>, Failure> {
+    let source: Box<dyn Read> = if path == "-" {
+        Box::new(io::stdin())
+    } else {
+        let file = File::open(path).with_context(|| format!("cannot read {path}"));
+        Box::new(file.map_err(|cause| Failure::new(Exit::Unreadable, cause))?)
+    };
+    parse(BufReader::new(source), joints)
+        .with_context(|| format!("cannot read {path}"))
+        .map_err(|cause| Failure::new(Exit::Unreadable, cause))
+}
+
+fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(source);
+    let header = reader.headers()?.clone();
+    let column = |name: &str| {
+        header
+            .iter()
+            .position(|cell| cell == name)
+            .ok_or_else(|| anyhow!("line 1: there is no column {name}"))
+    };
+    let mut names = vec!["t_s".to_owned(), "command".to_owned()];
+    names.extend((1..=joints).map(|joint| format!("q{joint}")));
+    names.extend(["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"].map(str::to_owned));
+    let columns = names
+        .iter()
+        .map(|name| column(name))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |index: usize| {
+            let cell = record.get(columns[index]).unwrap_or("");
+            match cell.parse::<f64>() {
+                Ok(value) if value.is_finite() => Ok(value),
+                _ => Err(anyhow!(
+                    "line {line}, column {}: expected a number, got {cell:?}",
+                    names[index]
+                )),
+            }
+        };
+        let numbers = (0..columns.len())
+            .map(number)
+            .collect::<Result<Vec<_>, _>>()?;
+        rows.push(row(&numbers, joints).with_context(|| format!("line {line}"))?);
+    }
+    Ok(rows)
+}
+
+/// A row from the numbers of its columns.
+fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
+    let ([t_s, command], rest) = numbers
+        .split_first_chunk()
+        .ok_or_else(|| anyhow!("too few columns"))?;
+    let (q, pose) = rest.split_at(joints);
+    let [x, y, z, w, i, j, k] = pose else {
+        return Err(anyhow!("too few columns"));
+    };
+    let turn = Quaternion::new(*w, *i, *j, *k);
+    if (turn.norm() - 1.0).abs() > 1e-3 {
+        return Err(anyhow!("the quaternion has length {}, not 1", turn.norm()));
+    }
+    if *command < 0.0 || command.fract() != 0.0 {
+        return Err(anyhow!("{command} is not the number of a command"));
+    }
+    Ok(Row {
+        t_s: *t_s,
+        command: *command as usize,
+        joints: q.to_vec(),
+        pose: Isometry3::from_parts(
+            Translation3::new(*x, *y, *z),
+            UnitQuaternion::from_quaternion(turn),
+        ),
+    })
+}
+
+fn table(verdict: &ProgramVerdict) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(
+        out,
+        "{:>5} {:>5}  {:30} {:>8}  verdict",
+        "index", "line", "command", "samples"
+    )?;
+    for command in &verdict.commands {
+        writeln!(
+            out,
+            "{:5} {:5}  {:30} {:8}  {}",
+            command.index,
+            command.line,
+            command.name,
+            command.samples,
+            words(command)
+        )?;
+        for finding in &command.findings {
+            writeln!(out, "{:13}FAULT: {finding}", "")?;
+        }
+    }
+    for finding in &verdict.findings {
+        writeln!(out, "FAULT: {finding}")?;
+    }
+    let word = if verdict.holds {
+        "holds"
+    } else {
+        "does NOT hold"
+    };
+    writeln!(
+        out,
+        "{} samples on {}: the motion {word}",
+        verdict.samples, verdict.robot
+    )
+}
+
+fn words(command: &CommandVerdict) -> String {
+    let mut words = Vec::new();
+    if let Some((ratio, limit)) = &command.peak {
+        words.push(format!("{limit} {:.1} %", ratio * 100.0));
+    }
+    if let Some(straightness) = command.straightness_m {
+        words.push(format!("straight within {:.2} um", straightness * 1e6));
+    }
+    let passes = command.poses.iter().rev().skip(1);
+    let worst = passes
+        .clone()
+        .map(|pass| pass.deviation_m)
+        .fold(0.0, f64::max);
+    if let Some(tolerance) = passes.clone().map(|pass| pass.tolerance_m).next() {
+        words.push(format!(
+            "{} poses passed within {:.3} mm of {:.3} mm",
+            passes.count(),
+            worst * 1e3,
+            tolerance * 1e3
+        ));
+    }
+    words.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn columns_are_found_by_name_and_faults_have_a_place() {
+        let text = "command,t_s,q1,dq1,x_m,y_m,z_m,qw,qx,qy,qz\n3,0.5,0.1,0,1,2,3,1,0,0,0\n";
+        let rows = parse(text.as_bytes(), 1).unwrap();
+        assert_eq!((rows[0].t_s, rows[0].command), (0.5, 3));
+        assert_eq!(rows[0].joints, [0.1]);
+        assert_eq!(rows[0].pose.translation.z, 3.0);
+        let fault = |text: String| format!("{:#}", parse(text.as_bytes(), 1).unwrap_err());
+        assert!(fault(text.replace("q1", "p1")).contains("no column q1"));
+        let bad = fault(text.replace("0.1", "x"));
+        assert!(bad.contains("line 2") && bad.contains("column q1"), "{bad}");
+        assert!(fault(text.replace("1,0,0,0\n", "0,0,0,0\n")).contains("quaternion"));
+        assert!(fault(text.replace("3,0.5", "3.5,0.5")).contains("command"));
+    }
+}
