@@ -82,10 +82,7 @@ impl Peer {
     }
 
     pub(crate) fn signal(&self, signal: i32) {
-        #[expect(unsafe_code, reason = "the standard library can only kill")]
-        // SAFETY: the process is our child and was not waited for.
-        let result = unsafe { libc::kill(self.child.id().cast_signed(), signal) };
-        assert_eq!(result, 0);
+        system_tests::signal::send(&self.child, signal);
     }
 }
 

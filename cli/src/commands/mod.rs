@@ -6,11 +6,8 @@ mod abort;
 mod bench;
 mod check;
 mod completions;
-<<<<<<< HEAD
-mod doctor;
-=======
 mod convert;
->>>>>>> main
+mod doctor;
 mod driver;
 mod engine;
 mod fk;
@@ -46,11 +43,8 @@ pub(crate) enum Command {
     Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
-<<<<<<< HEAD
-    Doctor(doctor::Doctor),
-=======
     Convert(convert::Convert),
->>>>>>> main
+    Doctor(doctor::Doctor),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
@@ -83,11 +77,8 @@ impl Command {
             Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
-<<<<<<< HEAD
-            Self::Doctor(command) => command.run(),
-=======
             Self::Convert(command) => command.run(),
->>>>>>> main
+            Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),

@@ -55,23 +55,12 @@ impl Run {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
-<<<<<<< HEAD
-        // The simulated arm starts where the dry run does, so that what is refused later is known
-        // before anything moves. Where another arm stands is known to its driver only.
-        if self.host.driver != DriverChoice::External {
-            let plan = program.plan(&robot, self.host.rate, FailurePolicy::Abort)?;
-            plan.refusals
-                .iter()
-                .for_each(|refusal| program.report_refusal(refusal));
-            if !plan.refusals.is_empty() {
-                return Ok(Exit::Refused);
-            }
-=======
         // The simulated arm starts where the dry run does, so that a program that cannot be
         // executed starts nothing. Where another arm stands is known to its driver only.
-        if self.host.driver == DriverChoice::Sim && !self.can_be_done(&program, &robot, None)? {
+        if self.host.driver != DriverChoice::External
+            && !self.can_be_done(&program, &robot, None)?
+        {
             return Ok(Exit::Refused);
->>>>>>> main
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
         let mut host = self
@@ -79,7 +68,9 @@ impl Run {
             .start(&robot, self.robot.place(), program.default_length())?;
         host.own("canter run");
         let start = Some(host.session.start.clone());
-        if self.host.driver != DriverChoice::Sim && !self.can_be_done(&program, &robot, start)? {
+        if self.host.driver == DriverChoice::External
+            && !self.can_be_done(&program, &robot, start)?
+        {
             return Ok(Exit::Refused);
         }
         let sink = self.samples.as_ref().map(|path| {
