@@ -38,9 +38,21 @@ pub(crate) struct HostOptions {
     /// Go in step with the driver instead of by the clock: faster, and the same every time
     #[arg(long)]
     lock_step: bool,
+}
+
+/// What an engine does with a command that it refuses.
+#[derive(Args, Debug)]
+pub(crate) struct RefusalOption {
     /// What happens when a command cannot be executed
     #[arg(long, value_enum, default_value_t = OnRefusal::Abort)]
     on_refusal: OnRefusal,
+}
+
+impl RefusalOption {
+    /// The policy that was chosen.
+    pub(crate) fn policy(&self) -> FailurePolicy {
+        self.on_refusal.into()
+    }
 }
 
 /// Which driver moves the arm.
@@ -76,11 +88,6 @@ impl From<OnRefusal> for FailurePolicy {
 }
 
 impl HostOptions {
-    /// What happens when a command cannot be executed.
-    pub(crate) fn on_refusal(&self) -> FailurePolicy {
-        self.on_refusal.into()
-    }
-
     /// Starts driver (if it is ours) and session, opens the channels for clients.
     ///
     /// # Errors
@@ -91,6 +98,7 @@ impl HostOptions {
         robot: &Robot,
         place: &str,
         default_length: crcl::LengthUnit,
+        on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
         let arm = self.arm.arm.clone();
         // Before the driver: a second engine must not disturb the arm of the first.
@@ -114,7 +122,7 @@ impl HostOptions {
             Clock::Wall
         };
         config.record = true;
-        config.on_refusal = self.on_refusal.into();
+        config.on_refusal = on_refusal;
         config.default_length = default_length;
         let session = Session::start(robot, &config).map_err(failure)?;
         if let Some(warning) = &session.warning {

@@ -15,7 +15,7 @@ use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{DriverChoice, Host, HostOptions};
+use crate::host::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::output;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
@@ -38,6 +38,8 @@ pub(crate) struct Run {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    #[command(flatten)]
+    refusal: RefusalOption,
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
@@ -63,9 +65,12 @@ impl Run {
             return Ok(Exit::Refused);
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-        let mut host = self
-            .host
-            .start(&robot, self.robot.place(), program.default_length())?;
+        let mut host = self.host.start(
+            &robot,
+            self.robot.place(),
+            program.default_length(),
+            self.refusal.policy(),
+        )?;
         host.own("canter run");
         let start = Some(host.session.start.clone());
         if self.host.driver == DriverChoice::External
@@ -103,7 +108,7 @@ impl Run {
         robot: &Robot,
         start: Option<Vec<f64>>,
     ) -> Result<bool, Failure> {
-        let policy = self.host.on_refusal();
+        let policy = self.refusal.policy();
         let plan = program.plan(robot, (self.host.rate, start), policy)?;
         for refusal in &plan.refusals {
             program.report_refusal(refusal);

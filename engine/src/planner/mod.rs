@@ -159,6 +159,15 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         trajectory: Trajectory<N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        if trajectory.pieces().is_empty() {
+            // Nothing to do: the arm is there. What is proved is that standing still is right.
+            let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
+            let standing = self.certify(motion, start, still)?;
+            return Ok(PlannedMove {
+                trajectory,
+                ..standing
+            });
+        }
         check_smooth(&trajectory, start)?;
         let trajectory = self.within_limits(trajectory, &motion.limits);
         let samples = certificate::tool_samples(self.chain(), &trajectory);
