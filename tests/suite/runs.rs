@@ -394,6 +394,39 @@ fn an_engine_serves_clients() {
     assert_eq!((gone.code, gone.stdout.as_str()), (4, ""));
 }
 
+/// A jog lasts as long as its client asks; a second client is refused by name meanwhile, and when
+/// the first is killed the arm stops by itself, on its way and without a fault.
+#[test]
+fn a_jog_needs_its_client_alive() {
+    let arm = arm("jog");
+    let engine = Engine::start(&arm);
+    let joint = |now: &Value| now["joints"][0].as_f64().unwrap();
+    let before = joint(&status(&arm));
+    let ran = canter(["jog", "j1=0.1", "--seconds", "0.5", "--arm", &arm]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let now = wait_for(&arm, "rest", |now| now["idle"] == true);
+    let moved = joint(&now) - before;
+    // A tenth of 3.14 rad/s, for as long as the client lived and a little longer.
+    assert!(moved > 0.02 && moved < 2.0, "{moved} rad");
+
+    let mut first = command(["jog", "z=0.02", "--arm", &arm]).spawn().unwrap();
+    wait_for(&arm, "a jog", |now| now["command"] == "jog");
+    let second = canter(["jog", "z=-0.02", "--seconds", "0.1", "--arm", &arm]);
+    assert_eq!(second.code, 1, "{}", second.stderr);
+    let refusal = "commanded by \"canter jog\"";
+    assert!(second.stderr.contains(refusal), "{}", second.stderr);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let now = wait_for(&arm, "rest", |now| now["idle"] == true);
+    assert!(now["fault"].is_null(), "{now}");
+
+    // Out of reach, or of range, it says why and nothing moves.
+    let ran = canter(["jog", "j7=0.1", "--arm", &arm]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert_eq!(canter(["shutdown", "--arm", &arm]).code, 0);
+    assert_eq!(engine.end(), Some(0));
+}
+
 #[test]
 fn without_a_driver_nothing_starts() {
     let arm = arm("lonely");

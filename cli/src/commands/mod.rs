@@ -7,10 +7,12 @@ mod bench;
 mod check;
 mod completions;
 mod convert;
+mod doctor;
 mod driver;
 mod engine;
 mod fk;
 mod ik;
+mod jog;
 mod man;
 mod override_speed;
 mod pause;
@@ -42,10 +44,12 @@ pub(crate) enum Command {
     Check(check::Check),
     Completions(completions::Completions),
     Convert(convert::Convert),
+    Doctor(doctor::Doctor),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
     Ik(ik::Ik),
+    Jog(jog::Jog),
     Man(man::Man),
     Override(override_speed::Override),
     Pause(pause::Pause),
@@ -74,10 +78,12 @@ impl Command {
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Convert(command) => command.run(),
+            Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
+            Self::Jog(command) => command.run(),
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),

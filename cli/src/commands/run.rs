@@ -59,7 +59,9 @@ impl Run {
         }
         // The simulated arm starts where the dry run does, so that a program that cannot be
         // executed starts nothing. Where another arm stands is known to its driver only.
-        if self.host.driver == DriverChoice::Sim && !self.can_be_done(&program, &robot, None)? {
+        if self.host.driver != DriverChoice::External
+            && !self.can_be_done(&program, &robot, None)?
+        {
             return Ok(Exit::Refused);
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
@@ -71,7 +73,9 @@ impl Run {
         )?;
         host.own("canter run");
         let start = Some(host.session.start.clone());
-        if self.host.driver != DriverChoice::Sim && !self.can_be_done(&program, &robot, start)? {
+        if self.host.driver == DriverChoice::External
+            && !self.can_be_done(&program, &robot, start)?
+        {
             return Ok(Exit::Refused);
         }
         let sink = self.samples.as_ref().map(|path| {

@@ -6,6 +6,7 @@
 mod cartesian;
 mod certificate;
 mod goal;
+mod jog;
 mod motion_error;
 
 use kinematics::{Chain, Solver};
@@ -13,6 +14,7 @@ use nalgebra::{Isometry3, SVector};
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
 pub use certificate::{MoveCertificate, PassReport, Peaks};
+pub use jog::Direction;
 pub use motion_error::MotionError;
 
 use crate::task::{Move, Shape};
