@@ -16,7 +16,7 @@ use std::sync::atomic::AtomicBool;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Control, Event, Executor, ExecutorConfig, Feeder, Remote};
+use engine::executor::{Control, Event, Executor, ExecutorConfig, Feeder, Histogram, Remote};
 use ipc::{Arm, Clock, DriverLink, EngineLink, Probe, Setpoint, State};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Limits, Manner, Piece, Sample, Segment};
@@ -24,8 +24,9 @@ use realtime::{Cycle, Demand, Limits, Manner, Piece, Sample, Segment};
 const N: usize = 6;
 type Joints = SVector<f64, N>;
 
-/// Setpoints of one wake-up measurement.
-const WAKEUPS: u64 = 4000;
+/// How many times ours and a peer are measured in turns, and how long each is at work (s).
+const ROUNDS: usize = 5;
+const ROUND_S: f64 = 2.0;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -42,7 +43,7 @@ fn main() {
         wake_up(rate, &mut ratios);
     }
     ping(&mut ratios);
-    lock_step();
+    lock_steps(&mut ratios);
     for (name, ratio) in ratios {
         println!("ratio {name} {ratio:.3}");
     }
@@ -188,87 +189,102 @@ fn summary(sorted: &[u64]) -> String {
     )
 }
 
-/// Processor time of this process (s).
+/// Processor time of all threads of this process (s), to the ns.
 fn processor_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let words: Vec<&str> = text
-        .rsplit(')')
-        .next()
-        .unwrap_or("")
-        .split_whitespace()
-        .collect();
-    let ticks = |at: usize| {
-        words
-            .get(at)
-            .and_then(|word| word.parse::<f64>().ok())
-            .unwrap_or(0.0)
+    let tasks = std::fs::read_dir("/proc/self/task")
+        .into_iter()
+        .flatten()
+        .flatten();
+    let run = |task: std::fs::DirEntry| {
+        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse::<f64>().ok()
     };
-    (ticks(11) + ticks(12)) / 100.0
+    tasks.filter_map(run).sum::<f64>() * 1e-9
 }
 
-/// Moves at a rate in turns with cyclictest: wake-up, work, share of a core.
-fn wake_up(rate: f64, ratios: &mut Vec<(String, f64)>) {
-    let arm = arm(&format!("wake{rate}"));
+/// What one round at a rate came to: p50 and p99 of wake-up and of work (ns), share of a core.
+struct Round {
+    wake_up: (u64, u64),
+    work: (u64, u64),
+    share: f64,
+}
+
+/// Moves at a rate for a while.
+fn round(rate: f64, number: usize) -> Round {
+    let arm = arm(&format!("wake{rate}-{number}"));
     let _driver = Peer::start("driver", &arm);
     let config = ExecutorConfig {
         rate_hz: rate,
         ..ExecutorConfig::new(arm, limits())
     };
     let (executor, mut feeder, mut monitor) = Executor::<N>::start(config).unwrap();
-    if let Some(warning) = &executor.warning {
+    if let Some(warning) = executor.warning.as_ref().filter(|_| number == 0) {
         println!("{warning}");
     }
     let remote = executor.remote();
     let before = (processor_seconds(), Instant::now());
-    move_for(&remote, &mut feeder, (WAKEUPS as f64 / rate).max(2.0));
+    move_for(&remote, &mut feeder, ROUND_S);
     let share = (processor_seconds() - before.0) / before.1.elapsed().as_secs_f64();
     while let Some(event) = monitor.event() {
         if let Event::Faulted { fault, .. } = event {
             println!("fault: {fault}");
         }
     }
-    let counters = remote.counters();
-    let ours = (
-        remote.latency().quantile(0.5),
-        remote.latency().quantile(0.99),
-    );
+    let both = |histogram: &Histogram| (histogram.quantile(0.5), histogram.quantile(0.99));
+    Round {
+        wake_up: both(remote.latency()),
+        work: both(remote.work()),
+        share,
+    }
+}
+
+/// Rounds in turns with cyclictest at the same rate and priority; each figure is the median of
+/// the rounds, each ratio the median of the rounds' ratios.
+fn wake_up(rate: f64, ratios: &mut Vec<(String, f64)>) {
+    let rounds: Vec<(Round, Option<(u64, u64)>)> = (0..ROUNDS)
+        .map(|number| (round(rate, number), cyclictest(rate)))
+        .collect();
+    let middle = |of: &dyn Fn(&(Round, Option<(u64, u64)>)) -> Option<f64>| {
+        median(rounds.iter().filter_map(of).collect())
+    };
+    let ns = |of: &dyn Fn(&Round) -> u64| middle(&|(ours, _)| Some(of(ours) as f64));
+    let share = middle(&|(ours, _)| Some(ours.share));
     println!(
-        "{rate} Hz: work p50 {} ns, p99 {} ns; wake-up p50 {} ns, p99 {} ns; state age p50 {} ns; \
-         {} published, {} skipped; {:.2} % of a core",
-        remote.work().quantile(0.5),
-        remote.work().quantile(0.99),
-        ours.0,
-        ours.1,
-        remote.state_age().quantile(0.5),
-        counters.published,
-        counters.skipped,
+        "{rate} Hz: work p50 {} ns, p99 {} ns; wake-up p50 {} ns, p99 {} ns; {:.2} % of a core",
+        ns(&|ours| ours.work.0),
+        ns(&|ours| ours.work.1),
+        ns(&|ours| ours.wake_up.0),
+        ns(&|ours| ours.wake_up.1),
         share * 100.0
     );
-    drop(executor);
-    let Some(peer) = cyclictest(rate) else {
-        println!("cyclictest is absent (Debian: rt-tests), its ratios are left out");
-        return;
-    };
-    println!(
-        "{rate} Hz: cyclictest wake-up p50 {} ns, p99 {} ns",
-        peer.0, peer.1
-    );
-    let suffix = if rate == 1000.0 {
-        String::new()
+    let peer = |of: &dyn Fn((u64, u64)) -> u64| middle(&|(_, peer)| peer.map(|p| of(p) as f64));
+    if rounds.iter().all(|(_, peer)| peer.is_none()) {
+        println!("cyclictest is missing (apt install rt-tests): no ratios of wake-ups");
     } else {
-        format!("-{}khz", rate / 1000.0)
-    };
-    ratios.push((
-        format!("cyclictest-wakeup-p50{suffix}"),
-        ours.0 as f64 / peer.0 as f64,
-    ));
-    ratios.push((
-        format!("cyclictest-wakeup-p99{suffix}"),
-        ours.1 as f64 / peer.1 as f64,
-    ));
+        println!(
+            "{rate} Hz: cyclictest wake-up p50 {} ns, p99 {} ns",
+            peer(&|p| p.0),
+            peer(&|p| p.1)
+        );
+        let suffix = if rate == 1000.0 {
+            String::new()
+        } else {
+            format!("-{}khz", rate / 1000.0)
+        };
+        let p50 = middle(&|(ours, peer)| peer.map(|p| ours.wake_up.0 as f64 / p.0 as f64));
+        let p99 = middle(&|(ours, peer)| peer.map(|p| ours.wake_up.1 as f64 / p.1 as f64));
+        ratios.push((format!("cyclictest-wakeup-p50{suffix}"), p50));
+        ratios.push((format!("cyclictest-wakeup-p99{suffix}"), p99));
+    }
     if rate == 1000.0 {
         ratios.push(("core-share-1khz-of-2-percent".to_owned(), share / 0.02));
     }
+}
+
+/// The middle of some numbers.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn move_for(remote: &Remote<N>, feeder: &mut Feeder<N>, seconds: f64) {
@@ -286,7 +302,7 @@ fn move_for(remote: &Remote<N>, feeder: &mut Feeder<N>, seconds: f64) {
 /// Median and 99th percentile of cyclictest's wake-up latency at the rate (ns).
 fn cyclictest(rate: f64) -> Option<(u64, u64)> {
     let interval = format!("{}", 1e6 / rate);
-    let loops = format!("{}", (2.0 * rate).max(WAKEUPS as f64));
+    let loops = format!("{}", ROUND_S * rate);
     let arguments = [
         "-q", "-m", "-p", "60", "-i", &interval, "-l", &loops, "-h", "20000",
     ];
@@ -307,8 +323,11 @@ fn cyclictest(rate: f64) -> Option<(u64, u64)> {
             seen += count;
             seen as f64 >= share * total as f64
         });
-        // Whole microseconds: the middle of the bucket.
-        found.map(|(microseconds, _)| microseconds * 1000 + 500)
+        // Whole microseconds: as if spread evenly over the bucket.
+        found.map(|(microseconds, count)| {
+            let over = (seen as f64 - share * total as f64) / *count as f64;
+            microseconds * 1000 + (1000.0 * (1.0 - over)) as u64
+        })
     };
     Some((quantile(0.5)?, quantile(0.99)?))
 }
@@ -326,7 +345,7 @@ fn echo_probe(arm: &str) {
 fn echo_link(arm: &str) {
     let link = DriverLink::open(&arm.parse().unwrap()).unwrap();
     loop {
-        if let Some(setpoint) = link.last_setpoint()
+        if let Some(setpoint) = link.next_setpoint()
             && setpoint.check(N).is_ok()
         {
             let setpoint_sequence = setpoint.sequence;
@@ -342,34 +361,58 @@ fn echo_link(arm: &str) {
 
 /// Round trips of a checked setpoint and state, in turns with those of bare messages.
 fn ping(ratios: &mut Vec<(String, f64)>) {
-    const TRIPS: u64 = 20_000;
-    let arm = arm("ping");
-    let _probe = Peer::start("probe", &arm);
-    let probe = Probe::open(&arm, true).unwrap();
-    let bare = trips(TRIPS, |number| {
+    let rounds: Vec<(Vec<u64>, Vec<u64>)> = (0..ROUNDS)
+        .map(|number| {
+            let arm = arm(&format!("ping{number}"));
+            (link_trips(&arm), probe_trips(&arm))
+        })
+        .collect();
+    let middle =
+        |of: &dyn Fn(&(Vec<u64>, Vec<u64>)) -> f64| median(rounds.iter().map(of).collect());
+    let at = |sorted: &[u64], share: f64| quantile(sorted, share) as f64;
+    for (name, share) in [("p50", 0.5), ("p99", 0.99)] {
+        println!(
+            "round trip {name}: setpoint and state, checked {} ns; bare messages of that size {} ns",
+            middle(&|(ours, _)| at(ours, share)),
+            middle(&|(_, bare)| at(bare, share))
+        );
+        let ratio = middle(&|(ours, bare)| at(ours, share) / at(bare, share));
+        ratios.push((format!("iceoryx2-ping-{name}"), ratio));
+    }
+}
+
+/// Round trips of a round.
+const TRIPS: u64 = 20_000;
+
+fn probe_trips(arm: &Arm) -> Vec<u64> {
+    let _probe = Peer::start("probe", arm);
+    let probe = Probe::open(arm, true).unwrap();
+    trips(TRIPS, |number| {
         probe.send(number);
         let end = Instant::now() + Duration::from_secs(1);
         while probe.receive() != Some(number) && Instant::now() < end {
             std::hint::spin_loop();
         }
-    });
-    drop((probe, _probe));
-    let _link = Peer::start("link", &arm);
-    let link = EngineLink::open(&arm).unwrap();
+    })
+}
+
+fn link_trips(arm: &Arm) -> Vec<u64> {
+    let _link = Peer::start("link", arm);
+    let link = EngineLink::open(arm).unwrap();
     let setpoint = Setpoint {
         joints: N as u32,
         period_ns: 1_000_000,
         watchdog_ns: 100_000_000,
         ..Setpoint::default()
     };
-    let ours = trips(TRIPS, |sequence| {
+    trips(TRIPS, |sequence| {
         let mut next = setpoint;
         next.sequence = sequence;
         next.published_ns = ipc::now_ns();
         link.send(next);
         let end = Instant::now() + Duration::from_secs(1);
         loop {
-            if let Some(state) = link.last_state()
+            if let Some(state) = link.next_state()
                 && state.check(N).is_ok()
                 && state.setpoint_sequence == sequence
             {
@@ -380,19 +423,7 @@ fn ping(ratios: &mut Vec<(String, f64)>) {
             }
             std::hint::spin_loop();
         }
-    });
-    println!(
-        "round trip of setpoint and state, checked: {}",
-        summary(&ours)
-    );
-    println!(
-        "round trip of bare messages of that size: {}",
-        summary(&bare)
-    );
-    ratios.push((
-        "iceoryx2-ping-p50".to_owned(),
-        quantile(&ours, 0.5) as f64 / quantile(&bare, 0.5) as f64,
-    ));
+    })
 }
 
 fn trips(count: u64, mut trip: impl FnMut(u64)) -> Vec<u64> {
@@ -408,25 +439,59 @@ fn trips(count: u64, mut trip: impl FnMut(u64)) -> Vec<u64> {
     times
 }
 
-/// How much faster than real time the whole chain runs in step with the simulated driver.
-fn lock_step() {
+/// How much faster than real time the whole chain runs in step with the simulated driver and with
+/// MuJoCo, beside what it shall be at least.
+fn lock_steps(ratios: &mut Vec<(String, f64)>) {
     let arm = arm("step");
-    let _driver = Peer::start("driver", &arm);
+    let driver = Peer::start("driver", &arm);
+    if let Some(speed) = lock_step(&arm, 60) {
+        println!("lock-step with the simulated driver: {speed:.0} times real time");
+        ratios.push(("lock-step-sim-of-200".to_owned(), 200.0 / speed));
+    }
+    drop(driver);
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    let script = format!("{root}/drivers/python/mujoco_driver.py");
+    let urdf = format!("{root}/robots/ur5e/robot.urdf");
+    let python = Command::new("python3")
+        .args([&script, &arm.to_string(), &urdf])
+        .stdout(std::process::Stdio::null())
+        .spawn();
+    let speed = python.ok().and_then(|child| {
+        let mut peer = Peer(child);
+        sleep(Duration::from_secs(3));
+        let alive = matches!(peer.0.try_wait(), Ok(None));
+        if alive { lock_step(&arm, 20) } else { None }
+    });
+    match speed {
+        Some(speed) => {
+            println!("lock-step with MuJoCo, UR5e from its URDF: {speed:.1} times real time");
+            ratios.push(("lock-step-mujoco-of-25".to_owned(), 25.0 / speed));
+        }
+        None => println!("python3 with mujoco and iceoryx2 is missing: no lock-step with MuJoCo"),
+    }
+}
+
+/// How much faster than real time `commands` of about a second run in step with the arm's driver.
+fn lock_step(arm: &Arm, commands: u32) -> Option<f64> {
     let config = ExecutorConfig {
         clock: Clock::LockStep,
-        ..ExecutorConfig::new(arm, limits())
+        ..ExecutorConfig::new(arm.clone(), limits())
     };
-    let (executor, mut feeder, mut monitor) = Executor::<N>::start(config).unwrap();
+    let (executor, mut feeder, mut monitor) = Executor::<N>::start(config).ok()?;
     let start = Instant::now();
-    (0..60).for_each(|index| feeder.push(command(index)).unwrap());
-    let mut done = false;
-    while !done && start.elapsed() < Duration::from_secs(60) {
+    (0..commands).for_each(|index| feeder.push(command(index)).unwrap());
+    while start.elapsed() < Duration::from_secs(60) {
         while let Some(event) = monitor.event() {
-            done |= matches!(event, Event::Finished { command: 59, .. });
+            match event {
+                Event::Finished { command, .. } if command + 1 == commands => {
+                    let ticks = executor.remote().counters().ticks;
+                    return Some(ticks as f64 * 0.001 / start.elapsed().as_secs_f64());
+                }
+                Event::Faulted { fault, .. } => println!("fault: {fault}"),
+                _ => {}
+            }
         }
         sleep(Duration::from_millis(1));
     }
-    let ticks = executor.remote().counters().ticks;
-    let speed = ticks as f64 * 0.001 / start.elapsed().as_secs_f64();
-    println!("lock-step: {ticks} periods of 1 ms, {speed:.0} times real time, done {done}");
+    None
 }

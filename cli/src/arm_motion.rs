@@ -1,76 +1,23 @@
 //! The arm of a robot as a plan needs it: planned by the engine, and moved by a driver if there is
 //! one.
 
-use std::collections::HashMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::io;
 
-use crcl::{Command, LengthUnit};
+use crcl::{Command, LengthUnit, Pose};
+use engine::command_error::CommandError;
 use engine::controller::Controller;
-use engine::robot::{EndEffector, Gripper, Robot, ToolChanger};
-use engine::session::{Note, Session};
+use engine::robot::Robot;
 use nalgebra::{Isometry3, SVector};
-use plan::run::{Batch, Motion, MotionFailure, Situation};
-use plan::world::{Change, Class, Model, pointing_down};
+use plan::run::{Batch, Motion, MotionFailure, Situation, canonical};
+use plan::world::{Change, from_axes};
 
+use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::moving_arm::MovingArm;
+use crate::recent::Recent;
 
-/// Servo periods a second that dry runs count with.
-pub(crate) const RATE_HZ: f64 = 1000.0;
-
-/// Most predictions and situations that are remembered.
-const MOST_REMEMBERED: usize = 4000;
-
-/// Opening and closing time of a gripper or tool changer that the world says nothing about (s).
-const NOMINAL_S: f64 = 0.2;
-
-/// Gives the robot the end effectors of the world, and the places where they are kept.
-pub(crate) fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanError> {
-    robot.end_effectors.clear();
-    robot.mounted = None;
-    let down = Isometry3::from_parts([0.0; 3].into(), pointing_down());
-    let mut free: Vec<Isometry3<f64>> = Vec::new();
-    for holder in world
-        .objects()
-        .filter(|o| o.class == Class::EndEffectorHolder)
-    {
-        if world.children(holder.id).next().is_none() {
-            free.push(world.workstation_from(holder.id)? * down);
-        }
-    }
-    for effector in world.objects().filter(|o| o.class.is_a(Class::EndEffector)) {
-        let on_arm = world
-            .effector()
-            .is_some_and(|mounted| mounted.id == effector.id);
-        if on_arm {
-            robot.mounted = Some(robot.end_effectors.len());
-        }
-        // The engine knows a holder as the place of one end effector; the one on the arm gets a
-        // place that is free.
-        let workstation_from_holder = if on_arm {
-            free.pop()
-        } else {
-            Some(world.workstation_from(effector.id)?)
-        };
-        robot.end_effectors.push(EndEffector {
-            name: effector.name.clone(),
-            flange_from_tcp: Isometry3::translation(0.0, 0.0, effector.effector_length()),
-            gripper: Some(Gripper {
-                opening: NOMINAL_S,
-                closing: NOMINAL_S,
-            }),
-            workstation_from_holder,
-        });
-    }
-    let nominal = ToolChanger {
-        opening: NOMINAL_S,
-        closing: NOMINAL_S,
-    };
-    robot.tool_changer.get_or_insert(nominal);
-    Ok(())
-}
+/// How many predictions and situations are remembered at least.
+const REMEMBERED: usize = 2000;
 
 /// The exact pose of the end of the arm and the tool on it.
 type Key = ([u64; 7], Option<String>);
@@ -99,76 +46,155 @@ fn end_key(start: &Situation, batch: &Batch) -> Key {
     )
 }
 
-/// A driver that this process runs itself, in step with the engine.
-pub(crate) struct OwnDriver {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+/// Time (s) from one look at a free way to the next.
+const LOOK: f64 = 0.01;
+
+/// How far (m) a free way may go below its lower end: half of the distance that is kept while
+/// travelling.
+const DIP: f64 = 0.02;
+
+/// Most parts that a straight way is made in.
+const MOST_PARTS: usize = 8;
+
+/// A batch that can be executed.
+struct Planned<const N: usize> {
+    /// The controller afterwards.
+    end: Controller<N>,
+    seconds: f64,
+    /// The commands as they are executed.
+    commands: Vec<Command>,
 }
 
-impl OwnDriver {
-    /// Starts the simulated driver of this robot.
-    pub(crate) fn start(robot: &Robot, arm: &ipc::Arm) -> Result<Self, Failure> {
-        let joints = &robot.joints;
-        let options = driver_sim::Options {
-            model: ipc::model_hash(robot.urdf.as_bytes()),
-            position: robot.home.clone(),
-            lower: joints.lower.iter().map(|value| value.max(-1e3)).collect(),
-            upper: joints.upper.iter().map(|value| value.min(1e3)).collect(),
-            velocity: joints.velocity.clone(),
-            acceleration: joints.acceleration.clone(),
-            jerk: joints.jerk.clone(),
-            ..driver_sim::Options::new(arm.clone(), robot.dof())
-        };
-        let stop = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&stop);
-        let run = move || {
-            if let Err(error) = driver_sim::run(options, &flag) {
-                tracing::error!("simulated driver: {error}");
-            }
-        };
-        let thread = std::thread::Builder::new()
-            .name("driver".into())
-            .spawn(run)?;
-        Ok(Self {
-            stop,
-            thread: Some(thread),
-        })
+/// Plans a command; the commands that do it with their servo ticks.
+fn steps<const N: usize>(
+    controller: &mut Controller<N>,
+    command: &Command,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    match command {
+        Command::MoveTo { pose } => travel(controller, pose),
+        Command::MoveStraightTo { pose } => straight(controller, pose),
+        _ => Ok(vec![(command.clone(), controller.step(command)?.ticks)]),
     }
 }
 
-impl Drop for OwnDriver {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A driver that panicked has already said so.
-            let _ = thread.join();
+/// A free way between two places above the workstation, unless the arm would come down on it: then
+/// a straight one.
+fn travel<const N: usize>(
+    controller: &mut Controller<N>,
+    pose: &Pose,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    let command = Command::MoveTo { pose: *pose };
+    let mut trial = controller.clone();
+    let lower_end = |trial: &Controller<N>| {
+        let (from, to) = (controller.pose(), trial.pose());
+        from.translation.z.min(to.translation.z)
+    };
+    let step = trial.step(&command)?;
+    let Some(planned) = &step.planned else {
+        return Ok(vec![(command, step.ticks)]);
+    };
+    let moments = (planned.trajectory.duration() / LOOK).ceil() as usize;
+    let lowest = (0..=moments)
+        .map(|moment| planned.trajectory.sample(moment as f64 * LOOK).position)
+        .map(|joints| trial.chain().forward(&joints).translation.z)
+        .fold(f64::INFINITY, f64::min);
+    if lowest < lower_end(&trial) - DIP {
+        return straight(controller, pose);
+    }
+    *controller = trial;
+    Ok(vec![(command, step.ticks)])
+}
+
+/// A straight way. One that an arm with a spare joint cannot go at once is made in parts, with a
+/// rest between them, in which the arm chooses its posture anew.
+fn straight<const N: usize>(
+    controller: &mut Controller<N>,
+    pose: &Pose,
+) -> Result<Vec<(Command, u64)>, CommandError> {
+    let command = Command::MoveStraightTo { pose: *pose };
+    let whole = match controller.step(&command) {
+        Ok(step) => return Ok(vec![(command, step.ticks)]),
+        Err(error) => error,
+    };
+    let Pose::Axes {
+        point,
+        z_axis,
+        x_axis,
+    } = pose
+    else {
+        return Err(whole);
+    };
+    let Ok(goal) = from_axes(*point, *x_axis, *z_axis) else {
+        return Err(whole);
+    };
+    let start = controller.pose();
+    let mut parts = 2;
+    while N > 6 && parts <= MOST_PARTS {
+        let mut trial = controller.clone();
+        let part = |number: usize| {
+            let share = number as f64 / parts as f64;
+            let between = start.try_lerp_slerp(&goal, share, 1e-9).unwrap_or(goal);
+            let pose = canonical(if number == parts { &goal } else { &between });
+            let command = Command::MoveStraightTo { pose };
+            let ticks = trial.step(&command)?.ticks;
+            Ok((command, ticks))
+        };
+        let done: Result<Vec<_>, CommandError> = (1..=parts).map(part).collect();
+        if let Ok(done) = done {
+            *controller = trial;
+            return Ok(done);
         }
+        parts *= 2;
     }
+    Err(whole)
 }
 
 /// An arm of `N` joints.
 pub(crate) struct ArmMotion<const N: usize> {
     /// Does in thought what the session does.
     mirror: Controller<N>,
-    session: Option<Session>,
-    known: HashMap<Key, Controller<N>>,
-    times: HashMap<(Key, String), f64>,
+    rate_hz: f64,
+    arm: Option<MovingArm>,
+    known: Recent<Key, Controller<N>>,
+    times: Recent<(Key, String), f64>,
 }
 
 impl<const N: usize> ArmMotion<N> {
-    /// The arm, at its home position or where the session found it.
-    pub(crate) fn new(robot: &Robot, session: Option<Session>) -> Result<Self, Failure> {
-        let mut mirror = Controller::new(robot, RATE_HZ, LengthUnit::Meter)
-            .map_err(|error| Failure::new(crate::exit::Exit::Unreadable, error))?;
-        if let Some(session) = &session {
-            mirror.set_joints(SVector::from_column_slice(&session.start));
+    /// The arm where it stands, or at its home position where nothing moves; `rate_hz` is the
+    /// servo rate that times are counted in.
+    ///
+    /// # Errors
+    /// [`Exit::Unreadable`] with the fault of the robot's description.
+    pub(crate) fn new(
+        robot: &Robot,
+        rate_hz: f64,
+        arm: Option<MovingArm>,
+    ) -> Result<Self, Failure> {
+        let mut mirror = Controller::new(robot, rate_hz, LengthUnit::Meter)
+            .map_err(|error| Failure::new(Exit::Unreadable, error))?;
+        if let Some(arm) = &arm {
+            mirror.set_joints(SVector::from_column_slice(arm.start()));
         }
         Ok(Self {
             mirror,
-            session,
-            known: HashMap::new(),
-            times: HashMap::new(),
+            rate_hz,
+            arm,
+            known: Recent::new(REMEMBERED),
+            times: Recent::new(REMEMBERED),
         })
+    }
+
+    /// How a process ends whose arm had a fault, if it had one.
+    pub(crate) fn blame(&self) -> Option<Exit> {
+        self.arm.as_ref().and_then(MovingArm::blame)
+    }
+
+    /// Ends the engine, if there is one; how far (m) the arm was off its path at most.
+    ///
+    /// # Errors
+    /// The samples cannot be written.
+    pub(crate) fn finish(self) -> io::Result<Option<f64>> {
+        self.arm.map(MovingArm::finish).transpose()
     }
 
     /// The end of the arm in the frame of the workstation (m).
@@ -177,7 +203,7 @@ impl<const N: usize> ArmMotion<N> {
     }
 
     /// The controller as it is in this situation.
-    fn controller(&self, start: &Situation) -> Result<Controller<N>, MotionFailure> {
+    fn controller(&mut self, start: &Situation) -> Result<Controller<N>, MotionFailure> {
         let key = key(
             &start.arm,
             start.tool.as_ref().map(|tool| tool.name.as_str()),
@@ -189,65 +215,35 @@ impl<const N: usize> ArmMotion<N> {
         if difference.translation.vector.norm() < 1e-3 && difference.rotation.angle() < 1e-2 {
             return Ok(self.mirror.clone());
         }
-        let reason = "the arm is not where the world says".into();
-        Err(MotionFailure { command: 0, reason })
+        Err(MotionFailure::new(0, "the arm is not where the world says"))
     }
 
-    /// Plans a batch; the controller afterwards and the time (s).
+    /// Plans a batch from where a controller is.
     fn plan(
+        &self,
         mut controller: Controller<N>,
         batch: &Batch,
-    ) -> Result<(Controller<N>, f64), MotionFailure> {
-        let mut ticks = 0;
+    ) -> Result<Planned<N>, MotionFailure> {
+        let (mut ticks, mut commands) = (0, Vec::new());
         for (index, command) in batch.commands.iter().enumerate() {
-            match controller.step(command) {
-                Ok(step) => ticks += step.ticks,
-                Err(error) => {
-                    let reason = format!("{}: {error}", crcl::text::write_command(command));
-                    return Err(MotionFailure {
-                        command: index,
-                        reason,
-                    });
-                }
+            let parts = steps(&mut controller, command).map_err(|error| {
+                let reason = format!("{}: {error}", crcl::text::write_command(command));
+                MotionFailure::new(index, reason)
+            })?;
+            for (part, length) in parts {
+                ticks += length;
+                commands.push(part);
             }
         }
-        Ok((controller, ticks as f64 / RATE_HZ))
+        Ok(Planned {
+            end: controller,
+            seconds: ticks as f64 / self.rate_hz,
+            commands,
+        })
     }
 
     fn remember(&mut self, start: &Situation, batch: &Batch, end: Controller<N>) {
-        if self.known.len() > MOST_REMEMBERED {
-            self.known.clear();
-        }
         self.known.insert(end_key(start, batch), end);
-    }
-
-    /// Has the session execute the commands and waits for the last.
-    fn move_arm(&self, session: &Session, batch: &Batch) -> Result<(), MotionFailure> {
-        let failure = |command: usize, reason: String| MotionFailure { command, reason };
-        let program: crcl::Program = batch.commands.iter().cloned().collect();
-        let ids = session
-            .submit(program.commands)
-            .map_err(|full| failure(0, format!("the queue is full: {full}")))?;
-        let Some(last) = ids.last().copied() else {
-            return Ok(());
-        };
-        let position = |id: u32| ids.iter().position(|known| *known == id).unwrap_or(0);
-        let ends = matches!(batch.commands.last(), Some(Command::EndCanon { .. }));
-        loop {
-            match session.note(Duration::from_millis(100)) {
-                Some(Note::Done { id, .. }) if id == last => return Ok(()),
-                Some(Note::Ended { .. }) if ends => return Ok(()),
-                Some(Note::Refused { id, error, .. }) => {
-                    return Err(failure(position(id), error.to_string()));
-                }
-                Some(Note::Faulted { reason, .. }) => return Err(failure(0, reason)),
-                Some(Note::Aborted { .. } | Note::Closed) => {
-                    return Err(failure(0, "the motion was stopped".into()));
-                }
-                Some(Note::Message { text }) => crate::output::note(&text),
-                _ => {}
-            }
-        }
     }
 }
 
@@ -257,9 +253,13 @@ impl<const N: usize> Motion for ArmMotion<N> {
     }
 
     fn execute(&mut self, start: &Situation, batch: &Batch) -> Result<f64, MotionFailure> {
-        let (end, seconds) = Self::plan(self.mirror.clone(), batch)?;
-        if let Some(session) = &self.session {
-            self.move_arm(session, batch)?;
+        let Planned {
+            end,
+            seconds,
+            commands,
+        } = self.plan(self.mirror.clone(), batch)?;
+        if let Some(arm) = &mut self.arm {
+            arm.execute(&commands)?;
         }
         self.mirror = end.clone();
         self.remember(start, batch, end);
@@ -272,33 +272,28 @@ impl<const N: usize> Motion for ArmMotion<N> {
             start.tool.as_ref().map(|tool| tool.name.as_str()),
         );
         let key = (key, format!("{:?}", batch.commands));
-        if let Some(seconds) = self.times.get(&key)
-            && self.known.contains_key(&end_key(start, batch))
+        if let Some(seconds) = self.times.get(&key).copied()
+            && self.known.get(&end_key(start, batch)).is_some()
         {
-            return Ok(*seconds);
+            return Ok(seconds);
         }
-        let (end, seconds) = Self::plan(self.controller(start)?, batch)?;
+        let controller = self.controller(start)?;
+        let Planned { end, seconds, .. } = self.plan(controller, batch)?;
         self.remember(start, batch, end);
-        if self.times.len() > MOST_REMEMBERED {
-            self.times.clear();
-        }
         self.times.insert(key, seconds);
         Ok(seconds)
     }
 
     fn recover(&mut self) -> bool {
         self.mirror.abort();
-        if let Some(session) = &self.session {
-            session.recover();
-            for _ in 0..50 {
-                match session.note(Duration::from_millis(100)) {
-                    Some(Note::Recovered) => return true,
-                    Some(Note::Closed) => return false,
-                    _ => {}
-                }
-            }
-            return false;
+        let Some(arm) = &mut self.arm else {
+            return true;
+        };
+        let recovered = arm.recover();
+        let joints = arm.setpoint();
+        if joints.len() == N {
+            self.mirror.set_joints(SVector::from_column_slice(&joints));
         }
-        true
+        recovered
     }
 }

@@ -33,6 +33,12 @@ impl Failure {
     }
 }
 
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&chain(&self.cause))
+    }
+}
+
 /// The causes from the outermost to the innermost; one that already says what its own cause says
 /// is not followed by it.
 fn chain(cause: &anyhow::Error) -> String {

@@ -6,14 +6,14 @@ use crcl::ReadOptions;
 use engine::dry_run::FailurePolicy;
 use engine::executor::{Control, ExecutorError};
 use engine::robot::Robot;
-use engine::session::{Note, Session, SessionConfig, SessionError};
+use engine::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
 use ipc::{Answer, ClientServer, Clock, Identity, Ownership, Request, StatusWriter, Verb};
 use serde_json::{Value, json};
 
 use crate::client::{self, ArmOption};
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::simulation::Simulation;
+use crate::simulation::{Kind, Simulation};
 
 /// How often the report for everybody is written.
 const REPORT: Duration = Duration::from_millis(100);
@@ -32,12 +32,27 @@ pub(crate) struct HostOptions {
     /// Which driver moves the arm
     #[arg(long, value_enum, default_value_t = DriverChoice::Sim)]
     pub(crate) driver: DriverChoice,
+    /// Python that runs the MuJoCo driver
+    #[arg(long, value_name = "PYTHON", default_value = "python3")]
+    python: String,
     /// Go in step with the driver instead of by the clock: faster, and the same every time
     #[arg(long)]
     lock_step: bool,
+}
+
+/// What an engine does with a command that it refuses.
+#[derive(Args, Debug)]
+pub(crate) struct RefusalOption {
     /// What happens when a command cannot be executed
     #[arg(long, value_enum, default_value_t = OnRefusal::Abort)]
     on_refusal: OnRefusal,
+}
+
+impl RefusalOption {
+    /// The policy that was chosen.
+    pub(crate) fn policy(&self) -> FailurePolicy {
+        self.on_refusal.into()
+    }
 }
 
 /// Which driver moves the arm.
@@ -45,6 +60,8 @@ pub(crate) struct HostOptions {
 pub(crate) enum DriverChoice {
     /// The built-in simulated servo, started and ended with the engine.
     Sim,
+    /// A MuJoCo simulation of the robot's URDF, started and ended with the engine.
+    Mujoco,
     /// One that runs already.
     External,
 }
@@ -81,15 +98,22 @@ impl HostOptions {
         robot: &Robot,
         place: &str,
         default_length: crcl::LengthUnit,
+        on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
         let arm = self.arm.arm.clone();
         // Before the driver: a second engine must not disturb the arm of the first.
         let clients = ClientServer::open(&arm).map_err(client::failure)?;
         let status = StatusWriter::open(&arm).map_err(client::failure)?;
         let simulation = match self.driver {
-            DriverChoice::Sim => Some(Simulation::start(place, &arm)?),
+            DriverChoice::Sim => Some(Kind::Servos),
+            DriverChoice::Mujoco => Some(Kind::Mujoco {
+                python: &self.python,
+            }),
             DriverChoice::External => None,
         };
+        let simulation = simulation
+            .map(|kind| Simulation::start(kind, place, &arm))
+            .transpose()?;
         let mut config = SessionConfig::new(arm);
         config.rate_hz = self.rate;
         config.clock = if self.lock_step {
@@ -98,7 +122,7 @@ impl HostOptions {
             Clock::Wall
         };
         config.record = true;
-        config.on_refusal = self.on_refusal.into();
+        config.on_refusal = on_refusal;
         config.default_length = default_length;
         let session = Session::start(robot, &config).map_err(failure)?;
         if let Some(warning) = &session.warning {
@@ -220,6 +244,11 @@ impl Host {
                     name,
                     program,
                 } => submit(session, &format, &name, &program),
+                Verb::Jog {
+                    space,
+                    speeds,
+                    timeout_ms,
+                } => jog(session, &space, speeds, timeout_ms),
                 ask => control(session, &ask),
             }
         });
@@ -248,6 +277,24 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
     match session.submit(reading.program.commands) {
         Ok(ids) => Answer::accept(json!({"ids": ids})),
         Err(full) => Answer::refuse(full.to_string()),
+    }
+}
+
+/// Moves by hand for as long as the client goes on asking.
+fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Answer {
+    let space = match space {
+        "joint" => JogSpace::Joint,
+        "tool" => JogSpace::Tool,
+        other => return Answer::refuse(format!("a jog is in joint or tool space, not {other:?}")),
+    };
+    let timeout = Duration::from_millis(timeout_ms);
+    match session.jog(Jog {
+        space,
+        speeds,
+        timeout,
+    }) {
+        Ok(()) => Answer::accept(Value::Null),
+        Err(error) => Answer::refuse(error.to_string()),
     }
 }
 

@@ -14,16 +14,20 @@
 mod arm_motion;
 mod client;
 mod commands;
+mod equipment;
 mod exit;
 mod failure;
 mod host;
 mod logging;
+mod moving_arm;
 mod output;
+mod pddl_file;
 mod picture;
-
+mod plan_report;
 mod plot;
 mod program;
 mod progress;
+mod recent;
 mod recording;
 mod robot;
 mod samples;

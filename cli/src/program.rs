@@ -178,21 +178,22 @@ impl ProgramFile {
         }
     }
 
-    /// Plans the program; commands that are refused are in the plan.
+    /// Plans the program for a servo rate (Hz), from given joints or from home; commands that
+    /// are refused are in the plan.
     ///
     /// # Errors
     /// [`Exit::Unreadable`] when the robot cannot be planned for.
     pub(crate) fn plan(
         &self,
         robot: &Robot,
-        rate_hz: f64,
+        (rate_hz, start): (f64, Option<Vec<f64>>),
         on_refusal: FailurePolicy,
     ) -> Result<Plan, Failure> {
         let options = PlanOptions {
             rate_hz,
             default_length: self.default_length,
             on_refusal,
-            start: None,
+            start,
         };
         plan_program(robot, &self.reading.program, &options)
             .map_err(|error| Failure::new(Exit::Unreadable, error))

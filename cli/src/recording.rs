@@ -14,6 +14,7 @@ pub(crate) struct Recording<W: Write> {
     last: u64,
     worst: f64,
     path: VecDeque<Vector3<f64>>,
+    command: u32,
 }
 
 /// How many published points the measured one is held against: the arm is behind by less.
@@ -40,6 +41,7 @@ impl<W: Write> Recording<W> {
             last: 0,
             worst: 0.0,
             path: VecDeque::with_capacity(BEHIND + 1),
+            command: 0,
         })
     }
 
@@ -52,6 +54,10 @@ impl<W: Write> Recording<W> {
             let first = *self.first.get_or_insert(sample.tick);
             self.last = sample.tick;
             self.hold_against_path(sample);
+            // The instant at which a command begins belongs to the one that ends there.
+            if sample.path_time > 0.0 {
+                self.command = sample.command;
+            }
             let Some(writer) = &mut self.writer else {
                 continue;
             };
@@ -61,7 +67,7 @@ impl<W: Write> Recording<W> {
             extra.extend([place.x, place.y, place.z]);
             let row = SampleRow {
                 t_s: (sample.tick - first) as f64 * self.period,
-                command: sample.command.saturating_sub(1) as usize,
+                command: self.command.saturating_sub(1) as usize,
                 joints: [&sample.q, &sample.dq, &sample.ddq],
                 pose: &sample.workstation_from_tool,
             };

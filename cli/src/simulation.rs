@@ -1,11 +1,11 @@
 use std::env;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use ipc::Arm;
 
 use crate::exit::Exit;
@@ -14,7 +14,19 @@ use crate::failure::Failure;
 /// How long the driver may take to end when it is asked to.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// The simulated driver as a process of our own, ended when this is dropped.
+/// Which simulation moves the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind<'a> {
+    /// The built-in servos.
+    Servos,
+    /// MuJoCo, in this Python.
+    Mujoco {
+        /// The Python with its packages.
+        python: &'a str,
+    },
+}
+
+/// A simulated driver as a process of our own, ended when this is dropped.
 ///
 /// It is in a process group of its own, so that Ctrl-C reaches the engine only, which then stops
 /// the arm with the driver's help. If we die, the end of its standard input tells it.
@@ -24,31 +36,54 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// Starts `canter driver sim` for an arm.
+    /// Starts `canter driver sim` or `canter driver mujoco` for an arm; MuJoCo is waited for,
+    /// because a Python takes its time, or ends without its packages.
     ///
     /// # Errors
     /// [`Exit::NoPeer`] when the process cannot be started.
-    pub(crate) fn start(robot: &str, arm: &Arm) -> Result<Self, Failure> {
+    pub(crate) fn start(kind: Kind<'_>, robot: &str, arm: &Arm) -> Result<Self, Failure> {
+        let output = match kind {
+            Kind::Servos => Stdio::null(),
+            Kind::Mujoco { .. } => Stdio::piped(),
+        };
         let program = env::current_exe().context("cannot find the program's own file");
         let child = program.and_then(|program| {
-            Command::new(program)
-                .args([
-                    "driver",
-                    "sim",
-                    "--until-end-of-input",
-                    "--robot",
-                    robot,
-                    "--arm",
-                ])
+            let mut command = Command::new(program);
+            command.arg("driver");
+            match kind {
+                Kind::Servos => command.arg("sim"),
+                Kind::Mujoco { python } => command.args(["mujoco", "--python", python]),
+            };
+            command
+                .args(["--until-end-of-input", "--robot", robot, "--arm"])
                 .arg(arm.to_string())
                 .stdin(Stdio::piped())
-                .stdout(Stdio::null())
+                .stdout(output)
                 .process_group(0)
                 .spawn()
                 .context("cannot start the simulated driver")
         });
         let child = child.map_err(|cause| Failure::new(Exit::NoPeer, cause))?;
-        Ok(Self { child })
+        let mut simulation = Self { child };
+        simulation.wait_until_ready()?;
+        Ok(simulation)
+    }
+
+    /// Waits for the line that a driver with a piped output says when it is there.
+    fn wait_until_ready(&mut self) -> Result<(), Failure> {
+        let Some(output) = self.child.stdout.take() else {
+            return Ok(());
+        };
+        let mut line = String::new();
+        let read = BufReader::new(output).read_line(&mut line);
+        if read.is_ok_and(|length| length > 0) {
+            return Ok(());
+        }
+        // It has said on standard error why.
+        Err(Failure::new(
+            Exit::NoPeer,
+            anyhow!("the simulated driver did not start"),
+        ))
     }
 
     fn end(&mut self) {

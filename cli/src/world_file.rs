@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use plan::PlanError;
 use plan::world::{Durability, Model, Reader, Writer, import_json, import_nist, import_toml};
+use tempfile::TempDir;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -23,7 +25,7 @@ pub(crate) fn load(path: &Path) -> Result<Model, Failure> {
     import(&read(path)?).map_err(unreadable)
 }
 
-type Importer = fn(&str) -> Result<Model, plan::PlanError>;
+type Importer = fn(&str) -> Result<Model, PlanError>;
 
 /// How a workstation file of this name is read; none for a database.
 fn importer(path: &Path) -> Option<Importer> {
@@ -50,49 +52,67 @@ pub(crate) fn read(path: &Path) -> Result<String, Failure> {
     })
 }
 
-/// A database for one run: its path and whether it is deleted afterwards.
+/// A database for one run.
 pub(crate) struct Database {
     /// Where it is.
     pub(crate) path: PathBuf,
-    temporary: bool,
+    /// The folder of a copy that goes away.
+    _folder: Option<TempDir>,
 }
 
 impl Database {
-    /// The database itself, or with `copy` a copy of the world in a new one that goes away.
-    pub(crate) fn open(world: &Path, copy: bool) -> Result<(Self, Writer), Failure> {
-        let temporary = copy || is_workstation_file(world);
-        let path = if temporary {
-            std::env::temp_dir().join(format!("canter-{}.db", std::process::id()))
-        } else {
-            world.to_owned()
-        };
-        let durability = if temporary {
-            Durability::Process
-        } else {
-            Durability::Full
-        };
+    /// The database itself, or where `copy` is wanted or `world` is a file, a copy: in the new file
+    /// `keep`, or in one that goes away. The last run of a database is copied as well.
+    ///
+    /// # Errors
+    /// [`Exit::Unreadable`]: no such world, or a file of the name `keep` exists.
+    pub(crate) fn open(
+        world: &Path,
+        copy: bool,
+        keep: Option<&Path>,
+    ) -> Result<(Self, Writer), Failure> {
         let unreadable = |error| Failure::new(Exit::Unreadable, error);
-        if !temporary && !path.exists() {
-            let missing = anyhow::anyhow!("{}: there is no such database", path.display());
-            return Err(Failure::new(Exit::Unreadable, missing));
+        if !(copy || keep.is_some() || is_workstation_file(world)) {
+            if !world.exists() {
+                let missing = anyhow::anyhow!("{}: there is no such database", world.display());
+                return Err(unreadable(missing));
+            }
+            let (path, _folder) = (world.to_owned(), None);
+            let writer =
+                Writer::open(&path, Durability::Full).map_err(|error| unreadable(error.into()))?;
+            return Ok((Self { path, _folder }, writer));
         }
-        let model = temporary.then(|| load(world)).transpose()?;
-        let database = Self { path, temporary };
-        let mut writer = Writer::open(&database.path, durability).map_err(unreadable)?;
-        if let Some(model) = model {
-            writer.replace(&model).map_err(unreadable)?;
-        }
-        Ok((database, writer))
+        let (path, _folder) = if let Some(keep) = keep {
+            if keep.exists() {
+                let there = anyhow::anyhow!("{}: there is such a file already", keep.display());
+                return Err(unreadable(there));
+            }
+            (keep.to_owned(), None)
+        } else {
+            let folder = tempfile::Builder::new().prefix("canter-").tempdir()?;
+            (folder.path().join("world.db"), Some(folder))
+        };
+        let writer = copied(world, &path)?;
+        Ok((Self { path, _folder }, writer))
     }
 }
 
-impl Drop for Database {
-    fn drop(&mut self) {
-        if self.temporary {
-            for ending in ["", "-wal", "-shm"] {
-                // What cannot be deleted is in the folder for such things.
-                let _ = std::fs::remove_file(format!("{}{ending}", self.path.display()));
-            }
-        }
+/// A new database with the world, and the last run, of another or of a workstation file.
+fn copied(world: &Path, path: &Path) -> Result<Writer, Failure> {
+    let unreadable = |error: PlanError| Failure::new(Exit::Unreadable, error);
+    let model = load(world)?;
+    let run = if is_workstation_file(world) {
+        None
+    } else {
+        let reader = Reader::open(world).map_err(unreadable)?;
+        reader.last_run().map_err(unreadable)?
+    };
+    let mut writer = Writer::open(path, Durability::Process).map_err(unreadable)?;
+    writer.replace(&model).map_err(unreadable)?;
+    if let Some(run) = run {
+        let id = writer.begin_run(&run).map_err(unreadable)?;
+        let change = Some((id, run.state.as_str(), run.outcome.as_deref()));
+        writer.commit(&[], change).map_err(unreadable)?;
     }
+    Ok(writer)
 }

@@ -87,6 +87,12 @@ impl<const N: usize> Controller<N> {
         &self.modal
     }
 
+    /// Plans moves with the tool in force.
+    #[must_use]
+    pub fn planner(&self) -> &Planner<N> {
+        &self.planner
+    }
+
     /// Refuses everything but InitCanon from now on.
     pub fn abort(&mut self) {
         self.modal.abort();

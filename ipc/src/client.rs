@@ -1,5 +1,6 @@
 //! Requests of operators to a running engine, and its report back.
 
+use core::cell::Cell;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -54,8 +55,11 @@ pub enum Verb {
     Jog {
         /// `joint` or `tool`.
         space: String,
-        /// Speeds as shares of the largest, -1..=1: one a joint, or x, y, z, rx, ry, rz.
+        /// Speeds as shares of the largest, -1..=1: one a joint, or x, y, z, rx, ry, rz of the
+        /// tool's own axes; all 0 stops.
         speeds: Vec<f64>,
+        /// The arm stops when no further request comes for this long (ms).
+        timeout_ms: u64,
     },
     /// Report.
     Status,
@@ -172,10 +176,15 @@ fn is_alive(process: u32) -> bool {
         .exists()
 }
 
-/// The engine's end of the client channel.
+/// How long an answer stays readable when the engine leaves: dropping the channel takes it away.
+const FAREWELL: Duration = Duration::from_millis(200);
+
+/// The engine's end of the client channel. Dropping it waits a moment for the last answer to be
+/// read.
 #[derive(Debug)]
 pub struct ClientServer {
     service: String,
+    answered: Cell<Option<Instant>>,
     server: Server<Shared, [u8], (), [u8], ()>,
     _node: Node<Shared>,
 }
@@ -208,6 +217,7 @@ impl ClientServer {
             })?;
         Ok(Self {
             service: arm.service("client"),
+            answered: Cell::new(None),
             server,
             _node: node,
         })
@@ -249,7 +259,16 @@ impl ClientServer {
         response
             .send()
             .map_err(|cause| fail("answering", format!("{cause:?}")))?;
+        self.answered.set(Some(Instant::now()));
         Ok(true)
+    }
+}
+
+impl Drop for ClientServer {
+    fn drop(&mut self) {
+        if let Some(at) = self.answered.get() {
+            sleep(FAREWELL.saturating_sub(at.elapsed()));
+        }
     }
 }
 
@@ -317,19 +336,24 @@ impl Client {
             .write_from_slice(&text)
             .send()
             .map_err(|cause| fail(format!("{cause:?}")))?;
-        while Instant::now() < end && pending.number_of_server_connections() > 0 {
-            if let Some(answer) = pending
+        loop {
+            // Asked before the look: an answer that came just before the end is still read.
+            let over = Instant::now() >= end || pending.number_of_server_connections() == 0;
+            let answer = pending
                 .receive()
-                .map_err(|cause| fail(format!("{cause:?}")))?
-            {
-                return serde_json::from_slice(answer.payload()).map_err(|cause| {
-                    IpcError::BadText {
-                        service: service(),
-                        cause: cause.to_string(),
-                    }
-                });
+                .map_err(|cause| fail(format!("{cause:?}")))?;
+            match answer {
+                Some(answer) => {
+                    return serde_json::from_slice(answer.payload()).map_err(|cause| {
+                        IpcError::BadText {
+                            service: service(),
+                            cause: cause.to_string(),
+                        }
+                    });
+                }
+                None if over => break,
+                None => sleep(Duration::from_micros(500)),
             }
-            sleep(Duration::from_micros(500));
         }
         let waited_ms = timeout.as_millis() as u64;
         Err(IpcError::NoAnswer {

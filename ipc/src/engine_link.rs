@@ -123,16 +123,17 @@ impl EngineLink {
             return Ok(None);
         }
         let patience = Instant::now() + Duration::from_millis(200);
-        while Instant::now() < end.min(patience) {
-            if let Some(answer) = pending
+        loop {
+            let over = Instant::now() >= end.min(patience);
+            let answer = pending
                 .receive()
-                .map_err(|cause| fail(format!("{cause:?}")))?
-            {
-                return Ok(Some(*answer));
+                .map_err(|cause| fail(format!("{cause:?}")))?;
+            match answer {
+                Some(answer) => return Ok(Some(*answer)),
+                None if over => return Ok(None),
+                None => sleep(Duration::from_micros(200)),
             }
-            sleep(Duration::from_micros(200));
         }
-        Ok(None)
     }
 
     /// Sends a setpoint; says whether iceoryx2 took it. Does not wait, and does not allocate once

@@ -207,3 +207,25 @@ fn one_client_commands_at_a_time() {
     ownership.admit(&ask(&gone, Verb::Resume), false).unwrap();
     ownership.admit(&ask(&here, Verb::Resume), true).unwrap();
 }
+
+/// `canter shutdown`: the engine answers and is gone before the client looks again.
+#[test]
+fn the_last_answer_of_an_engine_that_leaves_is_read() {
+    for _ in 0..10 {
+        let arm = arm("leaves");
+        let server = ClientServer::open(&arm).unwrap();
+        let asking = arm.clone();
+        let client = thread::spawn(move || {
+            let client = Client::open(&asking, "test").unwrap();
+            client.ask(Verb::Shutdown, Duration::from_secs(5))
+        });
+        while !server
+            .serve(|_| Answer::accept(serde_json::Value::Null))
+            .unwrap()
+        {
+            thread::yield_now();
+        }
+        drop(server);
+        assert!(client.join().unwrap().unwrap().accepted);
+    }
+}

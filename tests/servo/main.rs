@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 mod conformance;
+mod hostile;
 mod lock_step;
 mod processes;
+mod scene;
 mod virtual_time;
 mod wall_clock;
 

@@ -328,3 +328,98 @@ fn abort_and_begin_anew() {
     assert!(bench.events().iter().any(finished));
     assert!((bench.remote.measured().setpoint - home()).amax() < 1e-12);
 }
+
+/// The clock jumps: an hour forward, then back to where it was. The engine latches instead of
+/// catching up, and neither side moves faster than it may; jumps back are no time at all.
+#[test]
+fn a_clock_that_jumps() {
+    const HOUR: u64 = 3_600_000_000_000;
+    let mut bench = Bench::new();
+    assert!(feed(&mut bench.feeder, 0));
+    bench.run(400);
+    // Time stamps of the driver from the future and from the past are no time to rely on.
+    for published_ns in [u64::MAX, 0, HOUR] {
+        let setpoint = bench.period(0, |state| {
+            Some(State {
+                published_ns,
+                measured_ns: published_ns,
+                ..state
+            })
+        });
+        assert_eq!(setpoint.flags & SetpointFlags::STOPPING, 0);
+    }
+    bench.period(HOUR / 1_000_000, Some);
+    bench.run(600);
+    bench.assert_smooth();
+    let now = bench.remote.measured();
+    assert!(now.faulted && now.resting);
+    let stalled = |event: &Event| {
+        matches!(
+            event,
+            Event::Faulted {
+                fault: Fault::Stalled { .. },
+                ..
+            }
+        )
+    };
+    assert!(bench.events().iter().any(stalled));
+}
+
+/// The same for the driver: an hour without a setpoint, by its clock, is a stop within its own
+/// limits from where it was; a clock that goes back moves nothing.
+#[test]
+fn a_clock_that_jumps_at_the_driver() {
+    const PERIOD: u64 = 1_000_000;
+    let mut options = system_tests::servo_arm::driver_options("virtual/jump".parse().unwrap());
+    options.noise = 0.0;
+    let limits = limits();
+    let mut driver = driver_sim::driver(options).unwrap();
+    let start = 1_000_000_000_000_u64;
+    let hello = ipc::Hello::new(JOINTS, PERIOD, 100_000_000, Clock::Wall);
+    let ack = driver.greet(&hello, start);
+    let mut positions: Vec<[f64; JOINTS]> = Vec::new();
+    let mut period = |number: u64, now: u64, follow: bool| {
+        let plan = planned(0, number as f64 * 0.001);
+        let before = planned(0, number.saturating_sub(1) as f64 * 0.001);
+        let mut setpoint = Setpoint {
+            joints: JOINTS as u32,
+            session: ack.session,
+            sequence: number + 1,
+            period_ns: PERIOD,
+            watchdog_ns: 100_000_000,
+            ..Setpoint::default()
+        };
+        setpoint.position[..JOINTS].copy_from_slice(plan.as_slice());
+        setpoint.velocity[..JOINTS].copy_from_slice(((plan - before) * 1000.0).as_slice());
+        if follow {
+            driver.receive(&setpoint, now);
+        }
+        let state = driver.step(now, PERIOD);
+        positions.push(core::array::from_fn(|joint| state.position[joint]));
+        state
+    };
+    for number in 0..400 {
+        // The clock goes back by a second in the middle.
+        let back = if number > 200 { 1_000_000_000 } else { 0 };
+        let state = period(number, start + number * PERIOD - back, true);
+        assert!(matches!(
+            state.driver(),
+            DriverState::Armed | DriverState::Active
+        ));
+    }
+    let later = start + 3_600_000_000_000;
+    let mut last = State::default();
+    for number in 400..1400 {
+        last = period(number, later + number * PERIOD, false);
+    }
+    assert_eq!(
+        (last.driver(), last.fault_code()),
+        (DriverState::Fault, FaultCode::Watchdog)
+    );
+    for pair in positions.windows(2) {
+        for joint in 0..JOINTS {
+            let speed = (pair[1][joint] - pair[0][joint]).abs() / 0.001;
+            assert!(speed <= limits.velocity[joint], "{speed} rad/s");
+        }
+    }
+}

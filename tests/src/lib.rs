@@ -7,3 +7,4 @@ pub mod arm;
 pub mod motion;
 pub mod repository;
 pub mod servo_arm;
+pub mod signal;

@@ -6,7 +6,7 @@ use system_tests::repository::root;
 use toml::{Table, Value};
 
 /// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     (
         "cli",
         &[
@@ -26,7 +26,8 @@ const ARROWS: [(&str, &[&str]); 9] = [
         &["crcl", "kinematics", "trajectory", "realtime", "ipc"],
     ),
     ("trajectory", &["realtime"]),
-    ("driver-sim", &["ipc", "realtime"]),
+    ("driver-kit", &["ipc", "realtime"]),
+    ("driver-sim", &["driver-kit", "ipc"]),
     ("crcl", &[]),
     ("kinematics", &[]),
     ("realtime", &[]),

@@ -169,3 +169,19 @@ fn forward_kinematics_of_a_file() {
         }
     }
 }
+
+#[test]
+fn a_program_is_converted_there_and_back() {
+    let text = canter(["convert", "examples/pick_and_place.canon"]);
+    assert_eq!((text.code, text.stderr.as_str()), (0, ""));
+    let json: serde_json::Value = serde_json::from_str(&text.stdout).unwrap();
+    assert_eq!(json["commands"].as_array().unwrap().len(), 24);
+    let back = canter_reading(["convert", "-"], text.stdout.as_bytes());
+    assert_eq!(back.code, 0, "{}", back.stderr);
+    let again = canter_reading(["convert", "-"], back.stdout.as_bytes());
+    assert_eq!(again.stdout, text.stdout);
+    let bad = canter_reading(["convert", "-"], b"MoveTo({{1,2}})");
+    assert_eq!((bad.code, bad.stdout.as_str()), (3, ""));
+    let schema: serde_json::Value = serde_json::from_str(&canter(["schema"]).stdout).unwrap();
+    assert_eq!(schema["title"], "Canonical robot program");
+}

@@ -4,11 +4,17 @@
 
 mod arrows;
 mod bad_inputs;
+mod benchmarks;
 mod canter;
 mod command_line;
+mod documents;
+mod drivers;
+mod killed_plans;
 mod planned_motions;
+mod plans;
 mod runs;
 mod session;
+mod soak;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
 #[test]

@@ -1,12 +1,13 @@
 //! `canter run` and the commands around a running engine, as real processes.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
+use std::process::{Child, ChildStdout, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::canter::{canter, command};
+use system_tests::signal;
 
 /// An arm name that no other test uses.
 fn arm(name: &str) -> String {
@@ -112,6 +113,190 @@ fn a_run_publishes_what_was_planned() {
         }
     }
     assert!(compared > 4000, "only {compared} setpoints were compared");
+    measured_way(&folder.path().join("run.csv"), program);
+}
+
+/// The measured way keeps the tolerances of the program: 10 mm at the intermediate poses, in their
+/// order, and 0.5 mm at the end of each move.
+fn measured_way(samples: &std::path::Path, program: &str) {
+    let axes = ["x", "y", "z"].map(|axis| format!("measured_{axis}_m"));
+    let rows = columns(samples, &axes);
+    let text = std::fs::read_to_string(system_tests::repository::root().join(program)).unwrap();
+    let reading = crcl::text::read(&text, &crcl::ReadOptions::default());
+    let mut passed = 0;
+    for (index, command) in reading.program.iter().enumerate() {
+        let poses = match command {
+            crcl::Command::MoveTo { pose } | crcl::Command::MoveStraightTo { pose } => {
+                std::slice::from_ref(pose)
+            }
+            crcl::Command::MoveSmoothlyTo { poses } => poses,
+            _ => continue,
+        };
+        // The arm is behind its setpoints: what follows a move shows where it came to rest.
+        let rows = rows
+            .iter()
+            .filter(|row| (index..=index + 1).contains(&row.0));
+        let mut rows = rows.peekable();
+        for (number, pose) in poses.iter().enumerate() {
+            let crcl::Pose::Axes { point, .. } = pose else {
+                panic!("the example has poses by axes")
+            };
+            let tolerance = if number + 1 == poses.len() {
+                5e-4
+            } else {
+                1e-2
+            };
+            let distance = |at: &[f64]| {
+                let squares = at
+                    .iter()
+                    .zip(point)
+                    .map(|(at, mm)| (at - mm * 1e-3).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            let found = rows.by_ref().any(|row| distance(&row.1) <= tolerance);
+            assert!(found, "command {index} does not pass pose {number}");
+            passed += 1;
+        }
+    }
+    assert_eq!(passed, 8);
+}
+
+/// Starts a run of the example, with its answers line by line, and waits until `command` of it is
+/// done.
+fn started(
+    arguments: &[&str],
+    command_done: usize,
+) -> (Child, std::io::Lines<BufReader<ChildStdout>>) {
+    let mut child = command(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut done = 0;
+    while done < command_done {
+        let line = lines.next().expect("the run ended early").unwrap();
+        done += usize::from(line.contains("\"done\""));
+    }
+    (child, lines)
+}
+
+const EXAMPLE: &str = "examples/pick_and_place.canon";
+
+/// Setpoints of the last rows of a recording.
+fn last_rest(samples: &std::path::Path) -> f64 {
+    let names: Vec<String> = (1..=6).map(|joint| format!("dq{joint}")).collect();
+    let rows = columns(samples, &names);
+    let (_, last) = rows.last().unwrap();
+    last.iter().map(|speed| speed.abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn ctrl_c_stops_on_the_path_and_cleans_up() {
+    for presses in [1, 2] {
+        let arm = arm(&format!("interrupted{presses}"));
+        let folder = tempfile::tempdir().unwrap();
+        let samples = folder.path().join("run.csv");
+        let text = samples.to_str().unwrap();
+        let (mut child, lines) = started(
+            &[
+                "run",
+                EXAMPLE,
+                "-r",
+                "ur5e",
+                "--json",
+                "--arm",
+                &arm,
+                "--samples",
+                text,
+            ],
+            12,
+        );
+        for _ in 0..presses {
+            std::thread::sleep(Duration::from_millis(150));
+            signal::send(&child, libc::SIGINT);
+        }
+        assert_eq!(child.wait().unwrap().code(), Some(5), "{presses} times");
+        let answers: Vec<String> = lines.map(Result::unwrap).collect();
+        let summary: Value = serde_json::from_str(answers.last().unwrap()).unwrap();
+        assert_eq!(summary["exit"], 5);
+        assert!(summary["done"].as_u64().unwrap() < 24, "{summary}");
+        assert!(last_rest(&samples) < 1e-6, "the last setpoint still moves");
+        // Engine and driver are gone.
+        assert_eq!(canter(["status", "--arm", &arm]).code, 4);
+        let alone = canter([
+            "engine", "-r", "ur5e", "--driver", "external", "--arm", &arm,
+        ]);
+        assert_eq!(alone.code, 4, "{}", alone.stderr);
+    }
+}
+
+/// A driver of its own for an arm; killed when the test fails before its end.
+fn driver(arm: &str, options: &[&str]) -> Engine {
+    let arguments = ["driver", "sim", "-r", "ur5e", "--arm", arm];
+    let child = command(arguments.iter().chain(options))
+        .stderr(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    Engine(child)
+}
+
+#[test]
+fn an_arm_that_does_not_follow_is_stopped_by_the_guard() {
+    let arm = arm("sluggish");
+    let _driver = driver(&arm, &["--delay", "150"]);
+    let ran = canter([
+        "run", EXAMPLE, "-r", "ur5e", "--driver", "external", "--arm", &arm,
+    ]);
+    assert_eq!(ran.code, 6, "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stderr.contains("following error"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_driver_that_dies_is_told() {
+    let arm = arm("dying");
+    let mut driver = driver(&arm, &[]);
+    let (mut child, lines) = started(
+        &[
+            "run", EXAMPLE, "-r", "ur5e", "--driver", "external", "--json", "--arm", &arm,
+        ],
+        12,
+    );
+    std::thread::sleep(Duration::from_millis(100));
+    driver.0.kill().unwrap();
+    driver.0.wait().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(7));
+    let answers: Vec<String> = lines.map(Result::unwrap).collect();
+    assert!(
+        answers.iter().any(|line| line.contains("\"faulted\"")),
+        "{answers:?}"
+    );
+}
+
+/// A program that cannot be done from where an external arm stands moves nothing.
+#[test]
+fn an_external_arm_is_asked_where_it_stands() {
+    let arm = arm("elsewhere");
+    let _driver = driver(&arm, &[]);
+    let program = "InitCanon()\nMoveTo({{400, -100, 300}, {0,0,-1}, {1,0,0}})\n\
+        MoveTo({{4000, -100, 300}, {0,0,-1}, {1,0,0}})\nEndCanon(0)\n";
+    let run = [
+        "run", "-", "-r", "ur5e", "--driver", "external", "--arm", &arm,
+    ];
+    let ran = crate::canter::canter_reading(run, program.as_bytes());
+    assert_eq!(ran.code, 1, "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stderr.contains("out of reach"), "{}", ran.stderr);
+    assert!(!ran.stdout.contains("MoveTo"), "{}", ran.stdout);
+    let mut skip = run.to_vec();
+    skip.extend(["--on-refusal", "skip"]);
+    let ran = crate::canter::canter_reading(skip, program.as_bytes());
+    assert_eq!(ran.code, 1, "{}{}", ran.stdout, ran.stderr);
+    assert!(
+        ran.stdout.contains("3 of 4 commands done"),
+        "{}",
+        ran.stdout
+    );
 }
 
 /// An engine as a process; killed when the test fails before its end.
@@ -207,6 +392,39 @@ fn an_engine_serves_clients() {
     assert_eq!(engine.end(), Some(0));
     let gone = canter(["status", "--arm", &arm]);
     assert_eq!((gone.code, gone.stdout.as_str()), (4, ""));
+}
+
+/// A jog lasts as long as its client asks; a second client is refused by name meanwhile, and when
+/// the first is killed the arm stops by itself, on its way and without a fault.
+#[test]
+fn a_jog_needs_its_client_alive() {
+    let arm = arm("jog");
+    let engine = Engine::start(&arm);
+    let joint = |now: &Value| now["joints"][0].as_f64().unwrap();
+    let before = joint(&status(&arm));
+    let ran = canter(["jog", "j1=0.1", "--seconds", "0.5", "--arm", &arm]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let now = wait_for(&arm, "rest", |now| now["idle"] == true);
+    let moved = joint(&now) - before;
+    // A tenth of 3.14 rad/s, for as long as the client lived and a little longer.
+    assert!(moved > 0.02 && moved < 2.0, "{moved} rad");
+
+    let mut first = command(["jog", "z=0.02", "--arm", &arm]).spawn().unwrap();
+    wait_for(&arm, "a jog", |now| now["command"] == "jog");
+    let second = canter(["jog", "z=-0.02", "--seconds", "0.1", "--arm", &arm]);
+    assert_eq!(second.code, 1, "{}", second.stderr);
+    let refusal = "commanded by \"canter jog\"";
+    assert!(second.stderr.contains(refusal), "{}", second.stderr);
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let now = wait_for(&arm, "rest", |now| now["idle"] == true);
+    assert!(now["fault"].is_null(), "{now}");
+
+    // Out of reach, or of range, it says why and nothing moves.
+    let ran = canter(["jog", "j7=0.1", "--arm", &arm]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert_eq!(canter(["shutdown", "--arm", &arm]).code, 0);
+    assert_eq!(engine.end(), Some(0));
 }
 
 #[test]

@@ -134,7 +134,7 @@ pub fn verify<const N: usize>(samples: &[Recorded<N>], wanted: &Wanted<'_, N>) -
     verdict.peaks = joint_peaks(samples, wanted);
     verdict.peaks.extend(tool_peaks(samples, wanted));
     verdict.position_excess = position_excess(samples, wanted.joint);
-    verdict.passes = passes(samples, wanted.targets);
+    verdict.passes = passes(samples, wanted);
     verdict.rest = [rest(samples, wanted), rest_backward(samples, wanted)];
     verdict.findings = findings(&verdict, wanted);
     verdict
@@ -409,7 +409,8 @@ struct Approach {
 }
 
 /// The targets with the best approaches that keep their order.
-fn passes<const N: usize>(samples: &[Recorded<N>], targets: &[Target]) -> Vec<Passed> {
+fn passes<const N: usize>(samples: &[Recorded<N>], wanted: &Wanted<'_, N>) -> Vec<Passed> {
+    let (targets, bend) = (wanted.targets, bend(samples, wanted.tool));
     // Latest interval in which each target may be passed so that all later ones still can.
     let last = samples.len().saturating_sub(1);
     let mut latest = vec![last; targets.len()];
@@ -417,7 +418,7 @@ fn passes<const N: usize>(samples: &[Recorded<N>], targets: &[Target]) -> Vec<Pa
     for (index, target) in targets.iter().enumerate().rev() {
         let inside = (0..=end)
             .rev()
-            .find(|i| within(&approach(samples, *i, target), target));
+            .find(|i| within(&approach(samples, *i, target), target, bend));
         end = inside.unwrap_or(end);
         latest[index] = end;
     }
@@ -440,7 +441,7 @@ fn passes<const N: usize>(samples: &[Recorded<N>], targets: &[Target]) -> Vec<Pa
             angle,
             time,
         } = near;
-        let within = within(&near, target);
+        let within = within(&near, target, bend);
         passed.push(Passed {
             index,
             deviation: distance,
@@ -452,9 +453,23 @@ fn passes<const N: usize>(samples: &[Recorded<N>], targets: &[Target]) -> Vec<Pa
     passed
 }
 
-/// Whether an approach keeps the tolerances of a target, up to rounding.
-fn within(near: &Approach, target: &Target) -> bool {
-    near.distance <= target.tolerance * ALLOWED + 1e-9
+/// Largest distance (m) of a motion within an acceleration limit from the chords between its
+/// samples: it may have been that much nearer to a target than they are.
+fn bend<const N: usize>(samples: &[Recorded<N>], tool: &ToolLimits) -> f64 {
+    let step = samples
+        .windows(2)
+        .map(|pair| pair[1].time - pair[0].time)
+        .fold(0.0, f64::max);
+    if tool.acceleration.is_finite() {
+        tool.acceleration * step * step / 8.0
+    } else {
+        0.0
+    }
+}
+
+/// Whether an approach keeps the tolerances of a target, up to rounding and `bend` (m).
+fn within(near: &Approach, target: &Target, bend: f64) -> bool {
+    near.distance <= target.tolerance * ALLOWED + 1e-9 + bend
         && near.angle <= target.angular_tolerance * ALLOWED + 1e-7
 }
 

@@ -8,7 +8,7 @@ use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::HostOptions;
+use crate::host::{HostOptions, RefusalOption};
 use crate::output;
 use crate::robot::RobotOption;
 
@@ -22,6 +22,8 @@ pub(crate) struct Engine {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    #[command(flatten)]
+    refusal: RefusalOption,
     /// Print one JSON object for everything that happens, one a line
     #[arg(long)]
     json: bool,
@@ -33,7 +35,9 @@ impl Engine {
         let robot = self.robot.load()?;
         let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
         let length = crcl::LengthUnit::default();
-        let mut host = self.host.start(&robot, self.robot.place(), length)?;
+        let mut host =
+            self.host
+                .start(&robot, self.robot.place(), length, self.refusal.policy())?;
         output::note(&format!(
             "canter: engine of {} at {}, driver {}",
             robot.name, self.host.arm.arm, host.session.driver

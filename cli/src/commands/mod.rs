@@ -6,10 +6,13 @@ mod abort;
 mod bench;
 mod check;
 mod completions;
+mod convert;
+mod doctor;
 mod driver;
 mod engine;
 mod fk;
 mod ik;
+mod jog;
 mod man;
 mod override_speed;
 mod pause;
@@ -20,6 +23,7 @@ mod recover;
 mod resume;
 mod robots;
 mod run;
+mod schema;
 mod send;
 mod shutdown;
 mod status;
@@ -39,10 +43,13 @@ pub(crate) enum Command {
     Bench(bench::Bench),
     Check(check::Check),
     Completions(completions::Completions),
+    Convert(convert::Convert),
+    Doctor(doctor::Doctor),
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
     Ik(ik::Ik),
+    Jog(jog::Jog),
     Man(man::Man),
     Override(override_speed::Override),
     Pause(pause::Pause),
@@ -54,6 +61,7 @@ pub(crate) enum Command {
     PlanCheck(plan_check::PlanCheck),
     PlanRun(plan_run::PlanRun),
     Run(run::Run),
+    Schema(schema::Schema),
     Send(send::Send),
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
@@ -69,10 +77,13 @@ impl Command {
             Self::Bench(command) => command.run(),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
+            Self::Convert(command) => command.run(),
+            Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
+            Self::Jog(command) => command.run(),
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),
@@ -84,6 +95,7 @@ impl Command {
             Self::PlanCheck(command) => command.run(),
             Self::PlanRun(command) => command.run(),
             Self::Run(command) => command.run(),
+            Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),

@@ -1,18 +1,21 @@
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use plan::finding::{Finding, Severity, has_errors};
 use plan::kitting::{Plan, check, read};
+use plan::pddl::{PddlError, read_domain, read_plan, read_problem, simulate};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::pddl_file::{action_table, is_pddl};
 use crate::{output, world_file};
 
-/// Check a kitting process plan without executing it
+/// Check a kitting process plan or a PDDL plan without executing it
 ///
-/// Reads the outline layout, the block layout and JSON. With a world also checks that what the plan
-/// requires is there.
+/// Kitting plans are read in the outline layout, the block layout and JSON; with a world also checks
+/// that what the plan requires is there. A PDDL plan is executed in thought when its domain and
+/// problem are given: up to its goal, or to the first precondition that is false.
 #[derive(Args, Debug)]
 pub(crate) struct PlanCheck {
     /// The plan
@@ -20,6 +23,15 @@ pub(crate) struct PlanCheck {
     /// Database, or workstation file (.toml, .json, .xml)
     #[arg(long, value_name = "WORLD")]
     world: Option<PathBuf>,
+    /// Domain of a PDDL plan
+    #[arg(long, value_name = "DOMAIN.pddl", requires = "problem")]
+    domain: Option<PathBuf>,
+    /// Problem of a PDDL plan
+    #[arg(long, value_name = "PROBLEM.pddl", requires = "domain")]
+    problem: Option<PathBuf>,
+    /// Table (TOML) of further PDDL actions
+    #[arg(long, value_name = "TABLE.toml")]
+    actions: Option<PathBuf>,
     /// Print counts and findings as JSON
     #[arg(long)]
     json: bool,
@@ -29,6 +41,9 @@ impl PlanCheck {
     /// Reads and checks the plan.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let source = world_file::read(&self.plan)?;
+        if self.domain.is_some() || is_pddl(&source) {
+            return self.pddl(&source);
+        }
         let world = self.world.as_deref().map(world_file::load).transpose()?;
         let reading = read(&source);
         let mut findings = reading.findings;
@@ -46,6 +61,62 @@ impl PlanCheck {
         } else {
             Exit::Done
         })
+    }
+
+    fn pddl(&self, source: &str) -> Result<Exit, Failure> {
+        let verdict = self.judge(source)?;
+        let (steps, reason) = match &verdict {
+            Ok(steps) => (*steps, None),
+            Err((steps, reason)) => (*steps, Some(reason)),
+        };
+        let goal = self.problem.is_some();
+        if self.json {
+            let goal = goal.then_some(verdict.is_ok());
+            output::json(&serde_json::json!({
+                "steps": steps,
+                "goal_reached": goal,
+                "reason": reason,
+            }))?;
+        } else {
+            let mut out = io::stdout().lock();
+            match reason {
+                Some(reason) => writeln!(out, "{}: {reason}", self.plan.display())?,
+                None if goal => writeln!(out, "{steps} steps, the goal is reached")?,
+                None => writeln!(out, "{steps} steps, all actions are known")?,
+            }
+        }
+        Ok(if verdict.is_ok() {
+            Exit::Done
+        } else {
+            Exit::Refused
+        })
+    }
+
+    /// Steps of a PDDL plan that is as it should be, or the number of those and what is wrong.
+    fn judge(&self, source: &str) -> Result<Result<usize, (usize, String)>, Failure> {
+        let steps = match read_plan(source) {
+            Ok(steps) => steps,
+            Err(error) => return Ok(Err((0, error.to_string()))),
+        };
+        let count = steps.len();
+        if let (Some(domain), Some(problem)) = (&self.domain, &self.problem) {
+            let unreadable = |path: &Path, error: PddlError| {
+                let message = anyhow::anyhow!("{}: {error}", path.display());
+                Failure::new(Exit::Unreadable, message)
+            };
+            let read = read_domain(&world_file::read(domain)?);
+            let known = read.map_err(|error| unreadable(domain, error))?;
+            let read = read_problem(&world_file::read(problem)?);
+            let asked = read.map_err(|error| unreadable(problem, error))?;
+            let done = simulate(&known, &asked, &steps);
+            return Ok(done.map_err(|failure| (count, failure.to_string())));
+        }
+        let table = action_table(self.actions.as_deref())?;
+        let unknown = steps.iter().find_map(|step| {
+            let message = table.knows(step).err()?;
+            Some(format!("line {}: {message}", step.line))
+        });
+        Ok(unknown.map_or(Ok(count), |message| Err((count, message))))
     }
 
     fn print_json(&self, source: &str, plan: &Plan, findings: &[Finding]) -> io::Result<()> {

@@ -1,58 +1,63 @@
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use crcl::LengthUnit;
+use engine::dry_run::FailurePolicy;
 use engine::robot::Robot;
-use engine::session::{Session, SessionConfig};
-use ipc::{Arm, Clock};
 use plan::PlanError;
-use plan::interp::{PddlInterpreter, pull};
-use plan::pddl::ActionTable;
+use plan::interp::{PddlInterpreter, PulledReport, pull};
 use plan::run::{
     Cell, Controller, Event, Motion, Policy, Program, Report, RobotOptions, RunOptions,
-    SimulatedFactotum, Stock,
+    SimulatedFactotum, Stock, parameters, prepare,
 };
-use plan::world::{Reader, Writer};
+use plan::world::{Model, Reader, Writer};
 
-use crate::arm_motion::{ArmMotion, OwnDriver, equip};
+use crate::arm_motion::ArmMotion;
+use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::robot::{load, with_joints};
+use crate::host::HostOptions;
+use crate::moving_arm::MovingArm;
+use crate::pddl_file::{action_table, is_pddl};
+use crate::plan_report::PlanReport;
+use crate::robot::{RobotOption, with_joints};
 use crate::world_file::Database;
 use crate::{output, world_file};
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
-/// With --dry-run the motion is planned exactly as in a real run but nothing moves, and the world is
-/// left as it is. Otherwise a driver of the arm must be running, or give --sim. The factotum is
-/// simulated: it brings supplies like those at the start.
+/// Starts the engine and, unless told otherwise, the simulated driver. With --dry-run the motion is
+/// planned exactly as in a real run but nothing moves, and the world is left as it is. The factotum
+/// is simulated: it brings supplies like those at the start. Ctrl-C stops on the path and ends; the
+/// run can then be resumed. A second Ctrl-C aborts.
 #[derive(Args, Debug)]
 pub(crate) struct PlanRun {
     /// The plan; not needed with --resume
-    #[arg(required_unless_present = "resume")]
+    #[arg(required_unless_present = "resume", conflicts_with = "resume")]
     plan: Option<PathBuf>,
     /// Database (changed by the run), or workstation file (.toml, .json, .xml; used as a copy)
     #[arg(long, value_name = "WORLD")]
     world: PathBuf,
-    /// Shipped robot (see `canter robots list`) or a folder with robot.urdf and robot.toml
-    #[arg(short, long, value_name = "R")]
-    robot: String,
+    #[command(flatten)]
+    robot: RobotOption,
+    #[command(flatten)]
+    host: HostOptions,
     /// Value of a parameter of the plan
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
-    /// Plan all motion, move nothing, change nothing
-    #[arg(long, conflicts_with_all = ["sim", "resume"])]
+    /// How often the factotum brings what meets a requirement; without this, always
+    #[arg(long, value_name = "REQUIREMENT=TIMES")]
+    stock: Vec<String>,
+    /// Plan all motion, move nothing, leave the world as it is
+    #[arg(long)]
     dry_run: bool,
-    /// Go on with the last run of the database, which was killed
+    /// Run in a copy of the world, which is kept in this new database
+    #[arg(long, value_name = "FILE.db")]
+    keep: Option<PathBuf>,
+    /// Go on with the last run of the database, which was killed or stopped
     #[arg(long)]
     resume: bool,
-    /// Start a simulated driver and run in step with it
-    #[arg(long)]
-    sim: bool,
-    /// Name of the arm, as cell/arm
-    #[arg(long, value_name = "CELL/ARM", default_value = "canter/arm")]
-    arm: Arm,
     /// Percentage of the arm's speed and acceleration
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     speed: f64,
@@ -65,6 +70,9 @@ pub(crate) struct PlanRun {
     /// Table (TOML) of further PDDL actions
     #[arg(long, value_name = "TABLE.toml")]
     actions: Option<PathBuf>,
+    /// Write what was published and measured as CSV
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "dry_run")]
+    samples: Option<PathBuf>,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -86,48 +94,88 @@ fn refused(error: PlanError) -> Failure {
 impl PlanRun {
     /// Executes the plan.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        let mut robot = load(&self.robot)?;
-        let (database, writer) = Database::open(&self.world, self.dry_run)?;
-        equip(&mut robot, &writer.model().map_err(refused)?).map_err(refused)?;
-        let _driver = if self.sim {
-            Some(OwnDriver::start(&robot, &self.arm)?)
-        } else {
+        let mut robot = self.robot.load()?;
+        let source = self.plan.as_deref().map(world_file::read).transpose()?;
+        let (parameters, limits) = (self.parameters()?, self.limits()?);
+        let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
+        let model = writer.model().map_err(refused)?;
+        self.check(source.as_deref(), &parameters, &model)?;
+        equip(&mut robot, &model).map_err(refused)?;
+        let arm = if self.dry_run {
             None
-        };
-        let session = if self.dry_run {
-            None
         } else {
-            Some(self.session(&robot)?)
+            Some(self.moving_arm(&robot)?)
         };
-        with_joints!(
-            robot.dof(),
-            execute(self, &robot, session, &database, writer)
-        )
+        let task = Task {
+            command: self,
+            source,
+            parameters,
+            limits,
+            database,
+            writer,
+        };
+        with_joints!(robot.dof(), execute(task, &robot, arm))
     }
 
-    fn session(&self, robot: &Robot) -> Result<Session, Failure> {
-        let mut config = SessionConfig::new(self.arm.clone());
-        if self.sim {
-            config.clock = Clock::LockStep;
+    /// What can be known before an engine is started.
+    fn check(
+        &self,
+        source: Option<&str>,
+        given: &BTreeMap<String, String>,
+        model: &Model,
+    ) -> Result<(), Failure> {
+        match source {
+            Some(source) if !is_pddl(source) => {
+                let (program, _) = prepare(source, model).map_err(refused)?;
+                parameters(&program, given).map_err(refused)?;
+                Ok(())
+            }
+            _ => Ok(()),
         }
-        let session = Session::start(robot, &config);
-        session.map_err(|error| Failure::new(Exit::NoPeer, error))
+    }
+
+    fn moving_arm(&self, robot: &Robot) -> Result<MovingArm, Failure> {
+        let place = self.robot.place();
+        let (metres, policy) = (LengthUnit::Meter, FailurePolicy::Abort);
+        let host = self.host.start(robot, place, metres, policy)?;
+        let (joints, rate) = (robot.dof(), self.host.rate);
+        MovingArm::new(host, (joints, rate), self.samples.as_deref())
     }
 
     fn parameters(&self) -> Result<BTreeMap<String, String>, Failure> {
-        let pair = |text: &String| {
-            let (name, value) = text.split_once('=').ok_or_else(|| {
-                let message = anyhow::anyhow!("--set {text}: expected NAME=VALUE");
-                Failure::new(Exit::Usage, message)
-            })?;
-            Ok((name.trim().to_owned(), value.trim().to_owned()))
-        };
-        self.set.iter().map(pair).collect()
+        pairs("--set", &self.set)
     }
 
-    fn robot_options(&self) -> RobotOptions {
+    /// How often the factotum still brings something.
+    fn limits(&self) -> Result<BTreeMap<String, usize>, Failure> {
+        let number = |(name, times): (String, String)| match times.parse() {
+            Ok(times) => Ok((name, times)),
+            Err(_) => {
+                let message = anyhow::anyhow!("--stock {name}={times}: expected a number of times");
+                Err(Failure::new(Exit::Usage, message))
+            }
+        };
+        let pairs = pairs("--stock", &self.stock)?;
+        pairs.into_iter().map(number).collect()
+    }
+
+    fn options(&self, robot: &Robot) -> RunOptions {
+        RunOptions {
+            robot: self.robot_options(robot),
+            policy: match self.repair {
+                0 => Policy::Stop,
+                attempts => Policy::Repair { attempts },
+            },
+            choose_order: !self.written_order,
+        }
+    }
+
+    fn robot_options(&self, robot: &Robot) -> RobotOptions {
         RobotOptions {
             percent: Some(self.speed),
+            // Straight ways in a row leave a seven-joint arm in whatever posture they end in;
+            // between free ones it can take a good posture again.
+            straight: robot.dof() <= 6,
             ..RobotOptions::default()
         }
     }
@@ -137,10 +185,12 @@ impl PlanRun {
             Event::Statement {
                 name,
                 line,
-                number,
                 seconds,
+                ..
             } if self.verbose => {
-                output::note(&format!("{number}: line {line}, {name}, {seconds:.3} s"));
+                output::note(&format!(
+                    "done     line {line:4}  {name:30} {seconds:9.3} s"
+                ));
             }
             Event::Kit(number) => output::note(&format!("kit {number} is finished")),
             Event::EndEffector(name) if self.verbose => output::note(&format!("with {name}")),
@@ -149,157 +199,104 @@ impl PlanRun {
             _ => {}
         }
     }
+}
 
-    fn kitting(
-        &self,
-        source: Option<&str>,
-        database: &Database,
-        writer: Writer,
-        motion: &mut dyn Motion,
-    ) -> Result<Exit, Failure> {
-        let model = writer.model().map_err(refused)?;
-        let stock = match source {
-            Some(source) => Stock::of(&model, &Program::new(plan::kitting::read(source).plan).plan),
+/// Values by name, from NAME=VALUE.
+fn pairs(option: &str, texts: &[String]) -> Result<BTreeMap<String, String>, Failure> {
+    let pair = |text: &String| {
+        let (name, value) = text.split_once('=').ok_or_else(|| {
+            let message = anyhow::anyhow!("{option} {text}: expected NAME=VALUE");
+            Failure::new(Exit::Usage, message)
+        })?;
+        Ok((name.trim().to_owned(), value.trim().to_owned()))
+    };
+    texts.iter().map(pair).collect()
+}
+
+/// A plan with all it needs but an arm.
+struct Task<'a> {
+    command: &'a PlanRun,
+    /// Text of the plan; none when a run is resumed.
+    source: Option<String>,
+    parameters: BTreeMap<String, String>,
+    limits: BTreeMap<String, usize>,
+    database: Database,
+    writer: Writer,
+}
+
+impl Task<'_> {
+    fn kitting(self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, PlanError> {
+        let Self {
+            command,
+            source,
+            parameters,
+            limits,
+            database,
+            writer,
+        } = self;
+        let stock = match &source {
+            Some(source) => {
+                let program = Program::new(plan::kitting::read(source).plan);
+                Stock::of(&writer.model()?, &program.plan)
+            }
             None => {
-                let run = writer.last_run().map_err(refused)?;
-                let stock = run.and_then(|run| serde_json::from_str(&run.stock).ok());
-                stock.unwrap_or_default()
+                let stock = writer
+                    .last_run()?
+                    .map(|run| serde_json::from_str(&run.stock));
+                stock.and_then(Result::ok).unwrap_or_default()
             }
         };
         let mut factotum = SimulatedFactotum::new(stock.clone());
-        let reader = Reader::open(&database.path).map_err(refused)?;
-        let options = RunOptions {
-            robot: self.robot_options(),
-            policy: match self.repair {
-                0 => Policy::Stop,
-                attempts => Policy::Repair { attempts },
-            },
-            choose_order: !self.written_order,
-        };
+        factotum.limits = limits;
         let cell = Cell {
+            reader: Reader::open(&database.path)?,
             writer,
-            reader,
             motion,
             factotum: &mut factotum,
         };
-        let mut controller = match source {
-            Some(source) => Controller::start(cell, source, &self.parameters()?, &stock, options),
+        let options = command.options(robot);
+        let mut controller = match &source {
+            Some(source) => Controller::start(cell, source, &parameters, &stock, options),
             None => Controller::resume(cell, options),
-        }
-        .map_err(refused)?;
-        let report = controller
-            .run(&mut |event| self.observe(event))
-            .map_err(refused)?;
-        self.print(&report)?;
-        Ok(match report.code {
-            0 => Exit::Done,
-            3 => Exit::Aborted,
-            _ => Exit::Refused,
-        })
+        }?;
+        controller.run(&mut |event| command.observe(event))
     }
 
-    fn print(&self, report: &Report) -> io::Result<()> {
-        if self.json {
-            return output::json(report);
-        }
-        let mut out = io::stdout().lock();
-        let c = &report.counters;
-        if let Some(reason) = &report.reason {
-            writeln!(
-                out,
-                "{}: {reason} (EndCanon({}))",
-                report.outcome, report.code
-            )?;
-        }
-        writeln!(
-            out,
-            "{} kits: {} statements, {} commands, {} pick-ups, {} put-downs, {} moves above, {} end effector changes, {} factotum calls",
-            c.kits,
-            c.statements,
-            c.commands,
-            c.pick_ups,
-            c.put_downs,
-            c.moves_above,
-            c.end_effector_changes,
-            c.factotum_calls
-        )?;
-        writeln!(
-            out,
-            "{:.3} s of motion, {:.3} s gained by chosen orders, {:.3} s by the clock on the wall, {} warnings",
-            c.motion_s,
-            c.gained_s,
-            report.wall_s,
-            report.warnings.len()
-        )
-    }
-
-    fn pddl(
-        &self,
-        path: &std::path::Path,
-        database: &Database,
-        mut writer: Writer,
-        motion: &mut dyn Motion,
-    ) -> Result<Exit, Failure> {
-        let mut table = ActionTable::own().map_err(refused)?;
-        if let Some(more) = &self.actions {
-            table = table.with(&world_file::read(more)?).map_err(refused)?;
-        }
-        let mut interpreter = PddlInterpreter::new(&database.path, table, self.robot_options());
-        let name = path.display().to_string();
+    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<PulledReport, Failure> {
+        let command = self.command;
+        let table = action_table(command.actions.as_deref())?;
+        let options = command.robot_options(robot);
+        let mut interpreter = PddlInterpreter::new(&self.database.path, table, options);
+        let name = command.plan.as_ref().map(|path| path.display().to_string());
+        let name = name.unwrap_or_default();
         let mut step = |number| {
-            if self.verbose {
-                output::note(&format!("step {number} is done"));
+            if command.verbose {
+                output::note(&format!("done     step {number}"));
             }
         };
         let plan = (name.as_str(), "PDDL");
-        let report =
-            pull(&mut interpreter, plan, &mut writer, motion, &mut step).map_err(refused)?;
-        if self.json {
-            output::json(&report)?;
-        } else {
-            let mut out = io::stdout().lock();
-            if let Some(reason) = &report.reason {
-                writeln!(out, "{}: {reason}", report.outcome)?;
-            }
-            let (steps, commands) = (report.steps, report.commands);
-            writeln!(
-                out,
-                "{steps} steps, {commands} commands, {:.3} s of motion",
-                report.motion_s
-            )?;
-        }
-        Ok(match report.code {
-            0 => Exit::Done,
-            100 => Exit::Aborted,
-            _ => Exit::Refused,
-        })
+        pull(&mut interpreter, plan, &mut self.writer, motion, &mut step).map_err(refused)
     }
 }
 
 fn execute<const N: usize>(
-    command: &PlanRun,
+    task: Task<'_>,
     robot: &Robot,
-    session: Option<Session>,
-    database: &Database,
-    writer: Writer,
+    arm: Option<MovingArm>,
 ) -> Result<Exit, Failure> {
-    let mut motion = ArmMotion::<N>::new(robot, session)?;
-    let Some(path) = command.plan.as_ref().filter(|_| !command.resume) else {
-        return command.kitting(None, database, writer, &mut motion);
+    let command = task.command;
+    let mut motion = ArmMotion::<N>::new(robot, command.host.rate, arm)?;
+    let report: PlanReport = if task.source.as_deref().is_some_and(is_pddl) {
+        task.pddl(robot, &mut motion)?.into()
+    } else {
+        task.kitting(robot, &mut motion).map_err(refused)?.into()
     };
-    let source = world_file::read(path)?;
-    if is_pddl(&source) {
-        return command.pddl(path, database, writer, &mut motion);
-    }
-    command.kitting(Some(&source), database, writer, &mut motion)
-}
-
-/// A PDDL plan starts, after comments, with a parenthesis or a time.
-fn is_pddl(source: &str) -> bool {
-    let code = |line: &&str| !line.is_empty() && !line.starts_with(';');
-    let first = source.lines().map(str::trim).find(code).unwrap_or_default();
-    first.starts_with('(')
-        || first
-            .split_once(':')
-            .is_some_and(|(time, _)| time.trim().parse::<f64>().is_ok())
+    let blame = motion.blame();
+    let off_path = motion.finish()?;
+    report.print(command.json, off_path)?;
+    Ok(match report.outcome() {
+        "stopped" => Exit::Done,
+        "interrupted" => Exit::Stopped,
+        _ => blame.unwrap_or(Exit::Refused),
+    })
 }

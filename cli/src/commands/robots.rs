@@ -182,11 +182,34 @@ fn description(robot: &Robot, home: &Isometry3<f64>) -> Value {
     })
 }
 
-#[allow(clippy::too_many_lines, reason = "a table, printed from top to bottom")]
 fn table(robot: &Robot, home: &Isometry3<f64>) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    let (joints, tool) = (&robot.joints, &robot.tool);
     writeln!(out, "{}: {}\n", robot.name, robot.description)?;
+    joint_table(&mut out, robot)?;
+    let tool = &robot.tool;
+    writeln!(
+        out,
+        "controlled point: {} m/s, {} m/s2, {} m/s3; {} rad/s, {} rad/s2, {} rad/s3 ({})",
+        tool.speed,
+        tool.acceleration,
+        tool.jerk,
+        tool.angular_speed,
+        tool.angular_acceleration,
+        tool.angular_jerk,
+        tool.source
+    )?;
+    writeln!(
+        out,
+        "base in the workstation: {}",
+        millimetres(&robot.workstation_from_base)
+    )?;
+    writeln!(out, "controlled point at home: {}", millimetres(home))?;
+    end_effectors(&mut out, robot)
+}
+
+/// One line a joint.
+fn joint_table(out: &mut impl Write, robot: &Robot) -> io::Result<()> {
+    let joints = &robot.joints;
     writeln!(
         out,
         "{:24} {:>9} {:>9} {:>9} {:>13} {:>10} {:>9}",
@@ -210,24 +233,11 @@ fn table(robot: &Robot, home: &Isometry3<f64>) -> io::Result<()> {
         out,
         "(rad and s, m for sliding joints; acceleration and jerk: {})\n",
         joints.source
-    )?;
-    writeln!(
-        out,
-        "controlled point: {} m/s, {} m/s2, {} m/s3; {} rad/s, {} rad/s2, {} rad/s3 ({})",
-        tool.speed,
-        tool.acceleration,
-        tool.jerk,
-        tool.angular_speed,
-        tool.angular_acceleration,
-        tool.angular_jerk,
-        tool.source
-    )?;
-    writeln!(
-        out,
-        "base in the workstation: {}",
-        millimetres(&robot.workstation_from_base)
-    )?;
-    writeln!(out, "controlled point at home: {}", millimetres(home))?;
+    )
+}
+
+/// One line an end effector.
+fn end_effectors(out: &mut impl Write, robot: &Robot) -> io::Result<()> {
     for (index, tool) in robot.end_effectors.iter().enumerate() {
         let tcp = millimetres(&tool.flange_from_tcp);
         let mounted = if robot.mounted == Some(index) {

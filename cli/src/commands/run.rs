@@ -7,6 +7,7 @@ use anyhow::Context;
 use clap::Args;
 use engine::dry_run::FailurePolicy;
 use engine::executor::Control;
+use engine::robot::Robot;
 use engine::session::{Blame, Note};
 use serde_json::json;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -14,7 +15,7 @@ use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{DriverChoice, Host, HostOptions};
+use crate::host::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::output;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
@@ -37,6 +38,8 @@ pub(crate) struct Run {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    #[command(flatten)]
+    refusal: RefusalOption,
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
@@ -54,22 +57,27 @@ impl Run {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
-        // The simulated arm starts where the dry run does, so that what is refused later is known
-        // before anything moves. Where another arm stands is known to its driver only.
-        if self.host.driver == DriverChoice::Sim {
-            let plan = program.plan(&robot, self.host.rate, FailurePolicy::Abort)?;
-            plan.refusals
-                .iter()
-                .for_each(|refusal| program.report_refusal(refusal));
-            if !plan.refusals.is_empty() {
-                return Ok(Exit::Refused);
-            }
+        // The simulated arm starts where the dry run does, so that a program that cannot be
+        // executed starts nothing. Where another arm stands is known to its driver only.
+        if self.host.driver != DriverChoice::External
+            && !self.can_be_done(&program, &robot, None)?
+        {
+            return Ok(Exit::Refused);
         }
         let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-        let mut host = self
-            .host
-            .start(&robot, self.robot.place(), program.default_length())?;
+        let mut host = self.host.start(
+            &robot,
+            self.robot.place(),
+            program.default_length(),
+            self.refusal.policy(),
+        )?;
         host.own("canter run");
+        let start = Some(host.session.start.clone());
+        if self.host.driver == DriverChoice::External
+            && !self.can_be_done(&program, &robot, start)?
+        {
+            return Ok(Exit::Refused);
+        }
         let sink = self.samples.as_ref().map(|path| {
             let file =
                 File::create(path).with_context(|| format!("cannot write {}", path.display()));
@@ -88,6 +96,24 @@ impl Run {
             deadline: None,
         }
         .finish_program(&program)
+    }
+}
+
+impl Run {
+    /// Plans the whole program from `start`, or from home, and reports what is refused; tells
+    /// whether it may be run. With a policy that lives with refusals it always may.
+    fn can_be_done(
+        &self,
+        program: &ProgramFile,
+        robot: &Robot,
+        start: Option<Vec<f64>>,
+    ) -> Result<bool, Failure> {
+        let policy = self.refusal.policy();
+        let plan = program.plan(robot, (self.host.rate, start), policy)?;
+        for refusal in &plan.refusals {
+            program.report_refusal(refusal);
+        }
+        Ok(plan.refusals.is_empty() || policy != FailurePolicy::Abort)
     }
 }
 
@@ -214,6 +240,11 @@ impl Running {
         let status = self.host.session.status();
         let driver = self.host.session.driver.clone();
         let tracking = self.recording.worst();
+        let exit = match exit {
+            // The end was reached, but not everything on the way was done.
+            Exit::Done if done < count => Exit::Refused,
+            exit => exit,
+        };
         let duration = self.recording.duration();
         drop(self.host);
         self.recording.finish()?;

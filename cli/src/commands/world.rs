@@ -1,9 +1,10 @@
 use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use plan::finding::Severity;
-use plan::world::{Durability, Model, ObjectId, Writer, check, export_json, export_toml};
+use plan::run::{Outcome, State};
+use plan::world::{Durability, Model, ObjectId, Reader, Writer, check, export_json, export_toml};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -18,7 +19,7 @@ pub(crate) struct World {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Show the objects, each below what it is located relative to
+    /// Show the objects, each below what it is located relative to, and the last run of a plan
     Show {
         /// Database, or workstation file (.toml, .json, .xml)
         world: PathBuf,
@@ -52,7 +53,10 @@ impl World {
     /// Does what was asked for.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match &self.what {
-            What::Show { world } => show(&world_file::load(world)?),
+            What::Show { world } => {
+                show(&world_file::load(world)?)?;
+                tell_run(world)
+            }
             What::Check { world, json } => report(&world_file::load(world)?, *json),
             What::Import { file, database } => {
                 let model = world_file::load(file)?;
@@ -113,6 +117,38 @@ fn show(model: &Model) -> Result<Exit, Failure> {
         open.extend(children);
     }
     out.flush()?;
+    Ok(Exit::Done)
+}
+
+/// The last run of a plan in a database: where it is, or how it ended.
+fn tell_run(world: &Path) -> Result<Exit, Failure> {
+    let unreadable = |error| Failure::new(Exit::Unreadable, error);
+    if world_file::is_workstation_file(world) {
+        return Ok(Exit::Done);
+    }
+    let reader = Reader::open(world).map_err(unreadable)?;
+    let Some(run) = reader.last_run().map_err(unreadable)? else {
+        return Ok(Exit::Done);
+    };
+    let mut out = io::stdout().lock();
+    let state = serde_json::from_str::<State>(&run.state).ok();
+    let (statements, kits) = state.map_or((0, 0), |state| {
+        (state.counters.statements, state.counters.kits)
+    });
+    write!(
+        out,
+        "\nlast run: plan {}, {statements} statements, {kits} kits",
+        run.plan
+    )?;
+    let outcome = run.outcome.map(|text| serde_json::from_str(&text));
+    match (outcome, run.under_way) {
+        (Some(Ok(Outcome::Failed { code, reason })), _) => {
+            writeln!(out, "; failed: {reason} (EndCanon({code}))")?;
+        }
+        (Some(_), _) => writeln!(out, "; ended")?,
+        (None, Some(step)) => writeln!(out, "; not ended, {step} was under way")?,
+        (None, None) => writeln!(out, "; not ended")?,
+    }
     Ok(Exit::Done)
 }
 

@@ -14,6 +14,11 @@ from . import messages as m
 
 __all__ = ["Robot", "run"]
 
+# How many times lock-step looks for a setpoint before it sleeps between looks, and how long it
+# waits until the arm counts as left alone.
+SPINS = 200
+LOCK_STEP_PATIENCE_NS = 2_000_000_000
+
 
 class Robot:
     """What a robot must be able to do. Lists have one number a joint, in rad and seconds."""
@@ -125,10 +130,14 @@ class Driver:
         self.sequence = self.missed = 0
         self.last = m.Setpoint()
         self.fresh = False
-        self.received_ns = 0
+        self.received_ns = self.heard_ns = 0
         position, _ = robot.measure()
         self.reference = [list(position), [0.0] * self.joints, [0.0] * self.joints]
+        self.target = self.reference
         self.orders = [0] * m.MAX_TOOLS
+        # The state to send, written anew in every period.
+        self.out = m.State(protocol=m.PROTOCOL, joints=self.joints)
+        self.feedback = [self.out.tools[tool] for tool in range(m.MAX_TOOLS)]
 
     @property
     def lock_step(self):
@@ -173,7 +182,8 @@ class Driver:
         self.state, self.fault, self.fault_joint = m.SYNCED, m.NO_FAULT, 0xFFFFFFFF
         self.last, self.fresh, self.missed = m.Setpoint(), False, 0
         self.orders = [0] * m.MAX_TOOLS
-        self.received_ns = 0 if self.lock_step else time.monotonic_ns()
+        self.heard_ns = time.monotonic_ns()
+        self.received_ns = 0 if self.lock_step else self.heard_ns
         return ack
 
     def receive(self, setpoint, now_ns):
@@ -184,27 +194,37 @@ class Driver:
         if setpoint.sequence <= self.last.sequence:
             return
         n = self.joints
-        values = [*setpoint.position[:n], *setpoint.velocity[:n], *setpoint.acceleration[:n]]
+        target = [setpoint.position[:n], setpoint.velocity[:n], setpoint.acceleration[:n]]
         sane = setpoint.protocol == m.PROTOCOL and setpoint.joints == n
-        if not (sane and all(map(math.isfinite, values))):
+        # A sum is finite only if all its parts are.
+        if not (sane and math.isfinite(sum(map(sum, target)))):
             return self.stop(m.BAD_SETPOINT)
-        elapsed = max(now_ns - self.received_ns, self.hello.period_ns) * 1e-9
-        first = self.state == m.SYNCED
-        for joint in range(n):
-            at, speed = setpoint.position[joint], abs(setpoint.velocity[joint])
-            before = self.reference[0][joint] if first else self.last.position[joint]
-            room = 1e-3 if first else 2e-3 + self.robot.velocity[joint] * elapsed
-            lower, upper = self.robot.lower[joint] - 2e-3, self.robot.upper[joint] + 2e-3
-            fast = speed > self.robot.velocity[joint] * 1.001
-            if not lower <= at <= upper or fast or abs(at - before) > room:
-                return self.stop(m.OUT_OF_RANGE, joint)
-        self.last, self.received_ns, self.fresh = setpoint, now_ns, True
-        if setpoint.flags & m.FLAG_STOP_REQUEST:
+        joint = self.unreachable(target, now_ns)
+        if joint is not None:
+            return self.stop(m.OUT_OF_RANGE, joint)
+        self.last, self.target, self.received_ns, self.fresh = setpoint, target, now_ns, True
+        flags = setpoint.flags
+        if flags & m.FLAG_STOP_REQUEST:
             self.stop(m.STOP_REQUEST)
-        elif setpoint.flags & m.FLAG_GOODBYE:
+        elif flags & m.FLAG_GOODBYE:
             self.state, self.session, self.hello = m.DISCONNECTED, 0, None
         else:
             self.state = m.ARMED if self.state == m.SYNCED else m.ACTIVE
+
+    def unreachable(self, target, now_ns):
+        """The first joint whose setpoint is out of range, too fast, or too far from the last."""
+        first = self.state == m.SYNCED
+        before = self.reference[0] if first else self.target[0]
+        elapsed = max(now_ns - self.received_ns, self.hello.period_ns) * 1e-9
+        room, grows = (1e-3, 0.0) if first else (2e-3, elapsed)
+        robot = self.robot
+        ends = zip(target[0], target[1], before, robot.lower, robot.upper, robot.velocity)
+        for joint, (at, speed, last, lower, upper, most) in enumerate(ends):
+            near = -room - most * grows <= at - last <= room + most * grows
+            slow = -most * 1.001 <= speed <= most * 1.001
+            if not (near and slow and lower - 2e-3 <= at <= upper + 2e-3):
+                return joint
+        return None
 
     def stop(self, fault, joint=0xFFFFFFFF):
         self.state, self.fault, self.fault_joint = m.STOPPING, fault, joint
@@ -218,28 +238,37 @@ class Driver:
         if self.state == m.STOPPING and all(abs(speed) < 1e-9 for speed in self.reference[1]):
             self.state = m.FAULT
         state = self.report(now_ns)
+        if self.fresh:
+            self.take_orders()
         self.refer(period)
-        for tool in range(m.MAX_TOOLS):
-            order = self.last.tools[tool]
+        self.robot.move(*self.reference, period)
+        return state
+
+    def sign_of_life(self, setpoint):
+        """In lock-step, the answer to a setpoint of the period that was before; or None."""
+        last = self.last
+        repeats = setpoint.tick == last.tick and 0 < last.sequence < setpoint.sequence
+        if not repeats or setpoint.flags & (m.FLAG_GOODBYE | m.FLAG_STOP_REQUEST):
+            return None
+        last.sequence = setpoint.sequence
+        self.sequence += 1
+        self.out.sequence, self.out.setpoint_sequence = self.sequence, setpoint.sequence
+        return self.out
+
+    def take_orders(self):
+        for tool, order in enumerate(self.last.tools):
             if order.order != self.orders[tool]:
                 self.orders[tool] = order.order
                 if order.action in (m.OPEN, m.CLOSE):
                     self.robot.tool(tool, order.action)
-        self.robot.move(*self.reference, period)
-        return state
 
     def refer(self, period):
         """What the robot follows: the setpoint, or what the driver makes up without one."""
-        n = self.joints
         if self.fresh and self.state in (m.ARMED, m.ACTIVE):
-            self.reference = [
-                self.last.position[:n],
-                self.last.velocity[:n],
-                self.last.acceleration[:n],
-            ]
+            self.reference = [list(values) for values in self.target]
         elif self.state in (m.ARMED, m.ACTIVE, m.STOPPING):
             position, velocity, acceleration = self.reference
-            for joint in range(n):
+            for joint in range(self.joints):
                 p, v, a = position[joint], velocity[joint], acceleration[joint]
                 jerk = self.robot.jerk[joint]
                 if self.state == m.STOPPING:
@@ -253,27 +282,19 @@ class Driver:
 
     def report(self, now_ns):
         self.sequence += 1
+        n, state, last = self.joints, self.out, self.last
         position, velocity = self.robot.measure()
-        state = m.State(
-            protocol=m.PROTOCOL,
-            joints=self.joints,
-            session=self.session,
-            sequence=self.sequence,
-            measured_ns=now_ns,
-            published_ns=now_ns,
-            setpoint_sequence=self.last.sequence,
-            setpoint_published_ns=self.last.published_ns,
-            setpoint_received_ns=self.received_ns,
-            driver_state=self.state,
-            fault=self.fault,
-            fault_joint=self.fault_joint,
-            missed=self.missed,
-        )
-        state.position[: self.joints] = list(position)
-        state.velocity[: self.joints] = list(velocity)
-        for tool in range(m.MAX_TOOLS):
-            state.tools[tool].order = self.orders[tool]
-            state.tools[tool].status = self.robot.tool_status(tool)
+        state.session, state.sequence = self.session, self.sequence
+        state.measured_ns = state.published_ns = now_ns
+        state.setpoint_sequence = last.sequence
+        state.setpoint_published_ns = last.published_ns
+        state.setpoint_received_ns = self.received_ns
+        state.driver_state, state.fault = self.state, self.fault
+        state.fault_joint, state.missed = self.fault_joint, self.missed
+        state.position[:n], state.velocity[:n] = position, velocity
+        for tool, feedback in enumerate(self.feedback):
+            feedback.order = self.orders[tool]
+            feedback.status = self.robot.tool_status(tool)
         return state
 
 
@@ -283,12 +304,13 @@ def fill(field, text):
     field[: len(data)] = list(data)
 
 
-def run(arm, robot, stop=lambda: False):
-    """Drives `robot` as the arm `cell/arm` until `stop()` is true."""
+def run(arm, robot, stop=lambda: False, ready=lambda: None):
+    """Drives `robot` as the arm `cell/arm` until `stop()` is true; `ready()` when it is there."""
     link, driver = Link(arm), Driver(robot)
+    ready()
     turns = 0
     while not stop():
-        if not driver.lock_step or turns % 256 == 255:
+        if not driver.lock_step or turns % 64 == 63:
             answer_greeting(link, driver)
         if driver.lock_step:
             turns = lock_step(link, driver, turns + 1)
@@ -322,13 +344,22 @@ def lock_step(link, driver, turns):
     """A period if the engine asks for one; returns for how many turns it has not."""
     setpoint = link.next_setpoint()
     if setpoint is None:
-        if turns > 20_000:
-            time.sleep(50e-6)
-        if turns > 60_000 and driver.state in (m.ARMED, m.ACTIVE):
-            driver.stop(m.WATCHDOG)
+        if turns > SPINS:
+            time.sleep(20e-6)
+        if time.monotonic_ns() - driver.heard_ns > LOCK_STEP_PATIENCE_NS:
+            if driver.state in (m.ARMED, m.ACTIVE):
+                driver.stop(m.WATCHDOG)
         if driver.state == m.STOPPING:
             link.send(driver.step(driver.received_ns, driver.hello.period_ns * 1e-9))
         return turns
+    driver.heard_ns = time.monotonic_ns()
+    if setpoint.session != driver.session:
+        # One that was under way when the session began releases no state.
+        return turns
+    answer = driver.sign_of_life(setpoint)
+    if answer is not None:
+        link.send(answer)
+        return 0
     now = setpoint.tick * driver.hello.period_ns
     driver.receive(setpoint, now)
     if driver.hello is not None:

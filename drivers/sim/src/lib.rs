@@ -1,25 +1,46 @@
 //! The built-in simulated servo driver: a process of its own that stands where a robot's driver
 //! stands.
 //!
-//! [`Driver`] is the protocol and the servos, without a clock and without a channel: times go in,
-//! messages come out, the same every time. [`run`] puts it between shared memory and a clock.
-//!
-//! A driver owns the watchdog: without a setpoint it goes on for a while as it was going, then
-//! stops by itself within acceleration and jerk limits, then latches. Only a new session leads on.
+//! [`Simulated`] is the robot; [`driver`] puts it behind the protocol without a clock and without a
+//! channel, [`run`] between shared memory and a clock. The protocol's side is `driver-kit`'s, as in
+//! any other driver.
 //!
 //! This crate never plans, and knows no kinematics.
 
-mod driver;
-mod error;
-mod log;
 mod noise;
 mod options;
-mod process;
-mod reference;
+mod robot;
 mod servo;
 mod tool;
 
-pub use driver::Driver;
-pub use error::SimError;
+use std::sync::atomic::AtomicBool;
+
+use driver_kit::RunOptions;
+pub use driver_kit::{DriverError, Report};
 pub use options::{Options, ToolOptions};
-pub use process::{Report, run};
+pub use robot::Simulated;
+
+/// A simulated robot with the driver's side of the protocol.
+pub type Driver = driver_kit::Driver<Simulated>;
+
+/// A simulated robot behind the protocol, on a clock of the caller's.
+///
+/// # Errors
+/// When the options do not fit together.
+pub fn driver(options: Options) -> Result<Driver, DriverError> {
+    Driver::new(Simulated::new(options)?)
+}
+
+/// Runs the simulated driver until `stop` becomes true.
+///
+/// # Errors
+/// When the options do not fit together, or the arm already has a driver, or shared memory cannot
+/// be used.
+pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, DriverError> {
+    let how = RunOptions {
+        log: options.log.clone(),
+        urgency: options.urgency,
+    };
+    let arm = options.arm.clone();
+    driver_kit::run(&arm, Simulated::new(options)?, &how, stop)
+}

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use ipc::{Arm, MAX_JOINTS};
-
-use crate::SimError;
+use driver_kit::DriverError;
+use ipc::Arm;
 
 /// A gripper or tool changer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,57 +102,24 @@ impl Options {
         }
     }
 
-    /// Whether the options fit together.
+    /// Whether the options that are the simulation's own fit together; the kit looks at the rest.
     ///
     /// # Errors
-    /// [`SimError::Joints`], [`SimError::Count`] or [`SimError::Value`] with the option's name.
-    pub fn check(&self) -> Result<(), SimError> {
-        let joints = self.position.len();
-        if joints == 0 || joints > MAX_JOINTS {
-            return Err(SimError::Joints {
+    /// [`DriverError::Count`] or [`DriverError::Value`] with the option's name.
+    pub fn check(&self) -> Result<(), DriverError> {
+        let (found, joints) = (self.position.len(), self.lower.len());
+        if found != joints {
+            return Err(DriverError::Count {
+                option: "position",
+                found,
                 joints,
-                most: MAX_JOINTS,
             });
         }
-        let lists = [
-            ("position", &self.position, false),
-            ("lower", &self.lower, false),
-            ("upper", &self.upper, false),
-            ("velocity", &self.velocity, true),
-            ("acceleration", &self.acceleration, true),
-            ("jerk", &self.jerk, true),
-        ];
-        for (option, list, positive) in lists {
-            if list.len() != joints {
-                return Err(SimError::Count {
-                    option,
-                    found: list.len(),
-                    joints,
-                });
-            }
-            for value in list {
-                check_value(option, *value, positive)?;
-            }
+        for position in &self.position {
+            DriverError::check_value("position", *position, false)?;
         }
-        check_value("frequency", self.frequency, true)?;
-        check_value("damping", self.damping, true)?;
-        check_value("noise", self.noise, false)
-    }
-}
-
-fn check_value(option: &'static str, value: f64, positive: bool) -> Result<(), SimError> {
-    let wanted = if positive {
-        "positive and finite"
-    } else {
-        "finite"
-    };
-    if value.is_finite() && (!positive || value > 0.0) {
-        Ok(())
-    } else {
-        Err(SimError::Value {
-            option,
-            wanted,
-            value,
-        })
+        DriverError::check_value("frequency", self.frequency, true)?;
+        DriverError::check_value("damping", self.damping, true)?;
+        DriverError::check_value("noise", self.noise, false)
     }
 }

@@ -1,6 +1,6 @@
 //! One servo: a mass that an acceleration moves, and the controller that chooses it.
 
-use crate::reference::Reference;
+use driver_kit::Reference;
 
 /// One joint: a double integrator with a critically damped controller and acceleration
 /// feed-forward.

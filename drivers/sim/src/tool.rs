@@ -1,6 +1,6 @@
 //! A gripper or tool changer that takes its time.
 
-use ipc::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
+use ipc::{ToolAction, ToolFeedback, ToolStatus};
 
 use crate::ToolOptions;
 
@@ -8,7 +8,6 @@ use crate::ToolOptions;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tool {
     options: Option<ToolOptions>,
-    order: u32,
     goal: ToolStatus,
     /// What is left of the motion (s).
     left: f64,
@@ -24,27 +23,14 @@ impl Tool {
         };
         Self {
             options,
-            order: 0,
             goal: status,
             left: 0.0,
             status,
         }
     }
 
-    /// A session counts its orders from 1 again.
-    pub(crate) fn forget_orders(&mut self) {
-        self.order = 0;
-    }
-
-    /// Takes an order if it is new.
-    pub(crate) fn take(&mut self, command: &ToolCommand) {
-        if command.order == self.order {
-            return;
-        }
-        let Some(action) = ToolAction::from_number(command.action) else {
-            return;
-        };
-        self.order = command.order;
+    /// Begins an action.
+    pub(crate) fn act(&mut self, action: ToolAction) {
         let (goal, duration) = match (action, self.options) {
             (ToolAction::None, _) => return,
             (_, None) => {
@@ -89,11 +75,9 @@ impl Tool {
             _ => 0.0,
         };
         ToolFeedback {
-            order: self.order,
             status: self.status as u32,
             position,
-            force: 0.0,
-            reserved: 0,
+            ..ToolFeedback::default()
         }
     }
 }

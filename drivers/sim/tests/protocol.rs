@@ -20,7 +20,7 @@ struct Pair {
 
 impl Pair {
     fn new(options: Options) -> Self {
-        let mut driver = Driver::new(options).unwrap();
+        let mut driver = driver_sim::driver(options).unwrap();
         let now = 5_000_000_000;
         let ack = driver.greet(&Hello::new(2, PERIOD, WATCHDOG, Clock::Wall), now);
         assert_eq!(ack.check(2), Ok(()));

@@ -29,6 +29,9 @@ pub struct ExecutorConfig<const N: usize> {
     pub model: u64,
     /// What the thread asks of the operating system; nothing of it in lock-step.
     pub urgency: Urgency,
+    /// In lock-step: time stands while the planner thinks or there is nothing to do, so that the
+    /// same program gives the same periods. The planner must tell: [`super::Feeder::settle`].
+    pub wait_for_planner: bool,
     /// Whether each setpoint and measured position is recorded for [`super::Monitor::sample`].
     pub record: bool,
 }
@@ -50,6 +53,7 @@ impl<const N: usize> ExecutorConfig<N> {
             connect: Duration::from_secs(3),
             model: 0,
             urgency: Urgency::default(),
+            wait_for_planner: false,
             record: false,
         }
     }

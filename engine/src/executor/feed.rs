@@ -74,6 +74,12 @@ impl<const N: usize> Feeder<N> {
         self.age = self.shared.age();
     }
 
+    /// Tells that the planner has nothing more to hand over after `events` events, or, with
+    /// `None`, that it begins to think. Only [`super::ExecutorConfig::wait_for_planner`] looks.
+    pub fn settle(&self, events: Option<u64>) {
+        self.shared.answer(events);
+    }
+
     /// How many more items fit now.
     pub fn room(&self) -> usize {
         self.ring.slots()

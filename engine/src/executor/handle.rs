@@ -21,12 +21,20 @@ const STACK: usize = 4 << 20;
 pub struct Monitor<const N: usize> {
     pub(super) events: Consumer<Event>,
     pub(super) samples: Consumer<Recorded<N>>,
+    pub(super) seen: u64,
 }
 
 impl<const N: usize> Monitor<N> {
     /// The oldest event that was not read yet.
     pub fn event(&mut self) -> Option<Event> {
-        self.events.pop().ok()
+        let event = self.events.pop().ok();
+        self.seen += u64::from(event.is_some());
+        event
+    }
+
+    /// How many events were read, for [`super::Feeder::settle`].
+    pub fn seen(&self) -> u64 {
+        self.seen
     }
 
     /// The oldest sample that was not read yet; none without [`ExecutorConfig::record`]. In

@@ -80,6 +80,9 @@ pub(super) struct Shared<const N: usize> {
     pub(super) recover: AtomicBool,
     pub(super) shutdown: AtomicBool,
     age: AtomicU32,
+    /// Events reported, and how many of them the planner had seen when it had no more to do.
+    reported: AtomicU64,
+    answered: AtomicU64,
     version: AtomicU32,
     position: [AtomicU64; N],
     velocity: [AtomicU64; N],
@@ -107,6 +110,8 @@ impl<const N: usize> Shared<N> {
             recover: AtomicBool::new(false),
             shutdown: AtomicBool::new(false),
             age: AtomicU32::new(0),
+            reported: AtomicU64::new(0),
+            answered: AtomicU64::new(0),
             version: AtomicU32::new(0),
             position: zeros(),
             velocity: zeros(),
@@ -132,6 +137,22 @@ impl<const N: usize> Shared<N> {
     /// Begins a new age: what belongs to the old one is dropped.
     pub(super) fn new_age(&self) -> u32 {
         self.age.fetch_add(1, Ordering::AcqRel).wrapping_add(1)
+    }
+
+    /// Counts an event that the planner shall see.
+    pub(super) fn count_report(&self) {
+        self.reported.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// The planner has nothing more to do, having seen `events`; `None` when it has.
+    pub(super) fn answer(&self, events: Option<u64>) {
+        self.answered
+            .store(events.unwrap_or(u64::MAX), Ordering::Release);
+    }
+
+    /// Whether the planner has seen all events and has nothing more to do.
+    pub(super) fn is_settled(&self) -> bool {
+        self.answered.load(Ordering::Acquire) == self.reported.load(Ordering::Acquire)
     }
 
     /// What the operator wants now.

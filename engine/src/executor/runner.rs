@@ -117,6 +117,7 @@ impl<const N: usize> Runner<N> {
         let monitor = Monitor {
             events: event_reader,
             samples: sample_reader,
+            seen: 0,
         };
         (runner, feeder, Remote { shared }, monitor)
     }
@@ -180,6 +181,31 @@ impl<const N: usize> Runner<N> {
         self.samples
             .as_ref()
             .is_some_and(|samples| samples.slots() == 0 && !samples.is_abandoned())
+    }
+
+    /// Whether virtual time may stand: the planner thinks, or there is nothing to do.
+    pub(super) fn may_stand(&self) -> bool {
+        if self.aborting || self.shared.abort.load(Ordering::Acquire) {
+            return false;
+        }
+        let held = matches!(self.shared.demand(), Demand::Stop(_));
+        let begun = self.ready || self.fault.is_some();
+        let at_rest = self.cycle.is_resting() && self.tool.is_none();
+        let nothing_to_do = if held {
+            self.stopped
+        } else {
+            self.cycle.is_idle() && self.items.is_empty()
+        };
+        (begun && at_rest && nothing_to_do) || !self.shared.is_settled()
+    }
+
+    /// The last setpoint once more, as a sign of life.
+    pub(super) fn again(&mut self, last: Setpoint) -> Setpoint {
+        self.sequence += 1;
+        Setpoint {
+            sequence: self.sequence,
+            ..last
+        }
     }
 
     /// Latches a fault, unless one is latched already.
@@ -452,7 +478,9 @@ impl<const N: usize> Runner<N> {
     }
 
     pub(super) fn report(&mut self, event: Event) {
-        if self.events.push(event).is_err() {
+        if self.events.push(event).is_ok() {
+            self.shared.count_report();
+        } else {
             self.shared.lost_reports.fetch_add(1, Ordering::Relaxed);
         }
     }

@@ -7,8 +7,8 @@ use std::thread;
 use std::time::Instant;
 
 use ipc::{
-    Clock, EngineLink, Granted, Hello, Setpoint, SetpointFlags, State, now_ns, sleep_until_ns,
-    text_of, urge,
+    Clock, DriverState, EngineLink, Granted, Hello, Setpoint, SetpointFlags, State, now_ns,
+    sleep_until_ns, text_of, urge,
 };
 
 use super::config::{ExecutorConfig, ExecutorError};
@@ -18,6 +18,12 @@ use super::runner::{Runner, Tick};
 
 /// How long a driver of a lock-step session may think about a period.
 const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How many times lock-step looks for a state before it sleeps between looks.
+const SPINS: u32 = 4000;
+
+/// How often a driver gets a sign of life while virtual time stands.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 
 /// How long the thread tries to come to rest before it leaves anyway.
 const LEAVE: Duration = Duration::from_secs(5);
@@ -181,7 +187,8 @@ impl<const N: usize> Loop<'_, N> {
         let period = self.config.period_ns();
         let mut last = Setpoint::default();
         loop {
-            match self.wait_for_state() {
+            let state = self.wait_for_state();
+            match state.and_then(|state| self.stand(state, &mut last)) {
                 Some(state) => {
                     let begin_ns = self.tick * period;
                     let tick = Tick {
@@ -209,6 +216,36 @@ impl<const N: usize> Loop<'_, N> {
                 thread::yield_now();
             }
         }
+    }
+
+    /// Lets virtual time stand while the runner may; returns the newest state, or `None` when the
+    /// driver is gone.
+    fn stand(&mut self, mut state: State, last: &mut Setpoint) -> Option<State> {
+        let mut since = Instant::now();
+        let mut turns = 0_u32;
+        // The first period of a session is what a sign of life repeats.
+        let mine = last.session == self.runner.session();
+        while self.config.wait_for_planner && mine && self.runner.may_stand() {
+            if self.shared.shutdown.load(Ordering::Acquire) || self.runner.wants_session() {
+                break;
+            }
+            turns = turns.saturating_add(1);
+            if turns < 200 {
+                thread::yield_now();
+            } else {
+                thread::sleep(Duration::from_micros(20));
+            }
+            if since.elapsed() > SIGN_OF_LIFE {
+                since = Instant::now();
+                *last = self.runner.again(*last);
+                self.send(*last);
+                state = self.wait_for_state()?;
+                if matches!(state.driver(), DriverState::Stopping | DriverState::Fault) {
+                    break;
+                }
+            }
+        }
+        Some(state)
     }
 
     /// The driver of a lock-step session is gone: the motion comes to rest in virtual time.
@@ -243,12 +280,11 @@ impl<const N: usize> Loop<'_, N> {
                 continue;
             }
             turns = turns.saturating_add(1);
-            if turns < 2000 {
+            // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
+            if turns < SPINS {
                 core::hint::spin_loop();
-            } else if turns < 4000 {
-                thread::yield_now();
             } else {
-                thread::sleep(Duration::from_micros(50));
+                thread::sleep(Duration::from_micros(20));
                 let ends = self.shared.shutdown.load(Ordering::Acquire)
                     && start.elapsed() > Duration::from_millis(200);
                 if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {

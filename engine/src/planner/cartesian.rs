@@ -1,7 +1,7 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
-use kinematics::Chain;
 use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
+use kinematics::{Chain, Obstacle};
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 use trajectory::{
@@ -60,6 +60,7 @@ impl<const N: usize> Planner<N> {
             .map_err(|error| MotionError::Smooth(error.to_string()))?;
         let blend = Blend {
             tolerance: motion.tolerance,
+            exact_stop: plan.exact_stop(),
             corridor_ratio: plan.certificate().corridor.ratio,
             jerk_ratio: plan
                 .certificate()
@@ -159,12 +160,17 @@ impl<const N: usize> Planner<N> {
             .map_or_else(String::new, |joint| self.joint_name(joint));
         let cause = match (error.cause, error.joint) {
             (FollowCause::Limit, Some(index)) => format!(
-                "joint {joint} would pass its limit by {}",
+                "{joint} would pass its limit by {}",
                 self.amount(index, error.amount)
             ),
             (FollowCause::Singular, _) => format!(
-                "a singular pose, where joint {joint} would have to jump (smallest singular value {:.1e})",
+                "a singular pose, where {joint} would have to jump (smallest singular value {:.1e})",
                 error.amount
+            ),
+            (FollowCause::Unreachable(Obstacle::AtLimit { joint, beyond }), _) => format!(
+                "{} would have to go {} beyond its limit",
+                self.joint_name(joint),
+                self.amount(joint, beyond)
             ),
             (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
             (_, _) => error.to_string(),

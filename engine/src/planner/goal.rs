@@ -106,7 +106,7 @@ impl<const N: usize> Planner<N> {
         (room / ROOM).min(smallest / NIMBLE).clamp(1e-3, 1.0)
     }
 
-    fn joint_move(
+    pub(super) fn joint_move(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,

@@ -6,6 +6,7 @@
 mod cartesian;
 mod certificate;
 mod goal;
+mod jog;
 mod motion_error;
 
 use kinematics::{Chain, Solver};
@@ -13,6 +14,7 @@ use nalgebra::{Isometry3, SVector};
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
 pub use certificate::{MoveCertificate, PassReport, Peaks};
+pub use jog::Direction;
 pub use motion_error::MotionError;
 
 use crate::task::{Move, Shape};
@@ -39,6 +41,8 @@ pub struct PlannedMove<const N: usize> {
 pub struct Blend {
     /// Radius of the balls it was planned for, m: at most that of the command.
     pub tolerance: f64,
+    /// Time with a stop at each pose, for a tool without an arm, s: no arm is faster.
+    pub exact_stop: f64,
     /// Greatest distance from the leg / half width of the corridor.
     pub corridor_ratio: f64,
     /// Greatest jerk of the tool / limit, linear or angular, before the joints slow it down.
@@ -111,6 +115,7 @@ impl<const N: usize> Planner<N> {
 
     /// The smooth motion in the tolerance asked for; where its certificate fails after
     /// the joints had their say, in a quarter of it, and at last with a stop at each pose.
+    /// Never slower than with a stop at each pose.
     fn smooth_move(
         &self,
         motion: &Move,
@@ -128,15 +133,22 @@ impl<const N: usize> Planner<N> {
                 ..planned
             })
         };
-        attempt(motion.tolerance).or_else(|first| {
-            let uncertified = matches!(first, MotionError::Uncertified(_));
-            if !uncertified || motion.tolerance == 0.0 {
-                return Err(first);
+        let slower = |planned: &PlannedMove<N>, than: f64| planned.trajectory.duration() > than;
+        match attempt(motion.tolerance) {
+            Ok(planned) if slower(&planned, planned.blend.map_or(0.0, |b| b.exact_stop)) => {
+                let stops = attempt(0.0).ok();
+                let faster = stops.filter(|stops| slower(&planned, stops.trajectory.duration()));
+                Ok(faster.unwrap_or(planned))
             }
-            attempt(0.25 * motion.tolerance)
-                .or_else(|_| attempt(0.0))
-                .map_err(|_| first)
-        })
+            Err(first)
+                if matches!(first, MotionError::Uncertified(_)) && motion.tolerance > 0.0 =>
+            {
+                attempt(0.25 * motion.tolerance)
+                    .or_else(|_| attempt(0.0))
+                    .map_err(|_| first)
+            }
+            other => other,
+        }
     }
 
     /// Slows the motion down, uniformly and by as little as needed, until every
@@ -147,6 +159,15 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         trajectory: Trajectory<N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        if trajectory.pieces().is_empty() {
+            // Nothing to do: the arm is there. What is proved is that standing still is right.
+            let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
+            let standing = self.certify(motion, start, still)?;
+            return Ok(PlannedMove {
+                trajectory,
+                ..standing
+            });
+        }
         check_smooth(&trajectory, start)?;
         let trajectory = self.within_limits(trajectory, &motion.limits);
         let samples = certificate::tool_samples(self.chain(), &trajectory);
@@ -189,11 +210,13 @@ impl<const N: usize> Planner<N> {
         below.min(above)
     }
 
+    /// A joint as a message calls it: by its name, with the word joint in it.
     fn joint_name(&self, joint: usize) -> String {
-        self.joint_names
-            .get(joint)
-            .cloned()
-            .unwrap_or_else(|| format!("{}", joint + 1))
+        match self.joint_names.get(joint) {
+            Some(name) if name.to_lowercase().contains("joint") => name.clone(),
+            Some(name) => format!("joint {name}"),
+            None => format!("joint {}", joint + 1),
+        }
     }
 
     /// A joint quantity with the unit that people read.

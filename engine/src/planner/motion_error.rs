@@ -15,11 +15,11 @@ pub enum MotionError {
         millimetres: f64,
     },
     /// The pose is reached only beyond a joint limit.
-    #[error("pose {pose} needs joint {joint} {beyond} beyond its limit")]
+    #[error("pose {pose} needs {joint} {beyond} beyond its limit")]
     BeyondLimit {
         /// Which pose of the command.
         pose: usize,
-        /// Name of the joint.
+        /// The joint, as people call it.
         joint: String,
         /// How far beyond, with its unit.
         beyond: String,
@@ -56,6 +56,9 @@ pub enum MotionError {
         /// Joint, cause and amount in words.
         cause: String,
     },
+    /// There is no way in the direction of a jog.
+    #[error("{0}")]
+    Jog(String),
     /// The smooth path could not be made.
     #[error("no smooth path: {0}")]
     Smooth(String),
@@ -80,6 +83,7 @@ impl MotionError {
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"
             }
+            Self::Jog(_) => "go the other way",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
             Self::Timing(_) | Self::Uncertified(_) => {
                 "please report this with the program: it is a fault of the planner"

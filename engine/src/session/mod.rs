@@ -3,6 +3,7 @@
 //! A session owns a worker thread, which plans ahead of the executor and
 //! reports each command in order. The executor's real-time thread is its own.
 
+mod jog;
 mod note;
 mod status;
 mod worker;
@@ -17,6 +18,7 @@ use ipc::{Arm, Clock};
 use nalgebra::Isometry3;
 use thiserror::Error;
 
+pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
 pub use status::{Cycles, Status};
 
@@ -113,6 +115,7 @@ pub struct RunSample {
 enum Order {
     Submit(Vec<Located>, Sender<Result<Vec<u32>, Full>>),
     Control(Control),
+    Jog(Jog, Sender<Result<(), JogError>>),
     Recover,
     Close,
 }
@@ -207,6 +210,19 @@ impl Session {
     pub fn control(&self, control: Control) {
         // A session that has ended has nothing left to control.
         let _ = self.orders.send(Order::Control(control));
+    }
+
+    /// Moves by hand: goes on as long as requests come within each other's timeout, then stops on
+    /// its way. A change of direction is a stop and a new beginning.
+    ///
+    /// # Errors
+    /// [`JogError`]: a program is under way, a fault is latched, there is no way in that direction.
+    pub fn jog(&self, jog: Jog) -> Result<(), JogError> {
+        let (answer, answered) = mpsc::channel();
+        if self.orders.send(Order::Jog(jog, answer)).is_err() {
+            return Err(JogError::Closed);
+        }
+        answered.recv().unwrap_or(Err(JogError::Closed))
     }
 
     /// Asks for a new agreement with the driver, which clears a latched fault.

@@ -5,10 +5,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
+use ipc::Clock;
 use kinematics::Chain;
 use nalgebra::SVector;
 use realtime::{Piece, Segment};
+use trajectory::ToolLimits;
 
+use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
 use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared};
@@ -23,6 +26,8 @@ use crate::task::{Task, ToolAction};
 
 /// How many commands are planned ahead of the one that moves.
 const AHEAD: usize = 8;
+/// How many reported commands the tool is known of, for samples that come late.
+const CHAINS: usize = 64;
 /// How long a tool may take beyond its nominal time, s.
 const TOOL_PATIENCE: f64 = 5.0;
 
@@ -34,13 +39,13 @@ pub(super) struct Ends {
 }
 
 /// What still has to go through the ring.
-enum Work<const N: usize> {
+pub(super) enum Work<const N: usize> {
     Motion(Segment<N>),
     Tool(ToolOrder),
 }
 
 /// A command that left the queue and is not yet reported.
-struct InFlight<const N: usize> {
+pub(super) struct InFlight<const N: usize> {
     id: u32,
     line: usize,
     name: &'static str,
@@ -54,19 +59,22 @@ struct InFlight<const N: usize> {
     refused: bool,
 }
 
-struct Worker<'a, const N: usize> {
+pub(super) struct Worker<'a, const N: usize> {
     config: &'a SessionConfig,
-    controller: Controller<N>,
-    queue: Queue,
-    feeder: Feeder<N>,
+    /// Largest speeds of the controlled point, for jogs.
+    pub(super) most: ToolLimits,
+    pub(super) controller: Controller<N>,
+    pub(super) queue: Queue,
+    pub(super) feeder: Feeder<N>,
     monitor: Monitor<N>,
-    remote: Remote<N>,
-    work: VecDeque<Work<N>>,
-    flight: VecDeque<InFlight<N>>,
-    /// Tool in force for recorded samples.
-    chain: Chain<N>,
-    held: bool,
-    fault: Option<String>,
+    pub(super) remote: Remote<N>,
+    pub(super) work: VecDeque<Work<N>>,
+    pub(super) flight: VecDeque<InFlight<N>>,
+    pub(super) jogging: Option<Jogging>,
+    /// Tool in force for recorded samples, of the last commands that were reported.
+    chains: VecDeque<(u32, Chain<N>)>,
+    pub(super) held: bool,
+    pub(super) fault: Option<String>,
     closing: bool,
     ends: Ends,
 }
@@ -119,6 +127,7 @@ fn start<'a, const N: usize>(
     let mut wanted = ExecutorConfig::new(config.arm.clone(), limits);
     wanted.rate_hz = config.rate_hz;
     wanted.clock = config.clock;
+    wanted.wait_for_planner = config.clock == Clock::LockStep;
     wanted.record = config.record;
     wanted.connect = config.connect;
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
@@ -127,14 +136,16 @@ fn start<'a, const N: usize>(
     controller.set_joints(remote.measured().setpoint);
     let worker = Worker {
         config,
+        most: robot.motion_limits(),
         queue: Queue::new(config.capacity),
-        chain: *controller.chain(),
+        chains: VecDeque::from([(0, *controller.chain())]),
         controller,
         feeder,
         monitor,
         remote,
         work: VecDeque::new(),
         flight: VecDeque::new(),
+        jogging: None,
         held: false,
         fault: None,
         closing: false,
@@ -149,15 +160,32 @@ impl<const N: usize> Worker<'_, N> {
         self.read_orders();
         self.read_reports();
         self.report_done();
-        if self.flight.len() < AHEAD && self.work.is_empty() && !self.held && self.fault.is_none() {
+        self.watch_jog();
+        if self.may_take() {
+            self.feeder.settle(None);
             self.take_next();
         }
-        self.feed();
+        let all_fits = self.feed();
+        if !all_fits || !self.may_take() {
+            self.feeder.settle(Some(self.monitor.seen()));
+        }
+    }
+
+    /// Whether the next command can be planned now.
+    fn may_take(&self) -> bool {
+        self.flight.len() < AHEAD
+            && self.work.is_empty()
+            && !self.held
+            && self.fault.is_none()
+            && !self.queue.is_empty()
+            && self.jogging.is_none()
     }
 
     fn read_orders(&mut self) {
         let busy = !self.work.is_empty() || (!self.queue.is_empty() && self.flight.len() < AHEAD);
-        let wait = Duration::from_micros(if busy { 50 } else { 500 });
+        // In lock-step the other side waits for us.
+        let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();
+        let wait = Duration::from_micros(if busy || stepping { 20 } else { 500 });
         let mut order = match self.ends.orders.recv_timeout(wait) {
             Ok(order) => Some(order),
             Err(RecvTimeoutError::Timeout) => None,
@@ -177,6 +205,11 @@ impl<const N: usize> Worker<'_, N> {
                 let _ = answer.send(result);
             }
             Order::Control(control) => self.control(control),
+            Order::Jog(jog, answer) => {
+                let result = self.jog(jog);
+                // Who asked may have gone; the dead man's switch ends the jog.
+                let _ = answer.send(result);
+            }
             Order::Recover => self.remote.recover(),
             Order::Close => self.closing = true,
         }
@@ -298,17 +331,19 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    fn feed(&mut self) {
+    /// Hands over what fits into the ring; says whether all of it did.
+    fn feed(&mut self) -> bool {
         while let Some(work) = self.work.front() {
             let taken = match work {
                 Work::Motion(segment) => self.feeder.push(*segment),
                 Work::Tool(order) => self.feeder.tool(*order),
             };
             if taken.is_err() {
-                return;
+                return false;
             }
             self.work.pop_front();
         }
+        true
     }
 
     fn read_reports(&mut self) {
@@ -339,6 +374,7 @@ impl<const N: usize> Worker<'_, N> {
                     tick,
                 });
             }
+            Event::Finished { command, .. } if self.jog_finished(command) => {}
             Event::Finished { command, tick } => {
                 if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
                     flight.finished = Some(tick);
@@ -346,6 +382,7 @@ impl<const N: usize> Worker<'_, N> {
                 self.report_done();
             }
             Event::Stopped { .. } => self.say(Note::Stopped),
+            Event::Aborted { .. } if self.rest_from_jog() => {}
             Event::Aborted { .. } => {
                 let dropped = self.drop_all();
                 self.say(Note::Aborted { dropped });
@@ -376,6 +413,7 @@ impl<const N: usize> Worker<'_, N> {
         let dropped = self.queue.flush() + self.flight.len();
         self.work.clear();
         self.flight.clear();
+        self.jogging = None;
         self.feeder.renew();
         self.held = false;
         self.controller.abort();
@@ -396,7 +434,10 @@ impl<const N: usize> Worker<'_, N> {
             if let Some(note) = flight.says {
                 self.say(note);
             }
-            self.chain = flight.chain;
+            self.chains.push_back((flight.id, flight.chain));
+            if self.chains.len() > CHAINS {
+                self.chains.pop_front();
+            }
             if flight.refused {
                 continue;
             }
@@ -415,11 +456,13 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     fn record(&self, sample: &Recorded<N>) {
-        let flight = self
-            .flight
-            .iter()
-            .find(|flight| flight.id == sample.command);
-        let chain = flight.map_or(&self.chain, |flight| &flight.chain);
+        let flying = self.flight.iter().map(|flight| (flight.id, &flight.chain));
+        let reported = self.chains.iter().rev().map(|(id, chain)| (*id, chain));
+        // Command 0 is the time before the first; one that is forgotten was long ago.
+        let chain = flying
+            .chain(reported)
+            .find_map(|(id, chain)| (id == sample.command).then_some(chain))
+            .unwrap_or_else(|| self.controller.chain());
         let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
         let measured = SVector::from(sample.measured);
         let recorded = RunSample {
@@ -452,9 +495,11 @@ impl<const N: usize> Worker<'_, N> {
         robot.name.clone_into(&mut status.robot);
         driver.clone_into(&mut status.driver);
         status.state = state_name(self.controller.modal().state());
-        status.command = self.flight.front().map(|flight| flight.name);
+        let jog = self.jogging.as_ref().map(|_| "jog");
+        status.command = self.flight.front().map(|flight| flight.name).or(jog);
         status.queued = self.queue.len() + self.flight.len().saturating_sub(1);
-        status.idle = now.idle && self.flight.is_empty() && self.queue.is_empty();
+        status.idle =
+            now.idle && self.flight.is_empty() && self.queue.is_empty() && self.jogging.is_none();
         status.held = now.held || self.held;
         status.fault.clone_from(&self.fault);
         status.path_rate = now.path_rate;
@@ -465,7 +510,7 @@ impl<const N: usize> Worker<'_, N> {
         status.cycles = self.remote.counters().into();
     }
 
-    fn say(&self, note: Note) {
+    pub(super) fn say(&self, note: Note) {
         // Nobody has to listen.
         let _ = self.ends.notes.send(note);
     }

@@ -7,13 +7,13 @@ use serde::Serialize;
 
 use super::{Code, CommandSink, PlanInterpreter};
 use crate::PlanError;
-use crate::run::{Batch, Motion, Tool, situation};
-use crate::world::{Change, Writer};
+use crate::run::{Batch, Motion, MotionFailure, Tool, situation};
+use crate::world::{Change, Class, Model, Writer};
 
 /// How a pulled plan went.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PulledReport {
-    /// `stopped`, or `failed`.
+    /// `stopped` (at its end), `failed`, or `interrupted` by the operator.
     pub outcome: &'static str,
     /// Last return value of the interpreter; 100 when the motion failed.
     pub code: i64,
@@ -23,6 +23,14 @@ pub struct PulledReport {
     pub steps: usize,
     /// Canonical commands executed.
     pub commands: usize,
+    /// Objects picked up.
+    pub pick_ups: usize,
+    /// Objects put down.
+    pub put_downs: usize,
+    /// End effectors attached.
+    pub end_effector_changes: usize,
+    /// Kits put into a container.
+    pub kits: usize,
     /// Time of motion (s).
     pub motion_s: f64,
     /// Time that the run took (s).
@@ -65,12 +73,7 @@ pub fn pull(
     let began = Instant::now();
     let mut report = PulledReport {
         outcome: "failed",
-        code: 0,
-        reason: None,
-        steps: 0,
-        commands: 0,
-        motion_s: 0.0,
-        wall_s: 0.0,
+        ..PulledReport::default()
     };
     let model = writer.model()?;
     if let Some(arm) = motion.arm() {
@@ -97,9 +100,12 @@ pub fn pull(
     }
     report.code = code as i64;
     match (failure, code) {
-        (Some(reason), _) => {
+        (Some(failure), _) => {
             report.code = 100;
-            report.reason = Some(format!("step {}: {reason}", report.steps + 1));
+            report.reason = Some(format!("step {}: {failure}", report.steps + 1));
+            if failure.stopped {
+                report.outcome = "interrupted";
+            }
             let mut end = Batch::default();
             end.push(Command::EndCanon {
                 reason: report.code,
@@ -118,23 +124,51 @@ pub fn pull(
     Ok(report)
 }
 
-/// Executes the commands of a step and commits its effects; the reason when the motion failed.
+/// Executes the commands of a step and commits its effects; the failure of its motion, if any.
 fn execute(
     collector: Collector,
     writer: &mut Writer,
     motion: &mut dyn Motion,
     report: &mut PulledReport,
-) -> Result<Option<String>, PlanError> {
+) -> Result<Option<MotionFailure>, PlanError> {
     let batch = collector.batch;
+    if batch.commands.is_empty() && batch.changes.is_empty() {
+        return Ok(None);
+    }
+    let model = writer.model()?;
     if !batch.commands.is_empty() {
-        match motion.execute(&situation(&writer.model()?)?, &batch) {
+        match motion.execute(&situation(&model)?, &batch) {
             Ok(seconds) => report.motion_s += seconds,
-            Err(failure) => return Ok(Some(failure.to_string())),
+            Err(failure) => return Ok(Some(failure)),
         }
         report.commands += batch.commands.len();
     }
     if !batch.changes.is_empty() {
         writer.commit(&batch.changes, None)?;
+        report.count(&model, &batch);
     }
     Ok(None)
+}
+
+impl PulledReport {
+    /// Counts what a step did to a world.
+    fn count(&mut self, before: &Model, batch: &Batch) {
+        let attached = batch.tools.iter().filter(|(_, tool)| tool.is_some());
+        self.end_effector_changes += attached.count();
+        let effector = before.effector().map(|effector| effector.id);
+        let held = before.held().map(|held| held.id);
+        for change in &batch.changes {
+            let Change::Place { object, location } = change else {
+                continue;
+            };
+            if Some(location.reference) == effector {
+                self.pick_ups += 1;
+            } else if Some(*object) == held {
+                self.put_downs += 1;
+                let class = |id| before.object(id).map(|object| object.class).ok();
+                let boxed = class(location.reference).is_some_and(Class::is_container);
+                self.kits += usize::from(boxed && class(*object) == Some(Class::KitInstance));
+            }
+        }
+    }
 }

@@ -50,79 +50,114 @@ pub fn read_plan(source: &str) -> Result<Vec<PlanStep>, PddlError> {
     Ok(steps)
 }
 
-#[allow(
-    clippy::too_many_lines,
-    reason = "one line of a plan, read from left to right"
-)]
+/// A line of a plan file while it is read from left to right.
+struct Line<'a> {
+    source: &'a str,
+    /// Where it begins in the source, bytes.
+    start: usize,
+    text: &'a str,
+    words: std::vec::IntoIter<(&'a str, usize)>,
+}
+
 fn read_line(
     source: &str,
     start: usize,
-    line: &str,
+    text: &str,
     number: usize,
 ) -> Result<Option<PlanStep>, PddlError> {
-    let fail = |at: usize, message: String| PddlError::new(source, start + at, message);
-    let mut tokens = words(line).peekable();
-    let Some(&(first, at)) = tokens.peek() else {
+    let words = words(text).collect::<Vec<_>>().into_iter();
+    let mut line = Line {
+        source,
+        start,
+        text,
+        words,
+    };
+    let Some((_, at)) = line.peek() else {
         return Ok(None);
     };
-    let mut step = PlanStep {
-        name: String::new(),
-        objects: Vec::new(),
-        start: None,
-        duration: None,
+    let time = line.time()?;
+    let (name, objects) = line.action()?;
+    if name.is_empty() {
+        return Err(line.fail(at, "an action without a name".into()));
+    }
+    Ok(Some(PlanStep {
+        name,
+        objects,
+        start: time,
+        duration: line.duration()?,
         line: number,
-    };
-    if first != "(" {
-        tokens.next();
+    }))
+}
+
+impl<'a> Line<'a> {
+    fn fail(&self, at: usize, message: String) -> PddlError {
+        PddlError::new(self.source, self.start + at, message)
+    }
+
+    fn peek(&self) -> Option<(&'a str, usize)> {
+        self.words.as_slice().first().copied()
+    }
+
+    /// The time before the action, if there is one.
+    fn time(&mut self) -> Result<Option<f64>, PddlError> {
+        let Some((first, at)) = self.peek().filter(|(first, _)| *first != "(") else {
+            return Ok(None);
+        };
+        self.words.next();
         let time = first.strip_suffix(':').unwrap_or(first).parse::<f64>();
         let time = time.ok().filter(|time| time.is_finite());
-        if time.is_none()
-            || tokens
-                .peek()
-                .is_none_or(|(next, _)| *next != "(" && *next != ":")
-        {
-            return Err(fail(
-                at,
-                format!("expected \"(\" or a time, found {first:?}"),
-            ));
+        let goes_on = self
+            .peek()
+            .is_some_and(|(next, _)| next == "(" || next == ":");
+        if time.is_none() || !goes_on {
+            let message = format!("expected \"(\" or a time, found {first:?}");
+            return Err(self.fail(at, message));
         }
-        step.start = time;
-        tokens.next_if(|(next, _)| *next == ":");
+        if self.peek().is_some_and(|(next, _)| next == ":") {
+            self.words.next();
+        }
+        Ok(time)
     }
-    match tokens.next() {
-        Some(("(", _)) => {}
-        other => {
-            return Err(fail(
-                other.map_or(line.len(), |(_, at)| at),
-                "expected \"(\"".into(),
-            ));
+
+    /// Name and objects, in lower case.
+    fn action(&mut self) -> Result<(String, Vec<String>), PddlError> {
+        let (mut name, mut objects) = (String::new(), Vec::new());
+        match self.words.next() {
+            Some(("(", _)) => {}
+            other => {
+                let at = other.map_or(self.text.len(), |(_, at)| at);
+                return Err(self.fail(at, "expected \"(\"".into()));
+            }
+        }
+        loop {
+            match self.words.next() {
+                Some((")", _)) => return Ok((name, objects)),
+                Some(("(", at)) => return Err(self.fail(at, "unexpected \"(\"".into())),
+                Some((word, _)) if name.is_empty() => name = word.to_lowercase(),
+                Some((word, _)) => objects.push(word.to_lowercase()),
+                None => {
+                    let end = self.text.trim_end().len();
+                    return Err(self.fail(end, "expected \")\"".into()));
+                }
+            }
         }
     }
-    loop {
-        match tokens.next() {
-            Some((")", _)) => break,
-            Some(("(", at)) => return Err(fail(at, "unexpected \"(\"".into())),
-            Some((word, _)) if step.name.is_empty() => step.name = word.to_lowercase(),
-            Some((word, _)) => step.objects.push(word.to_lowercase()),
-            None => return Err(fail(line.trim_end().len(), "expected \")\"".into())),
-        }
-    }
-    if step.name.is_empty() {
-        return Err(fail(at, "an action without a name".into()));
-    }
-    let rest: Vec<(&str, usize)> = tokens.collect();
-    if let Some((_, at)) = rest.first() {
-        let text: String = rest.iter().map(|(word, _)| *word).collect();
-        let duration = text
+
+    /// The duration in brackets after the action, if there is one.
+    fn duration(&mut self) -> Result<Option<f64>, PddlError> {
+        let Some((_, at)) = self.peek() else {
+            return Ok(None);
+        };
+        let text: String = self.words.by_ref().map(|(word, _)| word).collect();
+        let inner = text
             .strip_prefix('[')
             .and_then(|text| text.strip_suffix(']'));
-        let duration = duration.and_then(|text| text.parse::<f64>().ok());
-        step.duration = Some(duration.filter(|time| time.is_finite()).ok_or_else(|| {
-            fail(
-                *at,
-                format!("expected a duration such as [0.5], found {text:?}"),
-            )
-        })?);
+        let duration = inner.and_then(|text| text.parse::<f64>().ok());
+        let duration = duration.filter(|time| time.is_finite());
+        if duration.is_none() {
+            let message = format!("expected a duration such as [0.5], found {text:?}");
+            return Err(self.fail(at, message));
+        }
+        Ok(duration)
     }
-    Ok(Some(step))
 }

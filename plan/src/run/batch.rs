@@ -54,13 +54,17 @@ impl Batch {
     }
 }
 
+/// Parts of a metre that commands are given to; what is smaller is rounding.
+const FINEST: f64 = 1e12;
+
 /// A pose as the canonical language says it: point and two axes.
 #[must_use]
 pub fn canonical(pose: &Isometry3<f64>) -> Pose {
-    let t = &pose.translation;
-    let axis = |axis: Vector3<f64>| (pose.rotation * axis).into();
+    // Adding zero makes a negative zero positive.
+    let rounded = |v: Vector3<f64>| v.map(|x| (x * FINEST).round() / FINEST + 0.0).into();
+    let axis = |axis: Vector3<f64>| rounded(pose.rotation * axis);
     Pose::Axes {
-        point: [t.x, t.y, t.z],
+        point: rounded(pose.translation.vector),
         z_axis: axis(Vector3::z()),
         x_axis: axis(Vector3::x()),
     }

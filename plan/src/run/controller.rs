@@ -8,16 +8,17 @@ use serde::Serialize;
 
 use super::batch::{Batch, Request};
 use super::factotum::{Factotum, Stock};
-use super::machine::{Act, Counters, Machine, Outcome, State, Step};
-use super::motion::Motion;
+use super::machine::Machine;
+use super::motion::{Motion, MotionFailure};
 use super::order::Foresight;
+use super::preparation::{parameters, prepare};
 use super::program::Program;
+use super::report::{Event, Report};
 use super::robot::{Robot, RobotOptions, situation};
+use super::state::{Act, Outcome, State, Step};
 use super::value::Value;
 use crate::PlanError;
-use crate::finding::{Severity, has_errors};
-use crate::kitting::types::Type;
-use crate::kitting::{Reading, check, read};
+use crate::kitting::read;
 use crate::world::{Change, Model, Reader, StoredRun, Writer};
 
 /// What to do when a motion or an errand fails.
@@ -54,53 +55,12 @@ impl Default for RunOptions {
     }
 }
 
-/// Something that happened; for progress displays.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// A statement was executed and committed.
-    Statement {
-        /// Its name.
-        name: &'static str,
-        /// Line of the plan, from 1.
-        line: usize,
-        /// Statements so far.
-        number: usize,
-        /// Time of its motion or errand (s).
-        seconds: f64,
-    },
-    /// The end effector of this name is now on the arm.
-    EndEffector(String),
-    /// This many kits are finished.
-    Kit(usize),
-    /// Something odd.
-    Warning(String),
-    /// A motion or errand failed and is tried again.
-    Retry(String),
-}
-
-/// How a run went.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
-    /// `stopped` (by Stop) or `failed`.
-    pub outcome: &'static str,
-    /// Reason given to EndCanon: 0, or positive.
-    pub code: i64,
-    /// In words; none when all went well.
-    pub reason: Option<String>,
-    /// What was done.
-    #[serde(flatten)]
-    pub counters: Counters,
-    /// Time that the run took (s).
-    pub wall_s: f64,
-    /// Oddities of the plan and of the run.
-    pub warnings: Vec<String>,
-}
-
 /// Executes a plan: asks the interpreter for one step at a time, has it executed, and commits the
 /// motion's effect together with the state of the plan.
 pub struct Controller<'a> {
-    writer: Writer,
+    // The writer is closed last, so that it leaves one file.
     reader: Reader,
+    writer: Writer,
     motion: &'a mut dyn Motion,
     factotum: &'a mut dyn Factotum,
     options: RunOptions,
@@ -111,6 +71,36 @@ pub struct Controller<'a> {
     run: i64,
     resumed: bool,
     warnings: Vec<String>,
+    /// Why the run is left where it is, to be resumed: outcome, code, reason.
+    left: Option<(&'static str, i64, String)>,
+}
+
+/// What a motion or an errand did.
+#[derive(Default)]
+struct Done {
+    changes: Vec<Change>,
+    seconds: f64,
+    /// A variable with its new value.
+    binding: Option<(String, Value)>,
+}
+
+/// Why a step did not come to its end.
+enum Trouble {
+    /// The plan fails, with this code.
+    Failed(i64, String),
+    /// The operator stopped the arm.
+    Stopped(String),
+}
+
+impl From<MotionFailure> for Trouble {
+    fn from(failure: MotionFailure) -> Self {
+        let text = failure.to_string();
+        if failure.stopped {
+            Self::Stopped(text)
+        } else {
+            Self::Failed(3, text)
+        }
+    }
 }
 
 /// The world's two connections and the two agents that act in it.
@@ -123,76 +113,6 @@ pub struct Cell<'a> {
     pub motion: &'a mut dyn Motion,
     /// What brings and takes things.
     pub factotum: &'a mut dyn Factotum,
-}
-
-/// Reads and checks a plan against a world.
-///
-/// # Errors
-/// [`PlanError::Invalid`] when the plan has errors.
-pub fn prepare(source: &str, model: &Model) -> Result<(Program, Vec<String>), PlanError> {
-    let Reading { plan, mut findings } = read(source);
-    if !has_errors(&findings) {
-        findings.extend(check(&plan, Some(model)));
-    }
-    let errors: Vec<_> = findings
-        .iter()
-        .filter(|f| f.severity == Severity::Error)
-        .collect();
-    if let Some(first) = errors.first() {
-        let (line, column) = first.position(source);
-        let first = format!("{} (line {line}, column {column})", first.message);
-        return Err(PlanError::Invalid {
-            count: errors.len(),
-            first,
-        });
-    }
-    let warnings = findings.iter().filter(|f| f.severity == Severity::Warning);
-    let warnings = warnings.map(|f| f.message.clone()).collect();
-    Ok((Program::new(plan), warnings))
-}
-
-/// Values of a plan's parameters from texts.
-///
-/// # Errors
-/// [`PlanError::Parameter`] for one that is missing, unknown or of the wrong type.
-pub fn parameters(
-    program: &Program,
-    given: &BTreeMap<String, String>,
-) -> Result<BTreeMap<String, Value>, PlanError> {
-    let fail = |name: &str, why: String| PlanError::Parameter {
-        name: name.to_owned(),
-        why,
-    };
-    let mut values = BTreeMap::new();
-    for parameter in &program.plan.parameters {
-        let name = &parameter.name;
-        let text = given
-            .get(name)
-            .ok_or_else(|| fail(name, "it has no value".into()))?;
-        let kind = Type::from_name(&parameter.class).unwrap_or(Type::Text);
-        let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-        let value = match (kind, number) {
-            (Type::Number { whole, least }, Some(number))
-                if (!whole || number.fract() == 0.0)
-                    && least.is_none_or(|least| number >= least as f64) =>
-            {
-                Value::Number(number)
-            }
-            (Type::Truth, _) if text == "true" || text == "false" => Value::Truth(text == "true"),
-            (Type::Text, _) => Value::Text(text.clone()),
-            _ => {
-                return Err(fail(
-                    name,
-                    format!("expected {}, got {text}", kind.describe()),
-                ));
-            }
-        };
-        values.insert(name.clone(), value);
-    }
-    match given.keys().find(|name| !values.contains_key(*name)) {
-        Some(unknown) => Err(fail(unknown, "the plan has no such parameter".into())),
-        None => Ok(values),
-    }
 }
 
 fn json<T: Serialize>(value: &T) -> Result<String, PlanError> {
@@ -257,6 +177,7 @@ impl<'a> Controller<'a> {
             run,
             resumed,
             warnings,
+            left: None,
         })
     }
 
@@ -269,7 +190,8 @@ impl<'a> Controller<'a> {
         let stored = cell.writer.last_run()?.ok_or_else(missing)?;
         if let Some(outcome) = &stored.outcome {
             return Err(PlanError::Resume(format!(
-                "the last run has ended: {outcome}"
+                "the last run has ended ({})",
+                outcome.trim_matches('"')
             )));
         }
         let model = cell.reader.model()?;
@@ -297,6 +219,7 @@ impl<'a> Controller<'a> {
             run,
             resumed,
             warnings,
+            left: None,
         })
     }
 
@@ -312,30 +235,39 @@ impl<'a> Controller<'a> {
         &self.model
     }
 
-    /// Executes the plan to its end.
+    /// Executes the plan to its end, or until the operator stops the arm.
     ///
     /// # Errors
     /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
     pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<Report, PlanError> {
         let began = Instant::now();
-        if let Err(reason) = self.open() {
-            self.end(Outcome::Failed { code: 3, reason })?;
+        match self.open() {
+            // An arm that cannot be brought back now may be helped, and the run goes on later.
+            Err(failure) if self.resumed && !failure.stopped => {
+                self.left = Some(("failed", 3, format!("at the start: {failure}")));
+            }
+            Err(failure) => self.give_up(failure.into(), "at the start")?,
+            Ok(()) => {}
         }
-        while self.state.outcome.is_none() {
+        while self.state.outcome.is_none() && self.left.is_none() {
             self.step(observer)?;
         }
-        let outcome = self.state.outcome.clone().unwrap_or(Outcome::Stopped);
-        let (code, reason) = match outcome {
-            Outcome::Stopped => (0, None),
-            Outcome::Failed { code, reason } => (code, Some(reason)),
+        let (outcome, code, reason) = match (&self.left, &self.state.outcome) {
+            (Some((outcome, code, reason)), _) => (*outcome, *code, Some(reason.clone())),
+            (None, Some(Outcome::Failed { code, reason })) => {
+                ("failed", *code, Some(reason.clone()))
+            }
+            (None, _) => ("stopped", 0, None),
         };
-        let mut closing = Batch::default();
-        closing.push(Command::EndCanon { reason: code });
-        if let Err(failure) = self.motion.execute(&situation(&self.model)?, &closing) {
-            self.warnings.push(format!("EndCanon: {failure}"));
+        if outcome != "interrupted" {
+            let mut closing = Batch::default();
+            closing.push(Command::EndCanon { reason: code });
+            if let Err(failure) = self.motion.execute(&situation(&self.model)?, &closing) {
+                self.warnings.push(format!("EndCanon: {failure}"));
+            }
         }
         Ok(Report {
-            outcome: if code == 0 { "stopped" } else { "failed" },
+            outcome,
             code,
             reason,
             counters: self.state.counters.clone(),
@@ -345,7 +277,7 @@ impl<'a> Controller<'a> {
     }
 
     /// InitCanon and the units, and the arm where the model has it.
-    fn open(&mut self) -> Result<(), String> {
+    fn open(&mut self) -> Result<(), MotionFailure> {
         let mut batch = Batch::default();
         batch.push(Command::InitCanon);
         batch.push(Command::SetLengthUnits {
@@ -369,25 +301,20 @@ impl<'a> Controller<'a> {
         }
     }
 
-    fn move_only(&mut self, batch: &Batch) -> Result<(), String> {
-        let start = situation(&self.model).map_err(|error| error.to_string())?;
-        let seconds = self
-            .motion
-            .execute(&start, batch)
-            .map_err(|failure| failure.to_string())?;
-        self.state.counters.motion_s += seconds;
+    fn move_only(&mut self, batch: &Batch) -> Result<(), MotionFailure> {
+        let start = situation(&self.model).map_err(unmoved)?;
+        self.state.counters.motion_s += self.motion.execute(&start, batch)?;
         Ok(())
     }
 
     /// Brings the arm from wherever it is to where the model has it: up, across, down. The gripper
     /// is left alone: a step that was under way is executed again from its beginning, and all steps
     /// come to the same end when some of their motion has been made before.
-    fn bring_back(&mut self) -> Result<(), String> {
+    fn bring_back(&mut self) -> Result<(), MotionFailure> {
         let Some(arm) = self.motion.arm() else {
             return Ok(());
         };
-        let text = |error: PlanError| error.to_string();
-        let wanted = situation(&self.model).map_err(text)?;
+        let wanted = situation(&self.model).map_err(unmoved)?;
         let from_tip = wanted
             .tool
             .as_ref()
@@ -402,7 +329,7 @@ impl<'a> Controller<'a> {
             model: &self.model,
             options: &self.options.robot,
         };
-        let height = robot.travel_height().map_err(text)?;
+        let height = robot.travel_height().map_err(unmoved)?;
         let raised = |pose: &nalgebra::Isometry3<f64>| {
             let mut raised = *pose;
             raised.translation.z = raised.translation.z.max(height);
@@ -415,68 +342,58 @@ impl<'a> Controller<'a> {
         self.move_only(&batch)
     }
 
-    #[allow(
-        clippy::too_many_lines,
-        reason = "the order of one step is its meaning"
-    )]
     fn step(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<(), PlanError> {
         // Late binding: the interpreter reads the world before each step.
         if self.reader.revision()? != self.model.revision {
             self.model = self.reader.model()?;
         }
-        let step = match self.interpret() {
+        let mut step = match self.interpret() {
             Ok(step) => step,
             Err(error) => {
                 let reason = error.to_string();
                 return self.end(Outcome::Failed { code: 2, reason });
             }
         };
+        let line = crate::finding::position(&self.source, step.span.start).0;
+        let mark = format!("{} (line {line})", step.name);
+        let done = match std::mem::replace(&mut step.act, Act::Nothing) {
+            Act::Nothing => Ok(Done::default()),
+            Act::End | Act::Exhausted => {
+                let outcome = step.state.outcome.take().unwrap_or(Outcome::Stopped);
+                self.state = step.state;
+                return self.end(outcome);
+            }
+            Act::Motion(batch) => self.execute(&mark, batch, observer)?,
+            Act::Errand(request) => self.errand(request, observer),
+        };
+        match done {
+            Ok(done) => self.finish(step, done, line, observer),
+            Err(trouble) => self.give_up(trouble, &mark),
+        }
+    }
+
+    /// Commits what a step did and tells about it.
+    fn finish(
+        &mut self,
+        step: Step,
+        done: Done,
+        line: usize,
+        observer: &mut dyn FnMut(&Event),
+    ) -> Result<(), PlanError> {
         let Step {
             name,
-            span,
-            act,
             mut changes,
             mut state,
             warning,
+            ..
         } = step;
-        let line = crate::finding::position(&self.source, span.start).0;
-        let seconds = match act {
-            Act::Nothing => 0.0,
-            Act::End | Act::Exhausted => {
-                let outcome = state.outcome.take().unwrap_or(Outcome::Stopped);
-                self.state = state;
-                return self.end(outcome);
-            }
-            Act::Motion(batch) => {
-                let mark = format!("{name} (line {line})");
-                let seconds = match self.execute(&mark, &batch, observer)? {
-                    Ok(seconds) => seconds,
-                    Err(reason) => {
-                        let reason = format!("{mark}: {reason}");
-                        return self.end(Outcome::Failed { code: 3, reason });
-                    }
-                };
-                state.counters.motion_s += seconds;
-                for (_, tool) in &batch.tools {
-                    tool.iter()
-                        .for_each(|tool| observer(&Event::EndEffector(tool.name.clone())));
-                }
-                changes.extend(batch.changes);
-                seconds
-            }
-            Act::Errand(request) => match self.errand(&request, observer) {
-                Ok(delivery) => {
-                    let value = delivery.object.map_or(Value::Null, Value::Object);
-                    state.bindings.insert(request.variable, value);
-                    changes.extend(delivery.changes);
-                    delivery.seconds
-                }
-                Err(reason) => {
-                    let reason = format!("{name} (line {line}): {reason}");
-                    return self.end(Outcome::Failed { code: 4, reason });
-                }
-            },
-        };
+        let seconds = done.seconds;
+        // An errand takes time, but nothing of the arm's.
+        if done.binding.is_none() {
+            state.counters.motion_s += seconds;
+        }
+        state.bindings.extend(done.binding);
+        changes.extend(done.changes);
         let kits = self.state.counters.kits;
         self.commit(&changes, state)?;
         let number = self.state.counters.statements;
@@ -491,6 +408,20 @@ impl<'a> Controller<'a> {
         }
         self.warn(warning, observer);
         Ok(())
+    }
+
+    /// Ends the plan, or leaves it to be resumed where the operator stopped it.
+    fn give_up(&mut self, trouble: Trouble, mark: &str) -> Result<(), PlanError> {
+        match trouble {
+            Trouble::Failed(code, reason) => {
+                let reason = format!("{mark}: {reason}");
+                self.end(Outcome::Failed { code, reason })
+            }
+            Trouble::Stopped(reason) => {
+                self.left = Some(("interrupted", 0, format!("{mark}: {reason}")));
+                Ok(())
+            }
+        }
     }
 
     fn warn(&mut self, warning: Option<String>, observer: &mut dyn FnMut(&Event)) {
@@ -545,51 +476,75 @@ impl<'a> Controller<'a> {
     fn execute(
         &mut self,
         mark: &str,
-        batch: &Batch,
+        batch: Batch,
         observer: &mut dyn FnMut(&Event),
-    ) -> Result<Result<f64, String>, PlanError> {
+    ) -> Result<Result<Done, Trouble>, PlanError> {
         self.writer.mark_under_way(self.run, mark)?;
         let mut attempt = 0;
-        loop {
-            let failure = match self.motion.execute(&situation(&self.model)?, batch) {
-                Ok(seconds) => return Ok(Ok(seconds)),
-                Err(failure) => failure.to_string(),
+        let seconds = loop {
+            let failure = match self.motion.execute(&situation(&self.model)?, &batch) {
+                Ok(seconds) => break seconds,
+                Err(failure) => failure,
             };
             attempt += 1;
-            let again =
-                matches!(self.options.policy, Policy::Repair { attempts } if attempt <= attempts);
+            let again = !failure.stopped && self.again(attempt);
             if !again || !self.motion.recover() {
-                return Ok(Err(failure));
+                return Ok(Err(failure.into()));
             }
             observer(&Event::Retry(format!("{mark}: {failure}")));
             self.warnings
                 .push(format!("{mark}: {failure}; tried again"));
             self.resumed = true;
             if let Err(failure) = self.open() {
-                return Ok(Err(failure));
+                return Ok(Err(failure.into()));
             }
+        };
+        for (_, tool) in &batch.tools {
+            tool.iter()
+                .for_each(|tool| observer(&Event::EndEffector(tool.name.clone())));
         }
+        Ok(Ok(Done {
+            changes: batch.changes,
+            seconds,
+            binding: None,
+        }))
+    }
+
+    /// Whether a failed step is tried again after this many attempts.
+    fn again(&self, attempt: usize) -> bool {
+        matches!(self.options.policy, Policy::Repair { attempts } if attempt <= attempts)
     }
 
     fn errand(
         &mut self,
-        request: &Request,
+        request: Request,
         observer: &mut dyn FnMut(&Event),
-    ) -> Result<super::factotum::Delivery, String> {
+    ) -> Result<Done, Trouble> {
         let mut attempt = 0;
         loop {
             let plan = &self.program.plan;
-            match self.factotum.perform(&self.model, plan, request) {
-                Ok(delivery) => return Ok(delivery),
+            match self.factotum.perform(&self.model, plan, &request) {
+                Ok(delivery) => {
+                    let value = delivery.object.map_or(Value::Null, Value::Object);
+                    return Ok(Done {
+                        changes: delivery.changes,
+                        seconds: delivery.seconds,
+                        binding: Some((request.variable, value)),
+                    });
+                }
                 Err(reason) => {
                     attempt += 1;
-                    let again = matches!(self.options.policy, Policy::Repair { attempts } if attempt <= attempts);
-                    if !again {
-                        return Err(reason);
+                    if !self.again(attempt) {
+                        return Err(Trouble::Failed(4, reason));
                     }
                     observer(&Event::Retry(reason));
                 }
             }
         }
     }
+}
+
+/// What keeps the arm from being moved at all.
+fn unmoved(error: PlanError) -> MotionFailure {
+    MotionFailure::new(0, error.to_string())
 }

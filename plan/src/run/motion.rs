@@ -11,10 +11,36 @@ pub struct MotionFailure {
     pub command: usize,
     /// What happened.
     pub reason: String,
+    /// The operator wanted it: the run is not over, it can be resumed.
+    pub stopped: bool,
+}
+
+impl MotionFailure {
+    /// A failure of the command at this position of its batch.
+    pub fn new(command: usize, reason: impl Into<String>) -> Self {
+        let (reason, stopped) = (reason.into(), false);
+        Self {
+            command,
+            reason,
+            stopped,
+        }
+    }
+
+    /// The operator stopped the arm.
+    #[must_use]
+    pub fn stopped() -> Self {
+        Self {
+            stopped: true,
+            ..Self::new(0, "the operator stopped the arm")
+        }
+    }
 }
 
 impl std::fmt::Display for MotionFailure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.stopped {
+            return f.write_str(&self.reason);
+        }
         write!(f, "command {}: {}", self.command + 1, self.reason)
     }
 }

@@ -1,10 +1,11 @@
 //! The order of lists that leave it open: the one with the shortest predicted time.
 
 use super::factotum::Factotum;
-use super::machine::{Act, Chooser, Frame, Machine, State};
+use super::machine::{Chooser, Machine};
 use super::motion::{Motion, Situation};
 use super::program::{Node, Program};
 use super::robot::{RobotOptions, situation};
+use super::state::{Act, Frame, State};
 use super::value::Value;
 use crate::world::Model;
 

@@ -264,11 +264,7 @@ impl Robot<'_> {
         support: ObjectId,
     ) -> Result<(Isometry3<f64>, Option<String>), PlanError> {
         let container = self.model.object(support)?;
-        let box_like = matches!(
-            container.class,
-            Class::LargeContainer | Class::LargeBoxWithKits | Class::LargeBoxWithEmptyKitTrays
-        );
-        if !box_like || !self.options.stack {
+        if !container.class.is_container() || !self.options.stack {
             return Ok((*pose, None));
         }
         let height = self.model.free_height(support, pose, object.id)?;

@@ -79,16 +79,16 @@ impl SimulatedMotion {
             x_axis,
         } = pose
         else {
-            let reason = "a pose without axes".into();
-            return Err(MotionFailure { command, reason });
+            let reason = "a pose without axes";
+            return Err(MotionFailure::new(command, reason));
         };
         let pose = from_axes(*point, *x_axis, *z_axis)
-            .map_err(|reason| MotionFailure { command, reason })?;
+            .map_err(|reason| MotionFailure::new(command, reason))?;
         let distance = pose.translation.vector.norm();
         match self.reach {
             Some(reach) if distance > reach => {
                 let reason = format!("{point:?} is {distance:.3} m away, the reach is {reach} m");
-                Err(MotionFailure { command, reason })
+                Err(MotionFailure::new(command, reason))
             }
             _ => Ok(pose),
         }
@@ -106,11 +106,8 @@ impl Motion for SimulatedMotion {
         if let Some(failure) = self.failures.iter().position(|at| range.contains(at)) {
             let at = self.failures.remove(failure);
             self.executed = range.end;
-            let reason = "the arm was made to fail here".into();
-            return Err(MotionFailure {
-                command: at - range.start,
-                reason,
-            });
+            let command = at - range.start;
+            return Err(MotionFailure::new(command, "the arm was made to fail here"));
         }
         self.executed = range.end;
         Ok(seconds)

@@ -144,6 +144,15 @@ impl Class {
         )
     }
 
+    /// Whether trays and kits are piled up in objects of this class.
+    #[must_use]
+    pub fn is_container(self) -> bool {
+        matches!(
+            self,
+            Self::LargeContainer | Self::LargeBoxWithKits | Self::LargeBoxWithEmptyKitTrays
+        )
+    }
+
     /// The property that names the stock keeping unit of objects of this class.
     #[must_use]
     pub fn sku_property(self) -> Option<&'static str> {

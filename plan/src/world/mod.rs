@@ -15,6 +15,7 @@ mod object;
 mod place;
 pub(crate) mod reader;
 pub mod schema;
+mod stored_run;
 mod writer;
 
 pub use change::Change;
@@ -27,4 +28,5 @@ pub use nist::import_nist;
 pub use object::{BoxVolume, Design, DesignPart, Object, ObjectId, Scalar, Shape, Sku, Units};
 pub use place::{Location, Relation, from_axes, from_roll_pitch_yaw, pointing_down};
 pub use reader::Reader;
-pub use writer::{Durability, StoredRun, Writer};
+pub use stored_run::StoredRun;
+pub use writer::{Durability, Writer};

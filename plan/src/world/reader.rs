@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use rusqlite::{Connection, OpenFlags, Row};
 
 use super::object::DesignPart;
+use super::stored_run::{StoredRun, last_run};
 use super::{
     BoxVolume, Class, Design, Location, Model, Object, ObjectId, Relation, Scalar, Shape, Sku,
     Units, schema,
@@ -51,6 +52,14 @@ impl Reader {
     pub fn model(&self) -> Result<Model, PlanError> {
         let transaction = self.connection.unchecked_transaction()?;
         load(&transaction)
+    }
+
+    /// The latest run, or none.
+    ///
+    /// # Errors
+    /// [`PlanError::Database`].
+    pub fn last_run(&self) -> Result<Option<StoredRun>, PlanError> {
+        last_run(&self.connection)
     }
 
     /// Number of the last commit; a model with the same number is up to date.

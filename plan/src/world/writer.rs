@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use rusqlite::{Connection, OptionalExtension, Transaction, params};
+use rusqlite::{Connection, Transaction, params};
 
 use super::reader::{load, pose_to_text};
+use super::stored_run::{StoredRun, last_run};
 use super::{Change, Location, Model, Object, ObjectId, Scalar, schema};
 use crate::PlanError;
 
@@ -16,27 +17,6 @@ pub enum Durability {
     Full,
     /// Handed to the operating system; for dry runs and tests.
     Process,
-}
-
-/// State of a run of a plan, stored with each commit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StoredRun {
-    /// Its number.
-    pub id: i64,
-    /// Id of the plan.
-    pub plan: String,
-    /// Text of the plan, as it was when the run started.
-    pub source: String,
-    /// Values of the parameters (JSON).
-    pub parameters: String,
-    /// What the simulated factotum has in store (JSON).
-    pub stock: String,
-    /// Program counter, variables and counters (JSON).
-    pub state: String,
-    /// How it ended; none while it runs or after it was killed.
-    pub outcome: Option<String>,
-    /// The step whose motion was begun and not yet committed.
-    pub under_way: Option<String>,
 }
 
 /// The one connection that may write the world database.
@@ -172,22 +152,7 @@ impl Writer {
     /// # Errors
     /// [`PlanError::Database`].
     pub fn last_run(&self) -> Result<Option<StoredRun>, PlanError> {
-        let run = self
-            .connection
-            .query_row("SELECT * FROM run ORDER BY id DESC LIMIT 1", [], |row| {
-                Ok(StoredRun {
-                    id: row.get(0)?,
-                    plan: row.get(1)?,
-                    source: row.get(2)?,
-                    parameters: row.get(3)?,
-                    stock: row.get(4)?,
-                    state: row.get(5)?,
-                    outcome: row.get(6)?,
-                    under_way: row.get(7)?,
-                })
-            })
-            .optional()?;
-        Ok(run)
+        last_run(&self.connection)
     }
 }
 

@@ -7,7 +7,7 @@
 
 use std::io::{BufRead, Write, stdin, stdout};
 use std::process::ExitCode;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,12 @@ fn main() -> ExitCode {
         ["driver", arm, log] => driver(arm, log),
         ["engine", arm] => engine(arm),
         ["paced", arm, commands] => paced(arm, commands),
-        _ => Err("usage: servo-peer driver ARM LOG | engine ARM | paced ARM COMMANDS".into()),
+        ["hostile", arm, log, kind] => hostile(arm, log, kind),
+        _ => Err(
+            "usage: servo-peer driver ARM LOG | engine ARM | paced ARM COMMANDS \
+                  | hostile ARM LOG KIND"
+                .into(),
+        ),
     };
     if let Err(error) = result {
         eprintln!("{error}");
@@ -44,28 +49,163 @@ fn engine(arm: &str) -> Outcome {
     config.record = false;
     let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
     let remote = executor.remote();
+    static STARVE: AtomicBool = AtomicBool::new(false);
     thread::spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
-            if line == "recover" {
-                remote.recover();
+            match line.as_str() {
+                "recover" => remote.recover(),
+                "starve" => STARVE.store(true, Ordering::Relaxed),
+                _ => {}
             }
         }
     });
     say("ready");
     let mut next = return_home(&mut feeder, &executor, 0);
+    let (mut finished, mut starved) = (next, false);
     loop {
         while let Some(event) = monitor.event() {
             say(&format!("{event:?}"));
-            if matches!(event, Event::Recovered { .. }) {
-                feeder.renew();
-                next = return_home(&mut feeder, &executor, next);
+            match event {
+                Event::Recovered { .. } => {
+                    feeder.renew();
+                    next = return_home(&mut feeder, &executor, next);
+                    finished = next;
+                }
+                Event::Finished { command, .. } => finished = command + 1,
+                _ => {}
             }
         }
-        while feeder.room() > 4000 && feed(&mut feeder, next) {
+        // A small stock, so that what is asked for comes soon.
+        let queued = next.saturating_sub(finished);
+        if STARVE.load(Ordering::Relaxed) {
+            if !starved && executor.remote().measured().idle {
+                starved = true;
+                half_a_command(&mut feeder, &executor);
+            }
+        } else if queued < 3 && feed(&mut feeder, next) {
             next += 1;
         }
         thread::sleep(Duration::from_millis(1));
     }
+}
+
+/// The first 3 s of a command of 6 s; the rest never comes.
+fn half_a_command(feeder: &mut Feeder<JOINTS>, executor: &Executor<JOINTS>) {
+    let from = executor.remote().measured().setpoint;
+    let to = from.map(|at| at + 0.8);
+    let whole = realtime::Piece::hermite(
+        6.0,
+        &realtime::Sample::rest(from),
+        &realtime::Sample::rest(to),
+    );
+    // The ring is empty.
+    let _ = feeder.push(realtime::Segment {
+        piece: realtime::Piece {
+            duration: 3.0,
+            ..whole
+        },
+        command: 4_000_000_000,
+        last: false,
+    });
+}
+
+/// A driver that keeps the protocol until it has followed for a while, then goes wrong.
+fn hostile(arm: &str, log: &str, kind: &str) -> Outcome {
+    const PERIOD: u64 = 1_000_000;
+    let arm: ipc::Arm = arm.parse()?;
+    let link = ipc::DriverLink::open(&arm)?;
+    let mut driver = driver_sim::driver(driver_options(arm))?;
+    let mut log = std::fs::File::create(log)?;
+    let mut random = 0x9e37_79b9_7f4a_7c15_u64;
+    let (mut next, mut active) = (ipc::now_ns(), 0_u64);
+    loop {
+        next = (next + PERIOD).max(ipc::now_ns());
+        ipc::sleep_until_ns(next);
+        if let Some(greeting) = link.greeting() {
+            let ack = driver.greet(&greeting.hello, next);
+            greeting.answer(old(ack, kind));
+        }
+        active += u64::from(driver.state() == ipc::DriverState::Active);
+        let reads = kind != "slow" || active % 20 == 0 || active < 100;
+        let setpoints = std::iter::from_fn(|| link.next_setpoint());
+        for setpoint in setpoints.take(if reads { 64 } else { 0 }) {
+            driver.receive(&setpoint, next);
+            write(&mut log, &setpoint, &driver, next)?;
+        }
+        let mut state = driver.step(next, PERIOD);
+        if active > 900 {
+            spoil(&mut state, kind, &mut random);
+        }
+        link.send(state);
+    }
+}
+
+/// The answer of a driver of another version.
+fn old(mut ack: ipc::HelloAck, kind: &str) -> ipc::HelloAck {
+    match kind {
+        "old-answer" => ack.protocol = 7,
+        "old-refusal" => {
+            let reason = "protocol 1 where 7 is spoken";
+            let verdict = ipc::Verdict::WrongProtocol;
+            return ipc::HelloAck::refusal(JOINTS, verdict, reason);
+        }
+        _ => {}
+    }
+    ack
+}
+
+/// What a driver that goes wrong says.
+fn spoil(state: &mut ipc::State, kind: &str, random: &mut u64) {
+    let mut bits = || {
+        *random ^= *random << 13;
+        *random ^= *random >> 7;
+        *random ^= *random << 17;
+        *random
+    };
+    match kind {
+        "nan" => state.position[2] = f64::NAN,
+        "range" => state.driver_state = 77,
+        "jump" => state.position[1] += 0.3,
+        "random" => {
+            // Now and then all of it, else all that is behind the head.
+            if bits() % 4 == 0 {
+                (state.session, state.sequence) = (bits(), bits());
+                (state.protocol, state.joints) = (bits() as u32, bits() as u32);
+            }
+            (state.measured_ns, state.published_ns) = (bits(), bits());
+            (state.driver_state, state.fault) = (bits() as u32, bits() as u32);
+            let (positions, velocities) = (&mut state.position, &mut state.velocity);
+            for value in positions.iter_mut().chain(velocities) {
+                *value = f64::from_bits(bits());
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A line like those of the simulated driver's own log.
+fn write(
+    log: &mut std::fs::File,
+    setpoint: &ipc::Setpoint,
+    driver: &driver_sim::Driver,
+    now: u64,
+) -> std::io::Result<()> {
+    let mut line = format!(
+        "{now},{},{},{},{}",
+        setpoint.session, setpoint.sequence, setpoint.tick, setpoint.flags
+    );
+    let lists = [
+        &setpoint.position,
+        &setpoint.velocity,
+        &setpoint.acceleration,
+    ];
+    for value in lists.into_iter().flat_map(|list| list.iter().take(JOINTS)) {
+        line.push_str(&format!(",{value:e}"));
+    }
+    for joint in 0..JOINTS {
+        line.push_str(&format!(",{:e}", driver.position(joint)));
+    }
+    writeln!(log, "{line}")
 }
 
 fn paced(arm: &str, commands: &str) -> Outcome {

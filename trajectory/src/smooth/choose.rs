@@ -14,8 +14,12 @@ use super::spline::{self, Effort, Moving, Request};
 const EFFORT: Effort = Effort {
     steps: 90,
     search: 72,
+    spread: Some(1.0),
     gap: 3e-3,
 };
+
+/// Spread of a start in motion that was too fast.
+const SPREAD: f64 = 1.2;
 
 /// A certified motion through a window.
 #[derive(Clone, Debug)]
@@ -97,22 +101,25 @@ fn spline(
         return None;
     }
     let mut inner = options.clone();
-    let mut coupled = None;
-    for attempt in 0..3 {
+    let (mut coupled, mut effort) = (None, EFFORT);
+    for attempt in 0..5 {
         let narrowed = inner.clone();
         let mut request = Request {
             poses,
             options: &narrowed,
             moving,
-            effort: EFFORT,
+            effort,
             coupled: false,
         };
         request.coupled = coupled.unwrap_or(!request.can_follow());
         let Some(mut spans) = spline::plan(&request) else {
-            if request.coupled {
+            if moving.is_some() && effort.spread.is_some() {
+                effort.spread = effort.spread.filter(|x| *x < SPREAD).map(|_| SPREAD);
+            } else if !request.coupled && request.moves()[1] {
+                (coupled, effort) = (Some(true), EFFORT);
+            } else {
                 return None;
             }
-            coupled = Some(request.moves()[1]);
             continue;
         };
         let (mut certificate, mut passes) = certify(&spans, poses, options);

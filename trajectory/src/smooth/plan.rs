@@ -164,8 +164,25 @@ impl ToolCurve for SmoothPlan {
 /// # Ok::<(), smooth::SmoothError>(())
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
-    Ok(Windows::new(poses, options)?.finish())
+    let plan = Windows::new(poses, options)?.finish();
+    // What keeps half of the tolerance keeps all of it. A second motion costs
+    // little where poses are close to each other.
+    let costly = plan.spans.len() > SPANS_PER_POSE * poses.len();
+    if costly || poses.len() <= SHORT || plan.method() != Method::Spline {
+        return Ok(plan);
+    }
+    let mut half = options.clone();
+    half.tolerance *= 0.5;
+    let half = Windows::new(poses, &half)?.finish_for(options);
+    let better = half.certificate.holds() && half.duration() < plan.duration();
+    Ok(if better { half } else { plan })
 }
+
+/// Lists up to this length are planned once.
+const SHORT: usize = 5;
+
+/// Longer lists are planned twice when they take no more than so many spans.
+const SPANS_PER_POSE: usize = 24;
 
 #[cfg(test)]
 mod tests {

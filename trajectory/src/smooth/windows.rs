@@ -135,8 +135,15 @@ impl Windows {
 
     /// Plans what is left and certifies the whole.
     #[must_use]
-    pub fn finish(mut self) -> SmoothPlan {
+    pub fn finish(self) -> SmoothPlan {
+        let options = self.options.clone();
+        self.finish_for(&options)
+    }
+
+    /// Plans what is left and certifies the whole for wider tolerances.
+    pub(crate) fn finish_for(mut self, options: &SmoothOptions) -> SmoothPlan {
         while self.advance() {}
+        self.options = options.finite();
         let stop = exact_stop::plan(&self.given, &self.options.limits);
         let exact_stop = stop.last().map_or(0.0, Span::end);
         let whole = certify(&self.done.spans, &self.given, &self.options);

@@ -17,7 +17,8 @@ use crate::{output, robot};
 /// Smooth motions through pose lists: motion time beside exact stop, planning time, certificate
 ///
 /// Without a robot the controlled point moves freely. With one, each list is laid before it with
-/// its middle where the tool is at home, and planned by the planner that runs programs.
+/// its middle where the tool is at home, and planned by the planner that runs programs. The
+/// planning time is the shortest of three, so that the machine's stalls do not count.
 #[derive(Args, Debug)]
 pub(crate) struct Motion {
     /// JSON file with cases: P positions in mm, Q unit quaternions w,x,y,z or null, tol in mm,
@@ -103,13 +104,16 @@ impl Motion {
     }
 }
 
+/// How often a case is planned; the result is the same each time.
+const PASSES: usize = 3;
+
 /// One case, planned and measured; a fault of the case is a reason.
 fn measure(case: &serde_json::Value, robot: Option<&Robot>) -> Result<Measure, Failure> {
     let trial = match suite::trial(case) {
         Ok(trial) => trial,
         Err(reason) => return Ok(Measure::unplanned(0, reason)),
     };
-    match robot {
+    let once = || match robot {
         None => {
             let options = SmoothOptions::new(trial.tolerance, trial.limits);
             Ok(smooth::measure(&trial.poses, &options))
@@ -117,7 +121,15 @@ fn measure(case: &serde_json::Value, robot: Option<&Robot>) -> Result<Measure, F
         Some(robot) => trial
             .measure(robot)
             .map_err(|error| Failure::new(Exit::Unreadable, error)),
+    };
+    let mut best = once()?;
+    for _ in 1..PASSES {
+        let row = once()?;
+        if row.planning < best.planning {
+            best = row;
+        }
     }
+    Ok(best)
 }
 
 fn named(name: &str, row: Measure) -> Case {

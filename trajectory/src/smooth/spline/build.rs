@@ -193,9 +193,13 @@ impl Task<'_> {
             vertices,
             start: begin,
             scale: 1.0,
+            anchor: None,
         };
-        let mut point = start::first(&mut problem, self.moving.is_some());
-        solve::<D, B>(&problem, &mut point, self.request.effort)?;
+        let spread = self
+            .moving
+            .map(|_| self.request.effort.spread.unwrap_or(1.0));
+        let mut point = start::first(&mut problem, spread);
+        solve::<D, B>(&mut problem, &mut point, self.request.effort)?;
         Some(self.spans(&problem, &point, used))
     }
 

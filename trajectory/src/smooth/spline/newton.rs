@@ -22,18 +22,28 @@ pub(crate) struct Step {
     pub(crate) decrement: f64,
 }
 
-/// Product of slacks with rare logarithms.
-struct Slacks {
+/// Share of each slack that a step must leave: an iterate that is thrown
+/// against a wall can only creep along it afterwards, since norms are curved.
+const KEEP: f64 = 0.02;
+
+/// Product of slacks, as shares of their bounds, with rare logarithms.
+struct Slacks<'a> {
     product: f64,
     sum: f64,
+    /// Slacks before the step; none when empty.
+    before: &'a [f64],
+    seen: &'a mut Vec<f64>,
 }
 
-impl Slacks {
-    /// False when the slack is not positive.
-    fn take(&mut self, slack: f64) -> bool {
-        if slack <= 0.0 || slack.is_nan() {
+impl Slacks<'_> {
+    /// Takes the slack of `square <= bound`; false when too little is left.
+    fn take(&mut self, square: f64, bound: f64) -> bool {
+        let slack = 1.0 - square / bound;
+        let least = self.before.get(self.seen.len()).map_or(0.0, |s| KEEP * s);
+        if slack <= least || slack.is_nan() {
             return false;
         }
+        self.seen.push(slack);
         self.product *= slack;
         if !(1e-200..1e200).contains(&self.product) {
             self.sum += self.product.ln();
@@ -43,51 +53,73 @@ impl Slacks {
     }
 }
 
-/// Value of the barrier with weight `t` on `z`; `None` outside of its domain.
-pub(crate) fn value<const D: usize>(
-    problem: &Problem<D>,
-    point: &Point<D>,
-    room: &Room,
-    t: f64,
-) -> Option<f64> {
-    let mut slacks = Slacks {
-        product: 1.0,
-        sum: 0.0,
-    };
-    for g in 0..Problem::<D>::GROUPS {
-        let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room)[0].powi(2));
-        let units = [1, 2, 3].map(|k| 1.0 / problem.cap(g, k, 1.0, room)[0].powi(2));
+/// The barrier with a weight on `z`.
+#[derive(Clone, Copy)]
+pub(crate) struct Barrier<'a, const D: usize> {
+    pub(crate) problem: &'a Problem<D>,
+    pub(crate) room: &'a Room,
+    pub(crate) weight: f64,
+}
+
+impl<const D: usize> Barrier<'_, D> {
+    /// Value at an iterate, and its slacks in `seen`; `None` outside of the
+    /// domain, and where a slack is a small share of what it was `before`.
+    pub(crate) fn value(
+        &self,
+        point: &Point<D>,
+        before: &[f64],
+        seen: &mut Vec<f64>,
+    ) -> Option<f64> {
+        seen.clear();
+        let mut slacks = Slacks {
+            product: 1.0,
+            sum: 0.0,
+            before,
+            seen,
+        };
+        let mut bounds = 0.0;
+        for g in 0..Problem::<D>::GROUPS {
+            bounds += self.limits(point, g, &mut slacks)?;
+            let balls = &self.room.balls[g];
+            for (i, radius) in balls.iter().enumerate() {
+                let miss = super::project::miss(self.problem, point, i, g);
+                if !slacks.take(miss * miss, radius * radius) {
+                    return None;
+                }
+            }
+            if self.problem.groups[g].width.is_finite() {
+                for k in 0..point.samples() {
+                    let place = point.sample(k, g);
+                    let away = self.problem.offset(&place, self.room.legs[k], g).0;
+                    if !slacks.take(square(&away), self.room.widths[g][k].powi(2)) {
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(self.weight * point.z - bounds - slacks.sum - slacks.product.ln())
+    }
+
+    /// Takes the slacks of speed, acceleration and jerk; the sum of the
+    /// logarithms of their bounds, which move with `z`.
+    fn limits(&self, point: &Point<D>, g: usize, slacks: &mut Slacks<'_>) -> Option<f64> {
+        let caps = [1, 2, 3].map(|k| self.problem.cap(g, k, point.z, self.room)[0].powi(2));
         let last = point.control.len() - 1;
         for k in 0..last {
-            let mut ok = slacks.take((caps[0] - square(&point.sum(k, &FIRST, g))) * units[0]);
+            let mut ok = slacks.take(square(&point.sum(k, &FIRST, g)), caps[0]);
             if k + 2 <= last {
-                ok &= slacks.take((caps[1] - square(&point.sum(k, &SECOND, g))) * units[1]);
+                ok &= slacks.take(square(&point.sum(k, &SECOND, g)), caps[1]);
             }
             if k + 3 <= last {
-                ok &= slacks.take((caps[2] - square(&point.sum(k, &THIRD, g))) * units[2]);
+                ok &= slacks.take(square(&point.sum(k, &THIRD, g)), caps[2]);
             }
             if !ok {
                 return None;
             }
         }
-        let unit = 1.0 / problem.groups[g].radius.powi(2);
-        for i in 0..point.passes.len() {
-            let miss = super::project::miss(problem, point, i, g);
-            if !slacks.take((room.balls[g][i].powi(2) - miss * miss) * unit) {
-                return None;
-            }
-        }
-        if problem.groups[g].width.is_finite() {
-            let unit = 1.0 / problem.groups[g].width.powi(2);
-            for k in 0..point.samples() {
-                let away = problem.offset(&point.sample(k, g), room.legs[k], g).0;
-                if !slacks.take((room.widths[g][k].powi(2) - square(&away)) * unit) {
-                    return None;
-                }
-            }
-        }
+        let count = [last, last.saturating_sub(1), last.saturating_sub(2)];
+        Some((0..3).map(|k| count[k] as f64 * caps[k].ln()).sum())
     }
-    Some(t * point.z - slacks.sum - slacks.product.ln())
 }
 
 impl<const D: usize, const B: usize> System<D, B> {

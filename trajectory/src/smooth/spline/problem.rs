@@ -31,6 +31,9 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) start: [[f64; D]; 4],
     /// Knot spacing at `z = 1`, s.
     pub(crate) scale: f64,
+    /// While a first iterate from a start in motion breaks limits, its first
+    /// control points stay as for this `z`; a greater `z` only widens limits.
+    pub(crate) anchor: Option<f64>,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -60,6 +63,11 @@ impl<const D: usize> Problem<D> {
     /// Number of groups.
     pub(crate) const GROUPS: usize = D / 3;
 
+    /// Whether the start is in motion.
+    pub(crate) fn moving(&self) -> bool {
+        self.start[1..].iter().flatten().any(|x| *x != 0.0)
+    }
+
     /// Knot spacing, s.
     pub(crate) fn spacing(&self, z: f64) -> f64 {
         self.scale * z.cbrt()
@@ -74,8 +82,12 @@ impl<const D: usize> Problem<D> {
 
     /// The first four control points at `z`, and their derivatives to `z`.
     pub(crate) fn pinned(&self, z: f64) -> [[[f64; D]; 2]; 4] {
-        let h = self.spacing(z);
-        let slope = h / (3.0 * z);
+        let h = self.spacing(self.anchor.unwrap_or(z));
+        let slope = if self.anchor.is_some() {
+            0.0
+        } else {
+            h / (3.0 * z)
+        };
         let [p, v, a, j] = &self.start;
         START.map(|w| {
             let (mut value, mut change) = ([0.0; D], [0.0; D]);

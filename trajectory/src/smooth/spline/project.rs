@@ -10,6 +10,12 @@ const WIDEN: f64 = 1.03;
 /// Share of a bound below which it need not be widened.
 const CLEAR: f64 = 0.99;
 
+/// First corridor samples of a start in motion, and what they may use: they
+/// cannot be moved, and lie in the corridor but not always as far inside as
+/// others are kept.
+const EASED: usize = 8;
+const EASE: f64 = 1.02;
+
 /// Bound for a present value: the true one when the value is clear of it, else
 /// one widened to hold the value, but never wider than before.
 fn narrowed(before: f64, value: f64, bound: f64, clear: f64) -> f64 {
@@ -184,7 +190,12 @@ impl Room {
             }
             for g in 0..Problem::<D>::GROUPS {
                 let far = away(problem, point, k, g, self.legs[k]);
-                let width = problem.groups[g].width;
+                let eased = if k < EASED && problem.moving() {
+                    EASE
+                } else {
+                    1.0
+                };
+                let width = eased * problem.groups[g].width;
                 self.widths[g][k] = narrowed(self.widths[g][k], far, width, CLEAR);
                 tight &= self.widths[g][k] <= width;
             }

@@ -1,7 +1,7 @@
 //! The interior point iteration: anytime, every iterate after the first
 //! feasible one is a motion.
 
-use super::newton::{self, System};
+use super::newton::{Barrier, Step, System};
 use super::problem::{Point, Problem, Room};
 use super::project::project;
 
@@ -12,12 +12,21 @@ pub(crate) struct Effort {
     pub(crate) steps: usize,
     /// Steps after which an iterate that still needs room is given up.
     pub(crate) search: usize,
+    /// A start in motion that breaks limits is made feasible by widening them
+    /// with `z`, over this many times the spans that the look-ahead needs;
+    /// `None`: by narrowing limits from where the start is.
+    pub(crate) spread: Option<f64>,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
 }
 
 /// Growth of the weight on `z` at each centre.
 const GROWTH: f64 = 8.0;
+
+/// Steps cut this short, so many times on end, mean that the iterate is stuck
+/// between walls far from its centre: the weight is then lowered, once.
+const SHORT: f64 = 0.1;
+const STUCK: usize = 4;
 
 /// Steps between two narrowings of widened bounds: the steps between take the
 /// iterate well inside, so that each narrowing is a large one.
@@ -34,35 +43,50 @@ const BACK: f64 = 0.6;
 /// method); the bounds of a still infeasible iterate are widened to contain it
 /// and follow it inwards.
 pub(crate) fn solve<const D: usize, const B: usize>(
-    problem: &Problem<D>,
+    problem: &mut Problem<D>,
     point: &mut Point<D>,
     effort: Effort,
 ) -> Option<usize> {
     let mut system = System::<D, B>::new(point.control.len());
+    if effort.spread.is_some() && problem.moving() {
+        problem.anchor = Some(point.z);
+    }
     problem.pin(point);
     project(problem, point, None, 20);
-    slow_down(problem, point);
+    if problem.anchor.is_some() || !problem.moving() {
+        slow_down(problem, point);
+    }
     let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
+    let (mut short, mut freed) = (0, false);
     for count in 0..effort.steps {
         since += 1;
         if tight || since > PATIENCE {
             tight = room.tighten(problem, point);
             since = 0;
         }
-        if !tight && count >= effort.search {
+        if tight && problem.anchor.is_some_and(|z| point.z < z) {
+            point.z = problem.anchor.take().unwrap_or(point.z);
+        }
+        let done = tight && problem.anchor.is_none();
+        if !done && count >= effort.search {
             return None;
         }
         let Some(step) = system.step(problem, point, &room, weight) else {
-            return tight.then_some(count);
+            return done.then_some(count);
         };
-        let moved = search(problem, point, &room, weight, &step);
+        let share = search(problem, point, &room, weight, &step);
+        let moved = share > 0.0;
+        short = if tight && share < SHORT { short + 1 } else { 0 };
+        if short == STUCK && !freed {
+            (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
+        }
         let centred = step.decrement < 3.0;
         if !moved || centred {
             if tight && parameter / weight <= effort.gap * point.z {
-                return Some(count);
+                return done.then_some(count);
             }
             if !tight {
                 let stuck = since == 0 && !moved;
@@ -80,15 +104,11 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             }
         }
     }
-    tight.then_some(effort.steps)
+    (tight && problem.anchor.is_none()).then_some(effort.steps)
 }
 
-/// Raises `z` until speed, acceleration and jerk hold with room to spare. A
-/// start in motion fixes the first control points, so there time is left alone.
+/// Raises `z` until speed, acceleration and jerk hold with room to spare.
 fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
-    if problem.start[1..].iter().flatten().any(|x| *x != 0.0) {
-        return;
-    }
     let mut need = 0.0_f64;
     for ratios in super::project::ratios(problem, point) {
         let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
@@ -100,17 +120,23 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     point.z *= need.max(1e-9);
 }
 
-/// Moves the iterate along the step as far as the barrier falls; false when it
-/// does not fall at all.
+/// Moves the iterate along the step as far as the barrier falls; the share of
+/// the step, 0 when it does not fall at all.
 fn search<const D: usize>(
     problem: &Problem<D>,
     point: &mut Point<D>,
     room: &Room,
     weight: f64,
-    step: &newton::Step,
-) -> bool {
-    let Some(here) = newton::value(problem, point, room, weight) else {
-        return false;
+    step: &Step,
+) -> f64 {
+    let barrier = Barrier {
+        problem,
+        room,
+        weight,
+    };
+    let (mut slacks, mut seen) = (Vec::new(), Vec::new());
+    let Some(here) = barrier.value(point, &[], &mut slacks) else {
+        return 0.0;
     };
     let mut share: f64 = if step.z < 0.0 {
         (-0.9 * point.z / step.z).min(1.0)
@@ -129,13 +155,13 @@ fn search<const D: usize>(
         problem.pin(&mut trial);
         trial.passes.copy_from_slice(&point.passes);
         project(problem, &mut trial, Some(room), 3);
-        if let Some(there) = newton::value(problem, &trial, room, weight)
+        if let Some(there) = barrier.value(&trial, &slacks, &mut seen)
             && there < here - 0.01 * share * step.decrement
         {
             *point = trial;
-            return true;
+            return share;
         }
         share *= BACK;
     }
-    false
+    0.0
 }

@@ -7,7 +7,10 @@ use super::problem::{Point, Problem, square};
 const SHARE: f64 = 0.6;
 
 /// Knot intervals in one time `A / J`.
-const KNOTS_PER_RAMP: f64 = 5.0;
+const KNOTS_PER_RAMP: f64 = 6.0;
+
+/// Control points over which the offset of a start in motion fades out.
+const FADE: f64 = 16.0;
 
 /// Rounds of averaging of the control points, and the share of the tolerance
 /// they may use up.
@@ -60,9 +63,10 @@ impl Schedule {
     }
 }
 
-/// First iterate of a problem whose `scale` it also sets; `moving` tells that
-/// the start is not at rest.
-pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, moving: bool) -> Point<D> {
+/// First iterate of a problem whose `scale` it also sets; for a start in motion
+/// `spread` is by how much more time it takes than the look-ahead.
+pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64>) -> Point<D> {
+    let moving = spread.is_some();
     let legs = legs(problem);
     let ramp = (0..Problem::<D>::GROUPS)
         .map(|g| problem.groups[g].caps[1] / problem.groups[g].caps[2])
@@ -88,7 +92,7 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, moving: bool) -> P
     }
     // A spacing that was lowered needs more spans for the same time.
     let spans = if moving {
-        ((total / problem.scale).ceil() as usize + 3).min(2 * MOST as usize)
+        ((spread.unwrap_or(1.0) * total / problem.scale).ceil() as usize + 3).min(2 * MOST as usize)
     } else {
         spans
     };
@@ -97,7 +101,13 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, moving: bool) -> P
     } else {
         0.5 * smoothing + 1.5 * problem.scale
     };
-    place(problem, &legs, &schedule, [spans as f64, lead, smoothing])
+    let slower = spread.unwrap_or(1.0);
+    place(
+        problem,
+        &legs,
+        &schedule,
+        [spans as f64, lead, smoothing, slower],
+    )
 }
 
 /// Lowers the knot spacing until the pinned control points of a start in motion
@@ -261,16 +271,16 @@ fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], [skip, _]: [f64; 2])
     result
 }
 
-/// Control points at the smoothed progress; `[spans, lead, smoothing]`.
+/// Control points at the smoothed progress; `[spans, lead, smoothing, slower]`.
 fn place<const D: usize>(
     problem: &Problem<D>,
     legs: &[Leg<D>],
     schedule: &Schedule,
-    [spans, lead, smoothing]: [f64; 3],
+    [spans, lead, smoothing, slower]: [f64; 4],
 ) -> Point<D> {
     let knots = spans as usize + 4;
     let h = problem.scale;
-    let progress = |k: usize| schedule.smooth((k as f64 - 1.5) * h - lead, smoothing);
+    let progress = |k: usize| schedule.smooth(((k as f64 - 1.5) * h - lead) / slower, smoothing);
     let mut ends = vec![0.0];
     for leg in legs {
         ends.push(ends[ends.len() - 1] + leg.length);
@@ -327,6 +337,18 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
         }
         legs[k] = leg;
     }
+    let offset = |place: &[f64; D], k: usize, g: usize| {
+        let place = [place[3 * g], place[3 * g + 1], place[3 * g + 2]];
+        let (away, _) = problem.offset(&place, legs[k], g);
+        (away, square(&away).sqrt())
+    };
+    // A start in motion may be farther away than that.
+    let mut held = vec![[0.0; 2]; knots];
+    for (k, place) in point.control.iter().enumerate() {
+        for g in 0..Problem::<D>::GROUPS {
+            held[k][g] = offset(place, k, g).1.max(HELD * problem.groups[g].radius);
+        }
+    }
     let mut rounded = point.control.clone();
     for _ in 0..ROUNDS {
         for k in 4..knots - 4 {
@@ -335,13 +357,7 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
                 rounded[k][d] = 0.5 * point.control[k][d] + 0.25 * sides;
             }
             for g in 0..Problem::<D>::GROUPS {
-                let place = [
-                    rounded[k][3 * g],
-                    rounded[k][3 * g + 1],
-                    rounded[k][3 * g + 2],
-                ];
-                let (away, _) = problem.offset(&place, legs[k], g);
-                let (far, most) = (square(&away).sqrt(), HELD * problem.groups[g].radius);
+                let ((away, far), most) = (offset(&rounded[k], k, g), held[k][g]);
                 if far > most {
                     for d in 0..3 {
                         rounded[k][3 * g + d] -= away[d] * (1.0 - most / far);
@@ -354,15 +370,25 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
 }
 
 /// Lets the offset between the start's own control points and the polyline
-/// fade out over a dozen control points.
+/// fade out over some control points, as a quintic that goes on evenly.
 fn blend_in<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
-    let planned = point.control[3];
+    let planned = [1, 2, 3].map(|k| point.control[k]);
     problem.pin(point);
-    let fade = 12.0_f64.min(point.control.len() as f64 / 2.0);
-    for k in 4..point.control.len() {
-        let left = (1.0 - (k as f64 - 3.0) / fade).max(0.0);
-        for d in 0..D {
-            point.control[k][d] += (point.control[3][d] - planned[d]) * left * left;
+    let fade = FADE.min(point.control.len() as f64 / 2.0);
+    let own = [1, 2, 3].map(|k| point.control[k]);
+    for d in 0..D {
+        let [o1, o2, o3] = [0, 1, 2].map(|i| own[i][d] - planned[i][d]);
+        // Slope and curvature at the last of them, over the whole fade.
+        let slope = (1.5 * o3 - 2.0 * o2 + 0.5 * o1) * fade;
+        let bend = (o3 - 2.0 * o2 + o1) * fade * fade;
+        for k in 4..point.control.len() {
+            let x = (k as f64 - 3.0) / fade;
+            if x >= 1.0 {
+                break;
+            }
+            let (y, xx) = ((1.0 - x).powi(3), x * x);
+            let even = 1.0 + 3.0 * x + 6.0 * xx;
+            point.control[k][d] += y * (o3 * even + slope * x * (1.0 + 3.0 * x) + 0.5 * bend * xx);
         }
     }
 }

@@ -1,16 +1,20 @@
 //! The driver between shared memory and a clock.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ipc::{Clock, DriverLink, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Clock, DriverLink, Urgency, now_ns, sleep_until_ns, urge};
 
 use crate::log::Log;
-use crate::{Driver, Options, SimError};
+use crate::{Driver, DriverError, Robot};
 
 /// The period without a session (ns).
 const IDLE_NS: u64 = 2_000_000;
+
+/// How many times lock-step looks for a setpoint before it sleeps between looks.
+const SPINS: u32 = 4000;
 
 /// How long lock-step waits for the engine before the arm counts as left alone (ns).
 const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
@@ -28,16 +32,42 @@ pub struct Report {
     pub warning: Option<String>,
 }
 
-/// Runs the simulated driver until `stop` becomes true.
+/// How a driver runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Where to write each setpoint received, as CSV.
+    pub log: Option<PathBuf>,
+    /// What the process asks of the operating system; nothing of it in lock-step.
+    pub urgency: Urgency,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        Self {
+            log: None,
+            urgency: Urgency {
+                priority: 50,
+                ..Urgency::default()
+            },
+        }
+    }
+}
+
+/// Drives `robot` as `arm` until `stop` becomes true.
 ///
 /// # Errors
-/// When the options do not fit together, or the arm already has a driver, or shared memory cannot
-/// be used.
-pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, SimError> {
+/// When what the robot says of itself does not fit together, or the arm already has a driver, or
+/// shared memory cannot be used.
+pub fn run<R: Robot>(
+    arm: &Arm,
+    robot: R,
+    options: &RunOptions,
+    stop: &AtomicBool,
+) -> Result<Report, DriverError> {
     let urgency = options.urgency;
-    let link = DriverLink::open(&options.arm)?;
+    let link = DriverLink::open(arm)?;
     let mut log = Log::open(options.log.as_deref())?;
-    let mut driver = Driver::new(options)?;
+    let mut driver = Driver::new(robot)?;
     let mut report = Report::default();
     // While an engine paces the driver it may spin, which a real-time thread must not.
     let mut granted = None;
@@ -63,7 +93,7 @@ pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, SimError> {
 }
 
 /// Answers a request for a session if one waits.
-fn answer_greeting(link: &DriverLink, driver: &mut Driver) {
+fn answer_greeting<R: Robot>(link: &DriverLink, driver: &mut Driver<R>) {
     if let Some(greeting) = link.greeting() {
         let ack = driver.greet(&greeting.hello, now_ns());
         greeting.answer(ack);
@@ -71,7 +101,7 @@ fn answer_greeting(link: &DriverLink, driver: &mut Driver) {
 }
 
 /// One period by the clock: 0.4 periods after the engine's.
-fn wall_period(link: &DriverLink, driver: &mut Driver, log: &mut Log) {
+fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) {
     let period = driver.period_ns().unwrap_or(IDLE_NS);
     let phase = match driver.last_setpoint().tick_ns {
         0 => 0,
@@ -95,7 +125,11 @@ fn wall_period(link: &DriverLink, driver: &mut Driver, log: &mut Log) {
 
 /// Periods as fast as the engine asks for them; time is what the setpoints say. Returns after a
 /// few thousand, or when the engine is silent.
-fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &AtomicBool)) -> u64 {
+fn lock_step<R: Robot>(
+    link: &DriverLink,
+    driver: &mut Driver<R>,
+    (log, stop): (&mut Log, &AtomicBool),
+) -> u64 {
     let Some(period) = driver.period_ns() else {
         return 0;
     };
@@ -112,6 +146,10 @@ fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &At
         let Some(setpoint) = wait_for_setpoint(link, driver, stop) else {
             return periods;
         };
+        if let Some(state) = driver.sign_of_life(&setpoint) {
+            link.send(state);
+            continue;
+        }
         virtual_ns = virtual_ns.max(setpoint.tick.saturating_mul(period));
         driver.receive(&setpoint, virtual_ns);
         log.write(&setpoint, driver, virtual_ns);
@@ -125,24 +163,27 @@ fn lock_step(link: &DriverLink, driver: &mut Driver, (log, stop): (&mut Log, &At
 
 /// Waits for the next setpoint, first awake, then asleep. Without one the driver stops the arm in
 /// virtual time and latches.
-fn wait_for_setpoint(
+fn wait_for_setpoint<R: Robot>(
     link: &DriverLink,
-    driver: &mut Driver,
+    driver: &mut Driver<R>,
     stop: &AtomicBool,
 ) -> Option<ipc::Setpoint> {
     let start = Instant::now();
     let mut turns = 0_u32;
     loop {
         if let Some(setpoint) = link.next_setpoint() {
-            return Some(setpoint);
+            // One that was under way when the session began releases no state.
+            if driver.is_of_session(&setpoint) {
+                return Some(setpoint);
+            }
+            continue;
         }
         turns = turns.saturating_add(1);
-        if turns < 2000 {
+        // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
+        if turns < SPINS {
             core::hint::spin_loop();
-        } else if turns < 4000 {
-            thread::yield_now();
         } else {
-            thread::sleep(Duration::from_micros(50));
+            thread::sleep(Duration::from_micros(20));
             let sessions = driver.sessions();
             answer_greeting(link, driver);
             if driver.sessions() != sessions || stop.load(Ordering::Relaxed) {
@@ -157,7 +198,7 @@ fn wait_for_setpoint(
 }
 
 /// The engine of a lock-step session is gone: the arm stops in virtual time.
-fn give_up(link: &DriverLink, driver: &mut Driver) {
+fn give_up<R: Robot>(link: &DriverLink, driver: &mut Driver<R>) {
     let (Some(period), Some(watchdog)) = (driver.period_ns(), driver.watchdog_ns()) else {
         return;
     };

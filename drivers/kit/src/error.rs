@@ -1,11 +1,11 @@
-//! What can go wrong with the simulated driver.
+//! What can go wrong with a driver.
 
 use thiserror::Error;
 
-/// Why the simulated driver cannot run.
+/// Why a driver cannot run.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
-pub enum SimError {
+pub enum DriverError {
     /// The number of joints does not fit into a message.
     #[error("{joints} joints do not fit, a message holds 1 to {most}")]
     Joints {
@@ -45,4 +45,27 @@ pub enum SimError {
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] ipc::IpcError),
+}
+
+impl DriverError {
+    /// Whether the number of an option is finite and, where it must be, positive.
+    ///
+    /// # Errors
+    /// [`DriverError::Value`] with the option's name.
+    pub fn check_value(option: &'static str, value: f64, positive: bool) -> Result<(), Self> {
+        let wanted = if positive {
+            "positive and finite"
+        } else {
+            "finite"
+        };
+        if value.is_finite() && (!positive || value > 0.0) {
+            Ok(())
+        } else {
+            Err(Self::Value {
+                option,
+                wanted,
+                value,
+            })
+        }
+    }
 }

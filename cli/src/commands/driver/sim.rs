@@ -1,10 +1,7 @@
-use std::io::{self, Read};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
 
-use clap::{Args, Subcommand};
+use clap::Args;
 use driver_sim::Options;
 use engine::robot::Robot;
 use ipc::IpcError;
@@ -16,28 +13,12 @@ use crate::failure::Failure;
 use crate::output;
 use crate::robot::RobotOption;
 
-/// How long the driver goes on when the process that started it is gone: enough for its watchdog
-/// to stop the arm.
-const FAREWELL: Duration = Duration::from_secs(2);
-
-/// Drivers: the processes that move an arm
-#[derive(Args, Debug)]
-pub(crate) struct Driver {
-    #[command(subcommand)]
-    what: What,
-}
-
-#[derive(Debug, Subcommand)]
-enum What {
-    Sim(Sim),
-}
-
 /// Run the simulated driver of an arm until Ctrl-C
 ///
 /// It takes setpoints from shared memory, moves a second-order servo a joint, and gives measured
 /// states back, as the driver of a real arm does.
 #[derive(Args, Debug)]
-struct Sim {
+pub(super) struct Sim {
     #[command(flatten)]
     robot: RobotOption,
     #[command(flatten)]
@@ -62,31 +43,16 @@ struct Sim {
     until_end_of_input: bool,
 }
 
-impl Driver {
-    /// Runs the driver that was chosen.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        match &self.what {
-            What::Sim(sim) => sim.run(),
-        }
-    }
-}
-
 impl Sim {
-    fn run(&self) -> Result<Exit, Failure> {
+    /// Drives until a signal, or until its starter asks for the end.
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
         if self.until_end_of_input {
-            let stop = Arc::clone(&stop);
-            thread::spawn(move || {
-                // A byte asks for an end at once. Without one, the starter is gone.
-                if io::stdin().read_exact(&mut [0]).is_err() {
-                    thread::sleep(FAREWELL);
-                }
-                stop.store(true, Ordering::Relaxed);
-            });
+            super::end_with_input(Arc::clone(&stop));
         }
         let report = driver_sim::run(self.options(&robot), &stop).map_err(failure)?;
         if let Some(warning) = &report.warning {
@@ -121,10 +87,10 @@ impl Sim {
     }
 }
 
-fn failure(error: driver_sim::SimError) -> Failure {
+fn failure(error: driver_sim::DriverError) -> Failure {
     let exit = match &error {
-        driver_sim::SimError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
-        driver_sim::SimError::Ipc(_) => Exit::NoPeer,
+        driver_sim::DriverError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
+        driver_sim::DriverError::Ipc(_) => Exit::NoPeer,
         _ => Exit::Usage,
     };
     Failure::new(exit, error)

@@ -1,11 +1,15 @@
 //! Looks at what the servo loop needs of this machine, and says what would repair it.
 
+mod driver;
+
 use core::time::Duration;
 use std::fs;
 use std::thread;
 
-use ipc::{Arm, EngineLink, Hello, Probe, Urgency, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Probe, Urgency, now_ns, sleep_until_ns, urge};
 use serde::Serialize;
+
+use crate::robot::Robot;
 
 /// How a check ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -55,8 +59,10 @@ pub struct DoctorOptions {
     pub rate_hz: f64,
     /// How long to measure wake-ups.
     pub wake_up: Duration,
-    /// An arm whose driver to greet, with its number of joints. The driver must have no engine.
-    pub driver: Option<(Arm, usize)>,
+    /// An arm whose driver to greet. The driver must have no engine.
+    pub driver: Option<Arm>,
+    /// A robot whose limits to look at, beside those of the driver.
+    pub robot: Option<Robot>,
 }
 
 impl Default for DoctorOptions {
@@ -65,6 +71,7 @@ impl Default for DoctorOptions {
             rate_hz: 1000.0,
             wake_up: Duration::from_secs(5),
             driver: None,
+            robot: None,
         }
     }
 }
@@ -75,8 +82,17 @@ pub fn examine(options: &DoctorOptions) -> Vec<Check> {
     checks.extend(rights());
     checks.push(wake_up(options));
     checks.push(round_trip());
-    if let Some((arm, joints)) = &options.driver {
-        checks.push(driver(arm, *joints, options.rate_hz));
+    let ack = options
+        .driver
+        .as_ref()
+        .map(|arm| driver::handshake(arm, options.rate_hz));
+    let ack = ack.and_then(|(check, ack)| {
+        checks.push(check);
+        ack
+    });
+    if let Some(robot) = &options.robot {
+        checks.push(driver::limits_known(robot));
+        checks.extend(ack.map(|ack| driver::limits_agree(robot, &ack)));
     }
     checks
 }
@@ -296,27 +312,6 @@ fn round_trip() -> Check {
     }
 }
 
-fn driver(arm: &Arm, joints: usize, rate_hz: f64) -> Check {
-    const NAME: &str = "driver handshake";
-    let period = (1e9 / rate_hz) as u64;
-    let hello = Hello::new(joints, period, 100_000_000.max(period), ipc::Clock::Wall);
-    let greeted = EngineLink::open(arm)
-        .and_then(|link| link.greet(&hello, Duration::from_secs(2)))
-        .map(|ack| ipc::text_of(&ack.name));
-    match greeted {
-        Ok(name) => Check::new(
-            NAME,
-            Health::Ok,
-            format!("{arm}: {name} opened a session"),
-            "",
-        ),
-        Err(error) => {
-            let remedy = "start the driver, e.g. canter driver sim --name CELL/ARM";
-            Check::new(NAME, Health::Fail, error.to_string(), remedy)
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -325,11 +320,12 @@ mod tests {
     fn every_check_that_is_not_ok_has_a_remedy() {
         let options = DoctorOptions {
             wake_up: Duration::from_millis(100),
-            driver: Some(("doctor/nobody-there".parse().unwrap(), 6)),
+            driver: Some("doctor/nobody-there".parse().unwrap()),
+            robot: Some(crate::robot::load("ur5e").unwrap()),
             ..DoctorOptions::default()
         };
         let checks = examine(&options);
-        assert_eq!(checks.len(), 10);
+        assert_eq!(checks.len(), 11);
         for check in &checks {
             println!("{check:?}");
             assert_eq!(
@@ -338,6 +334,6 @@ mod tests {
                 "{check:?}"
             );
         }
-        assert_eq!(checks.last().map(|check| check.health), Some(Health::Fail));
+        assert_eq!(checks[9].health, Health::Fail, "there is no driver");
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use ipc::Setpoint;
 
-use crate::{Driver, SimError};
+use crate::{Driver, DriverError, Robot};
 
 /// A CSV file with a line for each setpoint received: when (ns), its session, sequence, tick and
 /// flags, then position, velocity and acceleration of each joint, then where the joints were.
@@ -15,18 +15,18 @@ use crate::{Driver, SimError};
 pub(crate) struct Log(Option<File>);
 
 impl Log {
-    pub(crate) fn open(path: Option<&Path>) -> Result<Self, SimError> {
+    pub(crate) fn open(path: Option<&Path>) -> Result<Self, DriverError> {
         let Some(path) = path else {
             return Ok(Self(None));
         };
-        let file = File::create(path).map_err(|cause| SimError::Log {
+        let file = File::create(path).map_err(|cause| DriverError::Log {
             path: path.to_owned(),
             cause: cause.to_string(),
         })?;
         Ok(Self(Some(file)))
     }
 
-    pub(crate) fn write(&mut self, setpoint: &Setpoint, driver: &Driver, now_ns: u64) {
+    pub(crate) fn write<R: Robot>(&mut self, setpoint: &Setpoint, driver: &Driver<R>, now_ns: u64) {
         let Some(file) = &mut self.0 else { return };
         let joints = driver.joints();
         let mut line = format!(

@@ -1,18 +1,12 @@
 //! The driver's side of the protocol, without a clock and without a channel.
 
-use std::collections::VecDeque;
-
 use ipc::{
-    Clock, DriverState, FaultCode, GRIPPER, Hello, HelloAck, Setpoint, SetpointFlags, State,
-    TOOL_CHANGER, Verdict, bytes_of, text_of,
+    Clock, DriverState, FaultCode, Hello, HelloAck, MAX_TOOLS, Setpoint, SetpointFlags, State,
+    ToolAction, Verdict, bytes_of, text_of,
 };
 use realtime::Bounds;
 
-use crate::noise::Noise;
-use crate::reference::Reference;
-use crate::servo::Servo;
-use crate::tool::Tool;
-use crate::{Options, SimError};
+use crate::{About, DriverError, Measured, Reference, Robot};
 
 /// How far the first setpoint of a session may be from the measured position (rad).
 const FIRST: f64 = 1e-3;
@@ -31,59 +25,64 @@ struct Session {
     clock: Clock,
 }
 
-/// A simulated robot with the driver's side of the protocol. Times go in as numbers, so that the
-/// same setpoints at the same times give the same states.
+/// A robot with the driver's side of the protocol. Times go in as numbers, so that the same
+/// setpoints at the same times give the same states.
 #[derive(Clone, Debug)]
-pub struct Driver {
-    options: Options,
+pub struct Driver<R> {
+    robot: R,
+    about: About,
     state: DriverState,
     fault: FaultCode,
     fault_joint: u32,
     session: Option<Session>,
     sessions: u64,
-    servos: Vec<Servo>,
+    measured: Vec<Measured>,
     references: Vec<Reference>,
-    tools: [Tool; 2],
-    waiting: VecDeque<Setpoint>,
+    orders: [u32; MAX_TOOLS],
     last: Setpoint,
     fresh: bool,
     received_ns: u64,
     sequence: u64,
     missed: u64,
     missed_ever: u64,
-    noise: Noise,
+    reported: State,
 }
 
-impl Driver {
+impl<R: Robot> Driver<R> {
     /// A robot at rest.
     ///
     /// # Errors
-    /// When the options do not fit together.
-    pub fn new(options: Options) -> Result<Self, SimError> {
-        options.check()?;
+    /// When what it says of itself does not fit together.
+    pub fn new(mut robot: R) -> Result<Self, DriverError> {
+        let about = robot.about();
+        about.check()?;
+        let mut measured = vec![Measured::default(); about.joints()];
+        robot.measure(&mut measured);
+        let at = measured.iter().map(|joint| Reference::rest(joint.position));
         Ok(Self {
             state: DriverState::Disconnected,
             fault: FaultCode::None,
             fault_joint: u32::MAX,
             session: None,
             sessions: 0,
-            servos: options.position.iter().map(|at| Servo::rest(*at)).collect(),
-            references: options
-                .position
-                .iter()
-                .map(|at| Reference::rest(*at))
-                .collect(),
-            tools: [Tool::new(options.gripper), Tool::new(options.tool_changer)],
-            waiting: VecDeque::new(),
+            references: at.collect(),
+            orders: [0; MAX_TOOLS],
             last: Setpoint::default(),
             fresh: false,
             received_ns: 0,
             sequence: 0,
             missed: 0,
             missed_ever: 0,
-            noise: Noise::new(options.seed),
-            options,
+            reported: State::default(),
+            robot,
+            about,
+            measured,
         })
+    }
+
+    /// The robot.
+    pub fn robot(&self) -> &R {
+        &self.robot
     }
 
     /// Where the driver is in its life.
@@ -121,16 +120,22 @@ impl Driver {
         self.session.as_ref().map(|session| session.watchdog_ns)
     }
 
-    /// How many joints there are.
-    pub fn joints(&self) -> usize {
-        self.servos.len()
+    /// Whether a setpoint belongs to the session under way.
+    pub fn is_of_session(&self, setpoint: &Setpoint) -> bool {
+        let session = self.session.as_ref();
+        session.is_some_and(|session| session.number == setpoint.session)
     }
 
-    /// Where a joint is, without noise (rad); not a number where there is no such joint.
+    /// How many joints there are.
+    pub fn joints(&self) -> usize {
+        self.about.joints()
+    }
+
+    /// Where a joint was measured (rad); not a number where there is no such joint.
     pub fn position(&self, joint: usize) -> f64 {
-        self.servos
+        self.measured
             .get(joint)
-            .map_or(f64::NAN, |servo| servo.position)
+            .map_or(f64::NAN, |joint| joint.position)
     }
 
     /// The last setpoint that was accepted.
@@ -140,10 +145,10 @@ impl Driver {
 
     /// Answers a request for a session at `now_ns`.
     pub fn greet(&mut self, hello: &Hello, now_ns: u64) -> HelloAck {
-        let joints = self.servos.len();
+        let joints = self.joints();
         if let Some((verdict, reason)) = self.objection(hello) {
             let mut ack = HelloAck::refusal(joints, verdict, &reason);
-            ack.name = bytes_of(&self.options.name);
+            ack.name = bytes_of(&self.about.name);
             return ack;
         }
         self.sessions += 1;
@@ -160,35 +165,34 @@ impl Driver {
         self.state = DriverState::Synced;
         self.fault = FaultCode::None;
         self.fault_joint = u32::MAX;
-        self.waiting.clear();
         self.fresh = false;
         self.last = Setpoint::default();
         self.missed = 0;
         self.received_ns = now_ns;
-        for (servo, reference) in self.servos.iter_mut().zip(&mut self.references) {
-            *reference = Reference::rest(servo.position);
+        for (joint, reference) in self.measured.iter().zip(&mut self.references) {
+            *reference = Reference::rest(joint.position);
         }
-        self.tools.iter_mut().for_each(Tool::forget_orders);
+        self.orders = [0; MAX_TOOLS];
         self.welcome(number, hello.watchdog_ns)
     }
 
     fn welcome(&self, session: u64, watchdog_ns: u64) -> HelloAck {
-        let mut ack = HelloAck::refusal(self.servos.len(), Verdict::Welcome, "");
+        let mut ack = HelloAck::refusal(self.joints(), Verdict::Welcome, "");
         ack.session = session;
         ack.watchdog_ns = watchdog_ns;
-        ack.name = bytes_of(&self.options.name);
-        for (joint, servo) in self.servos.iter().enumerate() {
-            ack.position[joint] = servo.position;
-            ack.lower[joint] = self.options.lower[joint];
-            ack.upper[joint] = self.options.upper[joint];
-            ack.velocity[joint] = self.options.velocity[joint];
+        ack.name = bytes_of(&self.about.name);
+        for (joint, measured) in self.measured.iter().enumerate() {
+            ack.position[joint] = measured.position;
+            ack.lower[joint] = self.about.lower[joint];
+            ack.upper[joint] = self.about.upper[joint];
+            ack.velocity[joint] = self.about.velocity[joint];
         }
         ack
     }
 
     /// Why there can be no session now.
     fn objection(&self, hello: &Hello) -> Option<(Verdict, String)> {
-        if let Err(cause) = hello.check(self.servos.len()) {
+        if let Err(cause) = hello.check(self.joints()) {
             let verdict = match cause {
                 ipc::MessageError::Protocol { .. } => Verdict::WrongProtocol,
                 ipc::MessageError::Schema { .. } => Verdict::WrongSchema,
@@ -198,12 +202,12 @@ impl Driver {
             };
             return Some((verdict, cause.to_string()));
         }
-        if self.options.model != 0 && hello.model != 0 && self.options.model != hello.model {
+        if self.about.model != 0 && hello.model != 0 && self.about.model != hello.model {
             return Some((
                 Verdict::WrongModel,
                 format!(
                     "robot model {:#x} here, {:#x} there",
-                    self.options.model, hello.model
+                    self.about.model, hello.model
                 ),
             ));
         }
@@ -237,7 +241,7 @@ impl Driver {
         {
             return;
         }
-        if setpoint.check(self.servos.len()).is_err() {
+        if setpoint.check(self.joints()).is_err() {
             self.stop(FaultCode::BadSetpoint, u32::MAX);
             return;
         }
@@ -257,7 +261,6 @@ impl Driver {
         if setpoint.flags & SetpointFlags::GOODBYE != 0 {
             self.state = DriverState::Disconnected;
             self.session = None;
-            self.waiting.clear();
             return;
         }
         self.state = match self.state {
@@ -265,25 +268,42 @@ impl Driver {
             _ => DriverState::Active,
         };
         self.fresh = true;
-        self.waiting.push_back(*setpoint);
+    }
+
+    /// Answers a sign of life: in lock-step a setpoint of the period that was before. Nothing
+    /// moves; the answer is the last state with a number of its own.
+    pub fn sign_of_life(&mut self, setpoint: &Setpoint) -> Option<State> {
+        let repeats = self.is_of_session(setpoint)
+            && setpoint.tick == self.last.tick
+            && setpoint.flags & (SetpointFlags::GOODBYE | SetpointFlags::STOP_REQUEST) == 0
+            && self.last.sequence > 0
+            && setpoint.sequence > self.last.sequence;
+        if !repeats {
+            return None;
+        }
+        self.last.sequence = setpoint.sequence;
+        self.sequence += 1;
+        self.reported.sequence = self.sequence;
+        self.reported.setpoint_sequence = setpoint.sequence;
+        Some(self.reported)
     }
 
     /// The first joint whose setpoint is out of range, too fast, or further away than the joint
     /// can have come in `elapsed` (s).
     fn unreachable_joint(&self, setpoint: &Setpoint, elapsed: f64) -> Option<usize> {
         let first = self.state == DriverState::Synced;
-        (0..self.servos.len()).find(|&joint| {
+        (0..self.joints()).find(|&joint| {
             let (at, speed) = (setpoint.position[joint], setpoint.velocity[joint]);
-            let most = self.options.velocity[joint] * 1.001;
+            let most = self.about.velocity[joint] * 1.001;
             // A late setpoint follows on the last one, not on what was made up meanwhile.
             let before = if first {
-                self.servos[joint].position
+                self.measured[joint].position
             } else {
                 self.last.position[joint]
             };
             let room = if first { FIRST } else { ROOM + most * elapsed };
-            at < self.options.lower[joint] - ROOM
-                || at > self.options.upper[joint] + ROOM
+            at < self.about.lower[joint] - ROOM
+                || at > self.about.upper[joint] + ROOM
                 || speed.abs() > most
                 || (at - before).abs() > room
         })
@@ -293,35 +313,42 @@ impl Driver {
         self.fault = fault;
         self.fault_joint = joint;
         self.state = DriverState::Stopping;
-        self.waiting.clear();
     }
 
-    /// One period of `period_ns` that ends at `now_ns`: moves the joints, chooses what to follow,
-    /// returns the state to send.
+    /// One period of `period_ns` that ends at `now_ns`: measures, chooses what to follow, has the
+    /// robot follow it, returns the state to send.
     pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
         let period = period_ns as f64 * 1e-9;
-        for servo in &mut self.servos {
-            servo.move_on(period);
-        }
+        self.robot.measure(&mut self.measured);
         self.watch(now_ns);
-        self.refer(period);
-        let control = [
-            self.options.frequency.min(0.4 / period),
-            self.options.damping,
-        ];
         let state = self.report(now_ns);
-        for (servo, reference) in self.servos.iter_mut().zip(&self.references) {
-            servo.control(reference, control);
-        }
-        for (tool, order) in self.tools.iter_mut().zip([GRIPPER, TOOL_CHANGER]) {
-            tool.take(&self.last.tools[order]);
-            tool.move_on(period);
-        }
+        self.reported = state;
+        self.refer(period);
+        self.give_orders();
+        self.robot.follow(&self.references, period);
         state
+    }
+
+    /// Passes on the orders to tools that are new.
+    fn give_orders(&mut self) {
+        for (tool, order) in self.last.tools.iter().enumerate() {
+            if order.order == self.orders[tool] {
+                continue;
+            }
+            self.orders[tool] = order.order;
+            match ToolAction::from_number(order.action) {
+                None | Some(ToolAction::None) => {}
+                Some(action) => self.robot.act(tool, action),
+            }
+        }
     }
 
     /// The watchdog, and the end of a stop.
     fn watch(&mut self, now_ns: u64) {
+        let following = matches!(self.state, DriverState::Armed | DriverState::Active);
+        if let Some(joint) = self.robot.fault().filter(|_| following) {
+            self.stop(FaultCode::Hardware, joint);
+        }
         let Some(session) = &self.session else { return };
         let silence = now_ns.saturating_sub(self.received_ns);
         match self.state {
@@ -344,30 +371,23 @@ impl Driver {
         }
     }
 
-    /// What the servos follow in this period.
+    /// What the joints follow in this period.
     fn refer(&mut self, period: f64) {
-        let setpoint = if self.fresh && self.waiting.len() > self.options.delay {
-            self.waiting.pop_front()
-        } else {
-            None
-        };
-        let held = self.fresh && setpoint.is_none();
-        self.fresh = false;
+        let fresh = std::mem::take(&mut self.fresh);
+        let setpoint = &self.last;
         for (joint, reference) in self.references.iter_mut().enumerate() {
-            let rate = self.options.acceleration[joint];
-            let change = self.options.jerk[joint];
-            match (self.state, &setpoint) {
-                (DriverState::Armed | DriverState::Active, Some(setpoint)) => {
+            let rate = self.about.acceleration[joint];
+            let change = self.about.jerk[joint];
+            match self.state {
+                DriverState::Armed | DriverState::Active if fresh => {
                     *reference = Reference {
                         position: setpoint.position[joint],
                         velocity: setpoint.velocity[joint],
                         acceleration: setpoint.acceleration[joint],
                     };
                 }
-                (DriverState::Armed | DriverState::Active, None) if !held => {
-                    reference.go_on(change, period);
-                }
-                (DriverState::Stopping | DriverState::Disconnected, _) => {
+                DriverState::Armed | DriverState::Active => reference.go_on(change, period),
+                DriverState::Stopping | DriverState::Disconnected => {
                     reference.brake(Bounds { rate, change }, period);
                 }
                 _ => {}
@@ -378,7 +398,7 @@ impl Driver {
     fn report(&mut self, now_ns: u64) -> State {
         self.sequence += 1;
         let mut state = State {
-            joints: self.servos.len() as u32,
+            joints: self.joints() as u32,
             session: self.session.as_ref().map_or(0, |session| session.number),
             sequence: self.sequence,
             measured_ns: now_ns,
@@ -392,16 +412,15 @@ impl Driver {
             missed: self.missed,
             ..State::default()
         };
-        for (joint, servo) in self.servos.iter().enumerate() {
-            let noise = if self.options.noise > 0.0 {
-                self.options.noise * self.noise.next()
-            } else {
-                0.0
-            };
-            state.position[joint] = servo.position + noise;
-            state.velocity[joint] = servo.velocity;
+        for (joint, measured) in self.measured.iter().enumerate() {
+            state.position[joint] = measured.position;
+            state.velocity[joint] = measured.velocity;
+            state.effort[joint] = measured.effort;
         }
-        state.tools = [self.tools[0].feedback(), self.tools[1].feedback()];
+        for (tool, feedback) in state.tools.iter_mut().enumerate() {
+            *feedback = self.robot.tool(tool);
+            feedback.order = self.orders[tool];
+        }
         state
     }
 }

@@ -1,17 +1,21 @@
-//! What one servo follows: the setpoint, or what the driver makes up without one.
+//! What one joint follows: the setpoint, or what the driver makes up without one.
 
 use realtime::{Bounds, next_rate};
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) to follow.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reference {
-    pub(crate) position: f64,
-    pub(crate) velocity: f64,
-    pub(crate) acceleration: f64,
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reference {
+    /// Position (rad).
+    pub position: f64,
+    /// Velocity (rad/s).
+    pub velocity: f64,
+    /// Acceleration (rad/s²).
+    pub acceleration: f64,
 }
 
 impl Reference {
-    pub(crate) const fn rest(position: f64) -> Self {
+    /// At rest in a position (rad).
+    pub const fn rest(position: f64) -> Self {
         Self {
             position,
             velocity: 0.0,
@@ -40,6 +44,7 @@ impl Reference {
         self.acceleration = next;
     }
 
+    /// Whether it rests, but for rounding.
     pub(crate) fn rests(&self) -> bool {
         self.velocity.abs() < 1e-9 && self.acceleration.abs() < 1e-6
     }

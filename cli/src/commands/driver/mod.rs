@@ -1,0 +1,59 @@
+//! Drivers: one file a way to move an arm, and the test of any of them.
+
+mod mujoco;
+mod sim;
+mod test;
+
+use std::io::{self, Read};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+
+/// How long a driver goes on when the process that started it is gone: enough for its watchdog to
+/// stop the arm.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// Drivers: run one, or test one
+///
+/// A driver is the process that moves an arm: it takes setpoints from shared memory and gives
+/// measured states back.
+#[derive(Args, Debug)]
+pub(crate) struct Driver {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Sim(sim::Sim),
+    Mujoco(mujoco::Mujoco),
+    Test(test::Test),
+}
+
+impl Driver {
+    /// Runs the driver that was chosen, or the test.
+    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        match &self.what {
+            What::Sim(sim) => sim.run(),
+            What::Mujoco(mujoco) => mujoco.run(),
+            What::Test(test) => test.run(),
+        }
+    }
+}
+
+/// Sets `stop` when standard input brings a byte, or a while after it ended because the starter
+/// is gone.
+fn end_with_input(stop: Arc<AtomicBool>) {
+    thread::spawn(move || {
+        if io::stdin().read_exact(&mut [0]).is_err() {
+            thread::sleep(FAREWELL);
+        }
+        stop.store(true, Ordering::Relaxed);
+    });
+}

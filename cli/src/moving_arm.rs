@@ -1,0 +1,191 @@
+//! The running engine as a plan uses it: a few commands at a time, with an operator who may stop.
+
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use crcl::Command;
+use engine::executor::Control;
+use engine::session::{Blame, Note};
+use plan::run::MotionFailure;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::host::Host;
+use crate::output;
+use crate::progress::Progress;
+use crate::recording::Recording;
+
+/// How long an aborted arm may take to come to rest.
+const LAST_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How long the driver may take to agree to go on after a fault.
+const RECOVERY: Duration = Duration::from_secs(5);
+
+/// An engine with its driver, its clients and the signals of the operator.
+pub(crate) struct MovingArm {
+    host: Host,
+    signals: Signals,
+    recording: Recording<BufWriter<File>>,
+    progress: Progress,
+    signalled: usize,
+    deadline: Option<Instant>,
+    blame: Option<Exit>,
+}
+
+impl MovingArm {
+    /// Takes over a running engine of `joints` joints at `rate_hz`; with `samples`, what is
+    /// published and measured goes into that file.
+    ///
+    /// # Errors
+    /// The file cannot be written, or signals cannot be received.
+    pub(crate) fn new(
+        mut host: Host,
+        (joints, rate_hz): (usize, f64),
+        samples: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        host.own("canter plan-run");
+        let create = |path: &Path| {
+            File::create(path)
+                .with_context(|| format!("cannot write {}", path.display()))
+                .map_err(|cause| Failure::new(Exit::Unreadable, cause))
+        };
+        let sink = samples.map(create).transpose()?.map(BufWriter::new);
+        Ok(Self {
+            host,
+            signals: Signals::new([SIGINT, SIGTERM, SIGHUP])?,
+            recording: Recording::new(joints, rate_hz, sink)?,
+            progress: Progress::new(io::stderr().is_terminal()),
+            signalled: 0,
+            deadline: None,
+            blame: None,
+        })
+    }
+
+    /// Joint positions of the last setpoint at the start, rad or m.
+    pub(crate) fn start(&self) -> &[f64] {
+        &self.host.session.start
+    }
+
+    /// Joint positions of the last setpoint, rad or m.
+    pub(crate) fn setpoint(&self) -> Vec<f64> {
+        self.host.session.status().setpoint
+    }
+
+    /// How a process ends whose arm had a fault, if it had one.
+    pub(crate) fn blame(&self) -> Option<Exit> {
+        self.blame
+    }
+
+    /// Has commands executed and waits for the last.
+    ///
+    /// # Errors
+    /// [`MotionFailure`], with `stopped` when the operator wanted it.
+    pub(crate) fn execute(&mut self, commands: &[Command]) -> Result<(), MotionFailure> {
+        self.obey_signals();
+        if self.signalled > 0 {
+            return Err(MotionFailure::stopped());
+        }
+        let program: crcl::Program = commands.iter().cloned().collect();
+        let ids = self
+            .host
+            .session
+            .submit(program.commands)
+            .map_err(|full| MotionFailure::new(0, format!("the queue is full: {full}")))?;
+        let Some(last) = ids.last().copied() else {
+            return Ok(());
+        };
+        let position = |id: u32| ids.iter().position(|known| *known == id).unwrap_or(0);
+        loop {
+            let Some(note) = self.turn()? else { continue };
+            match note {
+                Note::Done { id, .. } if id == last => return Ok(()),
+                Note::Refused { id, error, .. } => {
+                    return Err(MotionFailure::new(position(id), error.to_string()));
+                }
+                Note::Faulted { blame, reason, .. } => {
+                    self.blame = Some(match blame {
+                        Blame::Guard => Exit::Aborted,
+                        Blame::Driver => Exit::DriverFault,
+                    });
+                    return Err(MotionFailure::new(0, reason));
+                }
+                Note::Stopped if self.signalled > 0 => return Err(MotionFailure::stopped()),
+                Note::Aborted { .. } => return Err(MotionFailure::stopped()),
+                Note::Closed => return Err(MotionFailure::new(0, "the engine has ended")),
+                Note::Message { text } => {
+                    self.progress.clear();
+                    output::note(&text);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Clears a fault; whether that was possible.
+    pub(crate) fn recover(&mut self) -> bool {
+        self.host.session.recover();
+        let deadline = Instant::now() + RECOVERY;
+        while Instant::now() < deadline {
+            match self.turn() {
+                Ok(Some(Note::Recovered)) => {
+                    self.blame = None;
+                    return true;
+                }
+                Ok(Some(Note::Closed)) | Err(_) => return false,
+                Ok(_) => {}
+            }
+        }
+        false
+    }
+
+    /// Serves clients and signals, keeps the recording, gives the next thing that happened.
+    fn turn(&mut self) -> Result<Option<Note>, MotionFailure> {
+        self.obey_signals();
+        let lost = |error: String| MotionFailure::new(0, error);
+        let note = self.host.turn().map_err(|error| lost(error.to_string()))?;
+        self.recording
+            .take(&self.host.session.samples())
+            .map_err(|error| lost(format!("the samples cannot be written: {error}")))?;
+        self.progress.show(&self.host.session.status());
+        if self.host.is_shut_down() || self.deadline.is_some_and(|at| Instant::now() > at) {
+            return Err(MotionFailure::stopped());
+        }
+        Ok(note)
+    }
+
+    /// The first signal stops on the path, the second aborts.
+    fn obey_signals(&mut self) {
+        for _ in self.signals.pending() {
+            self.signalled += 1;
+            self.progress.clear();
+            if self.signalled == 1 {
+                output::note("canter: stopping on the path; once more to abort");
+                self.host.session.control(Control::Stop { fast: false });
+                if self.host.session.status().idle {
+                    self.deadline = Some(Instant::now());
+                }
+            } else {
+                self.host.session.control(Control::Stop { fast: true });
+                self.deadline = Some(Instant::now() + LAST_PATIENCE);
+            }
+        }
+    }
+
+    /// Ends engine and driver, and the file of samples; how far (m) the arm was off its path at
+    /// most.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn finish(mut self) -> io::Result<f64> {
+        self.recording.take(&self.host.session.samples())?;
+        let worst = self.recording.worst();
+        drop(self.host);
+        self.recording.finish()?;
+        Ok(worst)
+    }
+}

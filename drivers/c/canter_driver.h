@@ -1,0 +1,152 @@
+/* The messages of Canter's driver protocol; see docs/driver-protocol.md.
+ * Generated from the Rust types by ipc/tests/c_header.rs: do not edit. */
+#ifndef CANTER_DRIVER_H
+#define CANTER_DRIVER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define CANTER_PROTOCOL 1u
+#define CANTER_SCHEMA_CHECKSUM UINT64_C(0x393238a461a7b232)
+#define CANTER_MAX_JOINTS 16u
+#define CANTER_MAX_TOOLS 2u
+#define CANTER_FLAG_HOLD 1u
+#define CANTER_FLAG_STOPPING 2u
+#define CANTER_FLAG_STOP_REQUEST 4u
+#define CANTER_FLAG_GOODBYE 8u
+#define CANTER_DISCONNECTED 0u
+#define CANTER_SYNCED 1u
+#define CANTER_ARMED 2u
+#define CANTER_ACTIVE 3u
+#define CANTER_STOPPING 4u
+#define CANTER_FAULT 5u
+#define CANTER_NO_FAULT 0u
+#define CANTER_FAULT_WATCHDOG 1u
+#define CANTER_FAULT_BAD_SETPOINT 2u
+#define CANTER_FAULT_OUT_OF_RANGE 3u
+#define CANTER_FAULT_STOP_REQUEST 4u
+#define CANTER_FAULT_HARDWARE 5u
+#define CANTER_WELCOME 0u
+#define CANTER_WRONG_PROTOCOL 1u
+#define CANTER_WRONG_SCHEMA 2u
+#define CANTER_WRONG_JOINTS 3u
+#define CANTER_WRONG_MODEL 4u
+#define CANTER_WRONG_PERIOD 5u
+#define CANTER_WRONG_CLOCK 6u
+#define CANTER_BUSY 7u
+#define CANTER_NOT_READY 8u
+#define CANTER_TOOL_OPEN_IT 1u
+#define CANTER_TOOL_CLOSE_IT 2u
+#define CANTER_TOOL_UNKNOWN 0u
+#define CANTER_TOOL_OPEN 1u
+#define CANTER_TOOL_CLOSED 2u
+#define CANTER_TOOL_MOVING 3u
+#define CANTER_TOOL_FAILED 4u
+
+typedef struct {
+    uint32_t order;
+    uint32_t action;
+    double position;
+    double velocity;
+    double force;
+} canter_tool_command;
+_Static_assert(sizeof(canter_tool_command) == 32, "canter_tool_command");
+
+typedef struct {
+    uint32_t order;
+    uint32_t status;
+    double position;
+    double force;
+    uint64_t reserved;
+} canter_tool_feedback;
+_Static_assert(sizeof(canter_tool_feedback) == 32, "canter_tool_feedback");
+
+#define CANTER_SETPOINT_TYPE "canter.Setpoint.1"
+typedef struct {
+    uint32_t protocol;
+    uint32_t joints;
+    uint64_t session;
+    uint64_t sequence;
+    uint64_t tick;
+    uint64_t published_ns;
+    uint64_t tick_ns;
+    uint64_t period_ns;
+    uint64_t watchdog_ns;
+    uint64_t state_sequence;
+    uint32_t command;
+    uint32_t flags;
+    uint32_t valid;
+    uint32_t reserved_word;
+    double path_time;
+    double path_rate;
+    double position[16];
+    double velocity[16];
+    double acceleration[16];
+    double effort[16];
+    canter_tool_command tools[2];
+    uint64_t digital_outputs;
+    uint64_t reserved[10];
+} canter_setpoint;
+_Static_assert(sizeof(canter_setpoint) == 768, "canter_setpoint");
+
+#define CANTER_STATE_TYPE "canter.State.1"
+typedef struct {
+    uint32_t protocol;
+    uint32_t joints;
+    uint64_t session;
+    uint64_t sequence;
+    uint64_t measured_ns;
+    uint64_t published_ns;
+    uint64_t setpoint_sequence;
+    uint64_t setpoint_published_ns;
+    uint64_t setpoint_received_ns;
+    uint32_t driver_state;
+    uint32_t fault;
+    uint32_t fault_joint;
+    uint32_t reserved_word;
+    uint64_t missed;
+    double position[16];
+    double velocity[16];
+    double effort[16];
+    canter_tool_feedback tools[2];
+    uint64_t digital_inputs;
+    uint64_t hardware_ns;
+    uint64_t reserved[11];
+} canter_state;
+_Static_assert(sizeof(canter_state) == 640, "canter_state");
+
+#define CANTER_HELLO_TYPE "canter.Hello.1"
+typedef struct {
+    uint32_t protocol;
+    uint32_t joints;
+    uint64_t schema;
+    uint64_t model;
+    uint64_t period_ns;
+    uint64_t watchdog_ns;
+    uint32_t clock;
+    uint32_t process;
+    uint8_t name[64];
+    uint64_t reserved[4];
+} canter_hello;
+_Static_assert(sizeof(canter_hello) == 144, "canter_hello");
+
+#define CANTER_HELLO_ACK_TYPE "canter.HelloAck.1"
+typedef struct {
+    uint32_t protocol;
+    uint32_t joints;
+    uint32_t verdict;
+    uint32_t reserved_word;
+    uint64_t schema;
+    uint64_t session;
+    uint64_t watchdog_ns;
+    double position[16];
+    double lower[16];
+    double upper[16];
+    double velocity[16];
+    uint8_t name[64];
+    uint8_t reason[128];
+    uint64_t reserved[3];
+} canter_hello_ack;
+_Static_assert(sizeof(canter_hello_ack) == 768, "canter_hello_ack");
+
+#endif

@@ -1,0 +1,54 @@
+//! A driver for a robot of your own: fill in the places marked HERE. Run it, then let Canter drive:
+//!     cargo run --release -p driver-kit --example template -- cell/arm
+//!     canter run PROGRAM --robot ur5e --driver external --arm cell/arm
+use std::sync::atomic::AtomicBool;
+
+use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, run};
+use ipc::{GRIPPER, ToolAction, ToolStatus};
+
+/// Six joints that are at once where they shall be.
+struct MyRobot([Measured; 6], ToolStatus);
+
+impl Robot for MyRobot {
+    fn about(&self) -> About {
+        // HERE: ranges (rad), speeds (rad/s), and what your own stop may use (rad/s2, rad/s3).
+        About {
+            name: "my robot".to_owned(),
+            lower: vec![-6.2; 6],
+            upper: vec![6.2; 6],
+            velocity: vec![3.1; 6],
+            acceleration: vec![10.0; 6],
+            jerk: vec![100.0; 6],
+            ..About::default()
+        }
+    }
+
+    fn measure(&mut self, joints: &mut [Measured]) {
+        // HERE: ask the hardware where the joints are.
+        joints.copy_from_slice(&self.0);
+    }
+
+    fn follow(&mut self, joints: &[Reference], _period: f64) {
+        // HERE: tell the hardware; use velocity and acceleration as feed-forward.
+        self.0 = core::array::from_fn(|joint| joints[joint].into());
+    }
+
+    fn act(&mut self, _tool: usize, action: ToolAction) {
+        // HERE: begin to open or close; `tool_status` tells when it is done.
+        let open = action == ToolAction::Open;
+        self.1 = [ToolStatus::Closed, ToolStatus::Open][usize::from(open)];
+    }
+
+    fn tool_status(&self, tool: usize) -> ToolStatus {
+        [ToolStatus::Unknown, self.1][usize::from(tool == GRIPPER)]
+    }
+}
+
+fn main() -> Result<(), DriverError> {
+    let arm = std::env::args().nth(1).unwrap_or("cell/arm".to_owned());
+    let home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0].map(|at| Reference::rest(at).into());
+    let robot = MyRobot(home, ToolStatus::Open);
+    let never = AtomicBool::new(false);
+    run(&arm.parse()?, robot, &RunOptions::default(), &never)?;
+    Ok(())
+}

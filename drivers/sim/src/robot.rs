@@ -1,0 +1,107 @@
+//! The simulated robot: servos, gripper, tool changer.
+
+use std::collections::VecDeque;
+
+use driver_kit::{About, DriverError, Measured, Reference, Robot};
+use ipc::{ToolAction, ToolFeedback};
+
+use crate::Options;
+use crate::noise::Noise;
+use crate::servo::Servo;
+use crate::tool::Tool;
+
+/// A simulated robot: a servo a joint, a gripper and a tool changer, the same every time.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    options: Options,
+    servos: Vec<Servo>,
+    tools: [Tool; 2],
+    noise: Noise,
+    /// What the servos follow later, for a delay.
+    waiting: VecDeque<Vec<Reference>>,
+    /// A period (s) that the servos have not moved yet.
+    pending: Option<f64>,
+}
+
+impl Simulated {
+    /// A robot at rest.
+    ///
+    /// # Errors
+    /// When the options do not fit together.
+    pub fn new(options: Options) -> Result<Self, DriverError> {
+        options.check()?;
+        Ok(Self {
+            servos: options.position.iter().map(|at| Servo::rest(*at)).collect(),
+            tools: [Tool::new(options.gripper), Tool::new(options.tool_changer)],
+            noise: Noise::new(options.seed),
+            waiting: VecDeque::new(),
+            pending: None,
+            options,
+        })
+    }
+}
+
+impl Robot for Simulated {
+    fn about(&self) -> About {
+        let options = &self.options;
+        About {
+            name: options.name.clone(),
+            model: options.model,
+            lower: options.lower.clone(),
+            upper: options.upper.clone(),
+            velocity: options.velocity.clone(),
+            acceleration: options.acceleration.clone(),
+            jerk: options.jerk.clone(),
+        }
+    }
+
+    fn measure(&mut self, joints: &mut [Measured]) {
+        let pending = self.pending.take();
+        for (joint, servo) in joints.iter_mut().zip(&mut self.servos) {
+            if let Some(period) = pending {
+                servo.move_on(period);
+            }
+            let noise = if self.options.noise > 0.0 {
+                self.options.noise * self.noise.next()
+            } else {
+                0.0
+            };
+            joint.position = servo.position + noise;
+            joint.velocity = servo.velocity;
+        }
+    }
+
+    fn follow(&mut self, joints: &[Reference], period: f64) {
+        let control = [
+            self.options.frequency.min(0.4 / period),
+            self.options.damping,
+        ];
+        if self.options.delay == 0 {
+            for (servo, reference) in self.servos.iter_mut().zip(joints) {
+                servo.control(reference, control);
+            }
+        } else {
+            self.waiting.push_back(joints.to_vec());
+            if self.waiting.len() > self.options.delay + 1 {
+                self.waiting.pop_front();
+            }
+            // Until the first arrives, that is where the robot is.
+            let late = self.waiting.front().map_or(joints, Vec::as_slice);
+            for (servo, reference) in self.servos.iter_mut().zip(late) {
+                servo.control(reference, control);
+            }
+        }
+        self.pending = Some(period);
+        self.tools.iter_mut().for_each(|tool| tool.move_on(period));
+    }
+
+    fn act(&mut self, tool: usize, action: ToolAction) {
+        if let Some(tool) = self.tools.get_mut(tool) {
+            tool.act(action);
+        }
+    }
+
+    fn tool(&self, tool: usize) -> ToolFeedback {
+        self.tools.get(tool).map(Tool::feedback).unwrap_or_default()
+    }
+}

@@ -1,0 +1,229 @@
+//! Moves by hand: as far as the arm can go in a direction, at a share of its speed. Whoever jogs
+//! ends the move before its end; so jogging has the same limits, path and guard as any move.
+
+use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
+use trajectory::ToolLimits;
+
+use super::{MotionError, PlannedMove, Planner};
+use crate::task::{Move, Shape};
+
+/// The farthest that one jog goes: of the tool in m, of the tool and of a joint in rad.
+const FAR: (f64, f64, f64) = (1.0, 1.5, 3.0);
+/// The nearest that is worth a move, m or rad.
+const NEAR: f64 = 1e-4;
+/// Distance kept from the end of a joint's range, rad or m.
+const MARGIN: f64 = 1e-3;
+/// How often a way that is blocked is tried shorter.
+const TRIES: usize = 8;
+
+/// Where to jog, as shares of the largest speeds, -1..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Direction<const N: usize> {
+    /// Each joint by itself, all in proportion.
+    Joints(SVector<f64, N>),
+    /// The controlled point along and about its own axes.
+    Tool {
+        /// Along x, y, z.
+        linear: Vector3<f64>,
+        /// About x, y, z.
+        angular: Vector3<f64>,
+    },
+}
+
+impl<const N: usize> Planner<N> {
+    /// Plans the way from `start`, at rest, as far as the arm can go in a direction, within the
+    /// limits `most` of the controlled point.
+    ///
+    /// # Errors
+    /// [`MotionError`] when it cannot go in that direction at all.
+    pub fn jog(
+        &self,
+        direction: &Direction<N>,
+        start: &SVector<f64, N>,
+        most: &ToolLimits,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        match direction {
+            Direction::Joints(shares) => self.jog_joints(shares, start, most),
+            Direction::Tool { linear, angular } => self.jog_tool((linear, angular), start, most),
+        }
+    }
+
+    fn jog_joints(
+        &self,
+        shares: &SVector<f64, N>,
+        start: &SVector<f64, N>,
+        most: &ToolLimits,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        let speeds = shares.component_mul(&self.limits.velocity);
+        let largest = speeds.amax();
+        let mut time = FAR.2 / largest;
+        let mut last = 0;
+        for joint in (0..N).filter(|joint| speeds[*joint] != 0.0) {
+            let (lower, upper) = (self.limits.lower[joint], self.limits.upper[joint]);
+            let room = if speeds[joint] > 0.0 {
+                upper - MARGIN - start[joint]
+            } else {
+                start[joint] - lower - MARGIN
+            };
+            if room / speeds[joint].abs() < time {
+                (time, last) = (room / speeds[joint].abs(), joint);
+            }
+        }
+        if time.is_nan() || time * largest < NEAR {
+            let name = self.joint_name(last);
+            return Err(MotionError::Jog(format!(
+                "joint {name} is at the end of its range"
+            )));
+        }
+        let goal = start + speeds * time;
+        let mut slow = self.clone();
+        for (limit, speed) in slow.limits.velocity.iter_mut().zip(speeds.iter()) {
+            if *speed != 0.0 {
+                *limit = speed.abs();
+            }
+        }
+        let motion = Move {
+            shape: Shape::Joint,
+            poses: vec![self.chain().forward(&goal)],
+            tolerance: 0.0,
+            limits: *most,
+        };
+        slow.certify(&motion, start, slow.joint_move(&motion, start, &goal)?)
+    }
+
+    fn jog_tool(
+        &self,
+        (linear, angular): (&Vector3<f64>, &Vector3<f64>),
+        start: &SVector<f64, N>,
+        most: &ToolLimits,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        let velocity = linear * most.speed;
+        let turning = angular * most.angular_speed;
+        let long = |speed: f64, far: f64| {
+            if speed > 0.0 {
+                far / speed
+            } else {
+                f64::INFINITY
+            }
+        };
+        let mut time = long(velocity.norm(), FAR.0).min(long(turning.norm(), FAR.1));
+        let from = self.chain().forward(start);
+        let slower = |speed: f64, largest: f64| if speed > 0.0 { speed } else { largest };
+        let limits = ToolLimits {
+            speed: slower(velocity.norm(), most.speed),
+            angular_speed: slower(turning.norm(), most.angular_speed),
+            ..*most
+        };
+        let mut refusal = MotionError::Jog("no direction".to_owned());
+        for _ in 0..TRIES {
+            if !(time.is_finite() && time * velocity.norm().max(turning.norm()) >= NEAR) {
+                break;
+            }
+            let turn = UnitQuaternion::from_scaled_axis(turning * time);
+            let step = Isometry3::from_parts(Translation3::from(velocity * time), turn);
+            let motion = Move {
+                shape: Shape::Straight,
+                poses: vec![from * step],
+                tolerance: 0.0,
+                limits,
+            };
+            match self.plan(&motion, start) {
+                Ok(planned) => return Ok(planned),
+                // Nearly as far as it goes, or half of it where that is not known.
+                Err(error) => {
+                    time *= match &error {
+                        MotionError::Blocked { percent, .. } => (percent * 0.0098).min(0.98),
+                        _ => 0.5,
+                    };
+                    refusal = error;
+                }
+            }
+        }
+        Err(refusal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::Controller;
+    use crate::robot::{load, vector};
+    use nalgebra::vector;
+
+    fn ur5e() -> (Planner<6>, SVector<f64, 6>, ToolLimits) {
+        let robot = load("ur5e").unwrap();
+        let controller = Controller::<6>::new(&robot, 1000.0, crcl::LengthUnit::default()).unwrap();
+        let home = vector(&robot.home);
+        (controller.planner().clone(), home, robot.motion_limits())
+    }
+
+    /// All joints that jog keep the proportion asked for, at their shares of the speed, up to the
+    /// end of the first range.
+    #[test]
+    fn joints_go_to_the_end_of_the_range_in_proportion() {
+        let (planner, home, most) = ur5e();
+        let shares = SVector::<f64, 6>::from_column_slice(&[0.0, 0.05, -0.1, 0.0, 0.0, 0.02]);
+        let planned = planner
+            .jog(&Direction::Joints(shares), &home, &most)
+            .unwrap();
+        let moved = planned.end - home;
+        assert!((moved[1] / moved[2] + 0.5).abs() < 1e-9, "{moved}");
+        assert!(moved.amax() > 1.0);
+        let limits = planner.limits();
+        let peaks = planned.trajectory.peaks();
+        for joint in 0..6 {
+            let allowed = shares[joint].abs() * limits.velocity[joint];
+            assert!(peaks.velocity[joint].abs() <= allowed + 1e-9);
+            assert!((limits.lower[joint]..=limits.upper[joint]).contains(&planned.end[joint]));
+        }
+        // Once there, there is no way on.
+        let on = planner.jog(&Direction::Joints(shares), &planned.end, &most);
+        assert!(on.is_ok() || on.unwrap_err().to_string().contains("end of its range"));
+    }
+
+    /// The tool goes straight along its own axis, as far as the arm reaches; again and again from
+    /// where it came to, it ends with a refusal that says why.
+    #[test]
+    fn the_tool_goes_straight_as_far_as_it_can() {
+        let (planner, home, most) = ur5e();
+        let direction = Direction::Tool {
+            linear: vector![0.2, 0.0, 0.0],
+            angular: Vector3::zeros(),
+        };
+        let (mut at, mut legs) = (home, 0);
+        let refusal = loop {
+            match planner.jog(&direction, &at, &most) {
+                Ok(planned) => {
+                    let before = planner.chain().forward(&at);
+                    let after = planner.chain().forward(&planned.end);
+                    let step = before.inv_mul(&after);
+                    assert!(step.translation.x > 0.0 && step.rotation.angle() < 1e-6);
+                    let aside = step.translation.y.hypot(step.translation.z);
+                    assert!(aside < 1e-5, "{aside} m beside the axis");
+                    assert!(planned.certificate.peaks.largest() <= 1.0 + 1e-9);
+                    at = planned.end;
+                }
+                Err(error) => break error,
+            }
+            legs += 1;
+            assert!(legs < 200, "the arm has no end");
+        };
+        assert!(legs >= 1, "{refusal}");
+    }
+
+    #[test]
+    fn a_turn_stays_in_its_place() {
+        let (planner, home, most) = ur5e();
+        let direction = Direction::Tool {
+            linear: Vector3::zeros(),
+            angular: vector![0.0, 0.0, 0.3],
+        };
+        let planned = planner.jog(&direction, &home, &most).unwrap();
+        let step = planner
+            .chain()
+            .forward(&home)
+            .inv_mul(&planner.chain().forward(&planned.end));
+        assert!(step.translation.vector.norm() < 1e-6);
+        assert!(step.rotation.angle() > 0.3);
+    }
+}

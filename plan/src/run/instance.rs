@@ -1,0 +1,110 @@
+//! Objects that are made of others: CreateInstance and DestroyInstance.
+
+use nalgebra::Isometry3;
+
+use super::machine::{Machine, Result};
+use super::state::{State, Step, nothing};
+use super::value::Value;
+use crate::PlanError;
+use crate::kitting::ast::{Expression, Name, Span};
+use crate::kitting::types::Type;
+use crate::world::class::derived_property;
+use crate::world::{Change, Class, Location, Object, Scalar};
+
+impl Machine<'_> {
+    /// The new object takes the place of its first component, which becomes relative to it.
+    pub(super) fn create(
+        &self,
+        variable: &Name,
+        (part, property): (&Expression, &str),
+        span: Span,
+        mut state: State,
+    ) -> Result<Step> {
+        let part = self.model.object(self.context(&state).object(part)?)?;
+        let declared = self.program.scope.lookup(&variable.text);
+        let Some((_, Type::Object(class))) = declared else {
+            return Err(PlanError::Value(format!("{} is no object", variable.text)));
+        };
+        let component = derived_property(class, property).map(|(component, _)| component);
+        if !component.is_some_and(|component| part.class.is_a(component)) {
+            let message = format!("{} cannot be the {property} of a {class}", part.name);
+            return Err(PlanError::Value(message));
+        }
+        if class.is_composite() && self.model.composite_of(part.id).is_some() {
+            return Err(PlanError::Value(format!(
+                "{} is already part of another",
+                part.name
+            )));
+        }
+        let mut fresh = self.model.clone();
+        let name = fresh.free_name(class.name());
+        let id = fresh.fresh();
+        let mut object = Object::new(id, name, class, part.location);
+        if class == Class::KitInstance {
+            let design = self.program.plan.about("TargetSKU").to_owned();
+            let tray = self
+                .model
+                .design(&design)
+                .map(|design| design.tray_sku.as_str());
+            if tray != part.sku() {
+                let message = format!("{} is not the tray of the design {design}", part.name);
+                return Err(PlanError::Value(message));
+            }
+            object
+                .properties
+                .insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
+            object
+                .properties
+                .insert("isKitInstance_Finished".into(), Scalar::Truth(false));
+        }
+        let location = Location::pose(id, Isometry3::identity());
+        let changes = vec![
+            Change::Create(object),
+            Change::Place {
+                object: part.id,
+                location,
+            },
+        ];
+        let declared = self
+            .program
+            .scope
+            .declared(&variable.text)
+            .unwrap_or_default()
+            .to_owned();
+        state.bindings.insert(declared, Value::Object(id));
+        Ok(Step {
+            changes,
+            ..nothing("CreateInstance", span, state)
+        })
+    }
+
+    /// The one component takes the place of the object.
+    pub(super) fn destroy(&self, variable: &Name, span: Span, mut state: State) -> Result<Step> {
+        let object = self.model.object(self.bound(variable, &state)?)?;
+        let components: Vec<&Object> = self.model.children(object.id).collect();
+        let [component] = components[..] else {
+            let message = format!(
+                "{} has {} components, not one",
+                object.name,
+                components.len()
+            );
+            return Err(PlanError::Value(message));
+        };
+        let pose = object.location.pose * component.location.pose;
+        let changes = vec![
+            Change::Place {
+                object: component.id,
+                location: Location {
+                    pose,
+                    ..object.location
+                },
+            },
+            Change::Delete(object.id),
+        ];
+        self.assign(variable, Value::Null, &mut state)?;
+        Ok(Step {
+            changes,
+            ..nothing("DestroyInstance", span, state)
+        })
+    }
+}

@@ -1,0 +1,133 @@
+//! `canter driver`, `canter doctor` and `canter run --driver`, as real processes.
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::canter::{canter, command};
+
+/// An arm name that no other test uses.
+fn arm(name: &str) -> String {
+    format!("drivers{}/{name}", std::process::id())
+}
+
+/// A driver in a process of its own, ended with the value.
+struct Driver(Child);
+
+impl Driver {
+    fn start(words: &[&str]) -> Self {
+        let child = command([&["driver"], words].concat())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        Self(child)
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        // Its input ends with it, which ends it as well.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn the_simulated_driver_passes_its_test() {
+    let arm = arm("sim");
+    let _driver = Driver::start(&["sim", "--robot", "ur5e", "--arm", &arm]);
+    let ran = canter(["driver", "test", "--arm", &arm, "--json"]);
+    let report = json(&ran.stdout);
+    assert_eq!(ran.code, 0, "{report:#}");
+    assert_eq!(
+        (&report["driver"], &report["joints"]),
+        (&"sim".into(), &6.into())
+    );
+    let clauses = report["clauses"].as_array().unwrap();
+    assert!(clauses.len() >= 18);
+    assert!(
+        clauses.iter().all(|clause| clause["verdict"] == "pass"),
+        "{report:#}"
+    );
+    // The doctor greets it too, and it allows all that the robot may.
+    let words = [
+        "doctor",
+        "--arm",
+        &arm,
+        "--robot",
+        "ur5e",
+        "--seconds",
+        "0.2",
+        "--json",
+    ];
+    let report = json(&canter(words).stdout);
+    let health = |name: &str| {
+        let checks = report["checks"].as_array().unwrap();
+        let found = checks.iter().find(|check| check["name"] == name);
+        found.map(|check| check["health"].clone())
+    };
+    assert_eq!(health("driver handshake"), Some("ok".into()), "{report:#}");
+    assert_eq!(health("limits of robot and driver"), Some("ok".into()));
+}
+
+#[test]
+fn without_a_driver_nothing_is_tested() {
+    let arm = arm("nobody");
+    let ran = canter(["driver", "test", "--arm", &arm]);
+    assert_eq!(ran.code, 4, "{ran:?}");
+    assert!(ran.stderr.contains("no driver answered"), "{}", ran.stderr);
+    let ran = canter(["doctor", "--arm", &arm, "--seconds", "0.2"]);
+    assert_eq!(ran.code, 1, "{ran:?}");
+    let remedy = format!("-> canter driver sim --robot ROBOT --arm {arm}");
+    assert!(ran.stdout.contains(&remedy), "{}", ran.stdout);
+}
+
+#[test]
+fn mujoco_without_its_python_says_so() {
+    let program = "examples/pick_and_place.canon";
+    let arm = arm("no-python");
+    let words = ["run", program, "-r", "ur5e", "--arm", &arm];
+    let more = ["--driver", "mujoco", "--python", "/nonexistent/python"];
+    let start = Instant::now();
+    let ran = canter([&words[..], &more].concat());
+    assert_eq!(ran.code, 4, "{ran:?}");
+    assert!(
+        ran.stderr.contains("cannot start /nonexistent/python"),
+        "{}",
+        ran.stderr
+    );
+    assert!(start.elapsed() < Duration::from_secs(60));
+}
+
+/// The README's promise: a physics simulation drives the same program, twice the same.
+#[test]
+fn mujoco_in_step_is_the_same_every_time() {
+    let packages = Command::new("python3")
+        .args(["-c", "import mujoco, iceoryx2"])
+        .stderr(Stdio::null())
+        .status();
+    if !packages.is_ok_and(|status| status.success()) {
+        println!("skipped: python3 has no mujoco or no iceoryx2");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str| {
+        let path = folder.path().join(name);
+        let arm = arm(name);
+        let program = "examples/pick_and_place.canon";
+        let words = ["run", program, "-r", "ur5e", "--arm", &arm];
+        let more = ["--driver", "mujoco", "--lock-step", "--samples"];
+        let ran = canter([&words[..], &more, &[path.to_str().unwrap()]].concat());
+        assert_eq!(ran.code, 0, "{ran:?}");
+        std::fs::read(path).unwrap()
+    };
+    let (first, second) = (run("first"), run("second"));
+    assert!(first.len() > 100_000);
+    assert!(first == second, "two runs differ");
+}
