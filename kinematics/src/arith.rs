@@ -6,8 +6,10 @@
 //! Everything that a dispatched function calls must be inlined into it, or it
 //! falls back to the plain instruction set.
 
-/// Multiply and add, fused or not.
-pub(crate) trait Arith: Copy {
+use crate::wide::{F4, Four};
+
+/// Multiply and add, fused or not, one number or four at a time.
+pub(crate) trait Arith: Four {
     /// `a * b + c`.
     fn fma(self, a: f64, b: f64, c: f64) -> f64;
 }
@@ -16,7 +18,13 @@ pub(crate) trait Arith: Copy {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
 
-/// Fused multiply-add; only for code compiled for processors that have it.
+/// Fused multiply-add and wide registers, with the proof that the processor has them.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fused(pub(crate) pulp::x86::V3);
+
+/// Fused multiply-add; only for processors that have it.
+#[cfg(not(target_arch = "x86_64"))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fused;
 
@@ -73,18 +81,24 @@ impl Build {
     #[inline(always)]
     pub(crate) fn run<O: Op>(self, op: O) -> O::Output {
         match self {
-            Self::Plain => op.run(Plain),
+            Self::Plain => plain(op),
             #[cfg(target_arch = "x86_64")]
-            Self::Wide(simd) => simd.vectorize(Wide(op)),
+            Self::Wide(simd) => simd.vectorize(Wide(op, simd)),
             #[cfg(target_arch = "aarch64")]
             Self::Wide => op.run(Fused),
         }
     }
 }
 
+/// The plain build of a computation, compiled once however often it is called.
+#[inline(never)]
+fn plain<O: Op>(op: O) -> O::Output {
+    op.run(Plain)
+}
+
 /// Adapter for `pulp`, which compiles `call` for the wide instruction set.
 #[cfg(target_arch = "x86_64")]
-struct Wide<O>(O);
+struct Wide<O>(O, pulp::x86::V3);
 
 #[cfg(target_arch = "x86_64")]
 impl<O: Op> pulp::NullaryFnOnce for Wide<O> {
@@ -92,7 +106,7 @@ impl<O: Op> pulp::NullaryFnOnce for Wide<O> {
 
     #[inline(always)]
     fn call(self) -> O::Output {
-        self.0.run(Fused)
+        self.0.run(Fused(self.1))
     }
 }
 
@@ -102,30 +116,9 @@ impl<O: Op> pulp::NullaryFnOnce for Wide<O> {
 pub(crate) struct V4(pub(crate) [f64; 4]);
 
 impl V4 {
-    pub(crate) const ZERO: Self = Self([0.0; 4]);
-
     #[inline(always)]
     pub(crate) fn new(x: f64, y: f64, z: f64) -> Self {
         Self([x, y, z, 0.0])
-    }
-
-    /// `self * s`.
-    #[inline(always)]
-    pub(crate) fn scale(self, s: f64) -> Self {
-        let v = self.0;
-        Self([v[0] * s, v[1] * s, v[2] * s, v[3] * s])
-    }
-
-    /// `self * s + c`.
-    #[inline(always)]
-    pub(crate) fn scale_add<A: Arith>(self, a: A, s: f64, c: Self) -> Self {
-        let (v, c) = (self.0, c.0);
-        Self([
-            a.fma(v[0], s, c[0]),
-            a.fma(v[1], s, c[1]),
-            a.fma(v[2], s, c[2]),
-            a.fma(v[3], s, c[3]),
-        ])
     }
 
     #[inline(always)]
@@ -154,26 +147,21 @@ impl V4 {
 /// parts, minimax polynomials on [-pi/4, pi/4].
 #[inline(always)]
 pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64; N], [f64; N]) {
-    const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to an integer
     const FAR: f64 = 1e6;
     let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-    let mut far = false;
-    for i in 0..N {
-        let shifted = a.fma(angles[i], std::f64::consts::FRAC_2_PI, MAGIC);
-        let turns = shifted - MAGIC;
-        let quadrant = shifted.to_bits();
-        let mut x = a.fma(-turns, 1.570_796_251_296_997, angles[i]);
-        x = a.fma(-turns, 7.549_789_415_861_596e-8, x);
-        x = a.fma(-turns, 5.390_302_858_158_119e-15, x);
-        let z = x * x;
-        let (s, c) = sin_cos_core(a, x, z);
-        let swap = quadrant & 1 != 0;
-        let (s, c) = if swap { (c, s) } else { (s, c) };
-        sin[i] = f64::from_bits(s.to_bits() ^ ((quadrant & 2) << 62));
-        cos[i] = f64::from_bits(c.to_bits() ^ ((quadrant.wrapping_add(1) & 2) << 62));
-        far |= angles[i].abs() > FAR || angles[i].is_nan();
+    let mut near = true;
+    for first in (0..N).step_by(4) {
+        let mut four = [0.0; 4];
+        let count = (N - first).min(4);
+        four[..count].copy_from_slice(&angles[first..first + count]);
+        let four = F4::new(a, four);
+        near &= four.abs().le(F4::splat(a, FAR)).bits() == 15;
+        let (s, c) = sin_cos_of(four);
+        let (s, c) = (s.array(), c.array());
+        sin[first..first + count].copy_from_slice(&s[..count]);
+        cos[first..first + count].copy_from_slice(&c[..count]);
     }
-    if far {
+    if !near {
         for i in 0..N {
             (sin[i], cos[i]) = angles[i].sin_cos();
         }
@@ -181,25 +169,64 @@ pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64
     (sin, cos)
 }
 
-/// Both polynomials for `|x| <= pi/4`, `z = x^2`.
+/// Sine and cosine of four angles below 1e6 rad.
 #[inline(always)]
-fn sin_cos_core<A: Arith>(a: A, x: f64, z: f64) -> (f64, f64) {
-    let mut s = a.fma(1.589_623_015_765_465_7e-10, z, -2.505_074_776_285_780_7e-8);
-    s = a.fma(s, z, 2.755_731_362_138_572_4e-6);
-    s = a.fma(s, z, -1.984_126_982_958_954e-4);
-    s = a.fma(s, z, 8.333_333_333_322_118e-3);
-    s = a.fma(s, z, -1.666_666_666_666_663e-1);
-    let mut c = a.fma(-1.135_853_652_138_768_2e-11, z, 2.087_570_084_197_473e-9);
-    c = a.fma(c, z, -2.755_731_417_929_674e-7);
-    c = a.fma(c, z, 2.480_158_728_885_170_5e-5);
-    c = a.fma(c, z, -1.388_888_888_887_305_6e-3);
-    c = a.fma(c, z, 4.166_666_666_666_659e-2);
-    (a.fma(s * z, x, x), a.fma(c * z, z, a.fma(-0.5, z, 1.0)))
+fn sin_cos_of<A: Arith>(angles: F4<A>) -> (F4<A>, F4<A>) {
+    const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to an integer
+    let a = angles.build();
+    let quarter = F4::splat(a, std::f64::consts::FRAC_2_PI);
+    let turns = angles.fma(quarter, F4::splat(a, MAGIC)) - F4::splat(a, MAGIC);
+    let mut x = turns.taken_from(F4::splat(a, 1.570_796_251_296_997), angles);
+    x = turns.taken_from(F4::splat(a, 7.549_789_415_861_596e-8), x);
+    x = turns.taken_from(F4::splat(a, 5.390_302_858_158_119e-15), x);
+    let (s, c) = sin_cos_core(x);
+    // The quadrant is 0 to 3; odd ones swap sine and cosine.
+    let quadrant = (turns * 0.25).floor().taken_from(F4::splat(a, 4.0), turns);
+    let even = ((quadrant * 0.5).floor() * 2.0 - quadrant)
+        .abs()
+        .le(F4::splat(a, 0.5));
+    let (sin, cos) = (even.select(s, c), even.select(c, s));
+    let upper = quadrant.le(F4::splat(a, 1.5));
+    let right = (quadrant - F4::splat(a, 1.5)).abs();
+    let right = right.le(F4::splat(a, 1.0));
+    (upper.select(sin, -sin), right.select(-cos, cos))
+}
+
+/// Both polynomials for `|x| <= pi/4`.
+#[inline(always)]
+fn sin_cos_core<A: Arith>(x: F4<A>) -> (F4<A>, F4<A>) {
+    let a = x.build();
+    let z = x * x;
+    let mut s = F4::splat(a, 1.589_623_015_765_465_7e-10);
+    s = s.fma(z, F4::splat(a, -2.505_074_776_285_780_7e-8));
+    s = s.fma(z, F4::splat(a, 2.755_731_362_138_572_4e-6));
+    s = s.fma(z, F4::splat(a, -1.984_126_982_958_954e-4));
+    s = s.fma(z, F4::splat(a, 8.333_333_333_322_118e-3));
+    s = s.fma(z, F4::splat(a, -1.666_666_666_666_663e-1));
+    let mut c = F4::splat(a, -1.135_853_652_138_768_2e-11);
+    c = c.fma(z, F4::splat(a, 2.087_570_084_197_473e-9));
+    c = c.fma(z, F4::splat(a, -2.755_731_417_929_674e-7));
+    c = c.fma(z, F4::splat(a, 2.480_158_728_885_170_5e-5));
+    c = c.fma(z, F4::splat(a, -1.388_888_888_887_305_6e-3));
+    c = c.fma(z, F4::splat(a, 4.166_666_666_666_659e-2));
+    let one = F4::splat(a, 1.0);
+    let cos = (c * z).fma(z, z.taken_from(F4::splat(a, 0.5), one));
+    ((s * z).fma(x, x), cos)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    struct Both(f64);
+
+    impl Op for Both {
+        type Output = ([f64; 1], [f64; 1]);
+
+        fn run<A: Arith>(self, a: A) -> Self::Output {
+            sin_cos(a, [self.0])
+        }
+    }
 
     /// Sine and cosine agree with the standard library to two units in the last place of one.
     #[test]
@@ -211,7 +238,7 @@ mod tests {
                 (s - x.sin()).abs() < 4e-16 && (c - x.cos()).abs() < 4e-16,
                 "{x}"
             );
-            let ([s], [c]) = sin_cos(Fused, [x]);
+            let ([s], [c]) = Build::detect().run(Both(x));
             assert!(
                 (s - x.sin()).abs() < 4e-16 && (c - x.cos()).abs() < 4e-16,
                 "{x}"

@@ -3,6 +3,7 @@
 use crate::arith::{self, Arith, Build, Op, V4};
 use crate::ik::Line;
 use crate::urdf::{JointKind, Model};
+use crate::wide::{F4, transposed};
 use nalgebra::{
     Isometry3, Matrix3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
 };
@@ -29,39 +30,6 @@ impl Frame {
         }
     }
 
-    /// `self * local`: the pose of `local` in the frame that `self` is in.
-    #[inline(always)]
-    fn times<A: Arith>(&self, a: A, local: &Self) -> Self {
-        let turn = |v: V4| {
-            let first = self.x.scale(v.0[0]);
-            self.z
-                .scale_add(a, v.0[2], self.y.scale_add(a, v.0[1], first))
-        };
-        let p = self.x.scale_add(a, local.p.0[0], self.p);
-        let p = self
-            .z
-            .scale_add(a, local.p.0[2], self.y.scale_add(a, local.p.0[1], p));
-        Self {
-            x: turn(local.x),
-            y: turn(local.y),
-            z: turn(local.z),
-            p,
-        }
-    }
-
-    /// This frame turned by an angle about its own z axis.
-    #[inline(always)]
-    fn turned<A: Arith>(&self, a: A, sin: f64, cos: f64) -> Self {
-        let x = self.y.scale_add(a, sin, self.x.scale(cos));
-        let y = self.x.scale_add(a, -sin, self.y.scale(cos));
-        Self {
-            x,
-            y,
-            z: self.z,
-            p: self.p,
-        }
-    }
-
     #[inline(always)]
     fn rotation(&self) -> Matrix3<f64> {
         let [x, y, z] = [self.x.0, self.y.0, self.z.0];
@@ -76,6 +44,74 @@ impl Frame {
             )),
         )
     }
+}
+
+/// A frame on its way along the chain, in registers.
+#[derive(Clone, Copy)]
+struct Moving<A: Arith> {
+    x: F4<A>,
+    y: F4<A>,
+    z: F4<A>,
+    p: F4<A>,
+}
+
+impl<A: Arith> Moving<A> {
+    #[inline(always)]
+    fn of(a: A, frame: &Frame) -> Self {
+        Self {
+            x: F4::new(a, frame.x.0),
+            y: F4::new(a, frame.y.0),
+            z: F4::new(a, frame.z.0),
+            p: F4::new(a, frame.p.0),
+        }
+    }
+
+    /// `self * local`: the pose of `local` in the frame that `self` is in.
+    #[inline(always)]
+    fn times(self, local: &Frame) -> Self {
+        Self {
+            x: self.direction(local.x),
+            y: self.direction(local.y),
+            z: self.direction(local.z),
+            p: self.direction(local.p) + self.p,
+        }
+    }
+
+    /// A direction given in this frame.
+    #[inline(always)]
+    fn direction(self, V4([x, y, z, _]): V4) -> F4<A> {
+        let a = self.p.build();
+        let first = self.y.fma(F4::splat(a, y), self.x * x);
+        self.z.fma(F4::splat(a, z), first)
+    }
+
+    /// This frame turned by an angle about its own z axis.
+    #[inline(always)]
+    fn turned(self, sin: f64, cos: f64) -> Self {
+        let a = self.p.build();
+        let (sin, cos) = (F4::splat(a, sin), F4::splat(a, cos));
+        Self {
+            x: self.y.fma(sin, self.x * cos),
+            y: self.x.taken_from(sin, self.y * cos),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    fn frame(self) -> Frame {
+        Frame {
+            x: V4(self.x.array()),
+            y: V4(self.y.array()),
+            z: V4(self.z.array()),
+            p: V4(self.p.array()),
+        }
+    }
+}
+
+/// `a x b` of vectors in the first three lanes.
+#[inline(always)]
+fn cross<A: Arith>(a: F4<A>, b: F4<A>) -> F4<A> {
+    a.next().taken_from(b, a * b.next()).next()
 }
 
 /// A serial arm of `N` joints as flat, immutable data.
@@ -282,7 +318,8 @@ impl<const N: usize> Chain<N> {
             return None;
         }
         let (points, axes, tool) = self.frames(arith::Plain, &SVector::zeros());
-        let first = |v: V4| [v.0[0], v.0[1], v.0[2]];
+        let tool = tool.frame();
+        let first = |v: F4<arith::Plain>| [v.array()[0], v.array()[1], v.array()[2]];
         let lines = points.into_iter().zip(axes).map(|(p, h)| Line {
             h: first(h),
             p: first(p),
@@ -292,22 +329,26 @@ impl<const N: usize> Chain<N> {
 
     /// Position and axis of every joint and the tool frame, in base axes.
     #[inline(always)]
-    fn frames<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> ([V4; N], [V4; N], Frame) {
-        let angles: [f64; N] = std::array::from_fn(|i| if self.prismatic[i] { 0.0 } else { q[i] });
+    fn frames<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> ([F4<A>; N], [F4<A>; N], Moving<A>) {
+        let mut angles = [0.0; N];
+        for i in 0..N {
+            angles[i] = if self.prismatic[i] { 0.0 } else { q[i] };
+        }
         let (sin, cos) = arith::sin_cos(a, angles);
-        let (mut points, mut axes) = ([V4::ZERO; N], [V4::ZERO; N]);
-        let mut frame = self.local[0].turned(a, sin[0], cos[0]);
+        let zero = F4::splat(a, 0.0);
+        let (mut points, mut axes) = ([zero; N], [zero; N]);
+        let mut frame = Moving::of(a, &self.local[0]).turned(sin[0], cos[0]);
         for i in 0..N {
             if i > 0 {
-                frame = frame.times(a, &self.local[i].turned(a, sin[i], cos[i]));
+                frame = frame.times(&self.local[i]).turned(sin[i], cos[i]);
             }
             if !self.all_turn && self.prismatic[i] {
-                frame.p = frame.z.scale_add(a, q[i], frame.p);
+                frame.p = frame.z.fma(F4::splat(a, q[i]), frame.p);
             }
             points[i] = frame.p;
             axes[i] = frame.z;
         }
-        (points, axes, frame.times(a, &self.end))
+        (points, axes, frame.times(&self.end))
     }
 
     /// Tool frame and Jacobian in one build of the arithmetic.
@@ -320,13 +361,14 @@ impl<const N: usize> Chain<N> {
         let (points, axes, tool) = self.frames(a, q);
         let mut j = SMatrix::zeros();
         for i in 0..N {
-            let (v, w) = self.column(a, i, (points[i], axes[i]), &tool);
-            let column = [v.0[0], v.0[1], v.0[2], w.0[0], w.0[1], w.0[2]];
-            for (row, value) in column.into_iter().enumerate() {
-                j[(row, i)] = value;
+            let (v, w) = self.column(i, (points[i], axes[i]), &tool);
+            let (v, w) = (v.array(), w.array());
+            for row in 0..3 {
+                j[(row, i)] = v[row];
+                j[(3 + row, i)] = w[row];
             }
         }
-        (tool, j)
+        (tool.frame(), j)
     }
 
     /// Tool frame and Jacobian as rows of eight, the last ones zero; `N` is at most 8.
@@ -335,26 +377,39 @@ impl<const N: usize> Chain<N> {
         &self,
         a: A,
         q: &SVector<f64, N>,
-    ) -> (Frame, [[f64; 8]; 6]) {
+    ) -> (Frame, [[F4<A>; 2]; 6]) {
         let (points, axes, tool) = self.frames(a, q);
-        let mut rows = [[0.0; 8]; 6];
+        let zero = F4::splat(a, 0.0);
+        let mut columns = [(zero, zero); 8];
         for i in 0..N {
-            let (v, w) = self.column(a, i, (points[i], axes[i]), &tool);
+            columns[i] = self.column(i, (points[i], axes[i]), &tool);
+        }
+        let mut rows = [[zero; 2]; 6];
+        for half in 0..2 {
+            let i = 4 * half;
+            let (x, y, z, w) = (columns[i], columns[i + 1], columns[i + 2], columns[i + 3]);
+            let linear = transposed([x.0, y.0, z.0, w.0]);
+            let angular = transposed([x.1, y.1, z.1, w.1]);
             for r in 0..3 {
-                rows[r][i] = v.0[r];
-                rows[3 + r][i] = w.0[r];
+                rows[r][half] = linear[r];
+                rows[3 + r][half] = angular[r];
             }
         }
-        (tool, rows)
+        (tool.frame(), rows)
     }
 
     /// Linear and angular part of a column of the Jacobian.
     #[inline(always)]
-    fn column<A: Arith>(&self, a: A, i: usize, (point, axis): (V4, V4), tool: &Frame) -> (V4, V4) {
+    fn column<A: Arith>(
+        &self,
+        i: usize,
+        (point, axis): (F4<A>, F4<A>),
+        tool: &Moving<A>,
+    ) -> (F4<A>, F4<A>) {
         if !self.all_turn && self.prismatic[i] {
-            return (axis, V4::ZERO);
+            return (axis, F4::splat(axis.build(), 0.0));
         }
-        (axis.cross(a, tool.p.sub(point)), axis)
+        (cross(axis, tool.p - point), axis)
     }
 }
 
@@ -369,7 +424,7 @@ impl<const N: usize> Op for Forward<'_, N> {
 
     #[inline(always)]
     fn run<A: Arith>(self, a: A) -> Frame {
-        self.chain.frames(a, self.q).2
+        self.chain.frames(a, self.q).2.frame()
     }
 }
 

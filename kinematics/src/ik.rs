@@ -6,6 +6,7 @@ mod goal;
 mod lanes;
 mod numeric;
 mod polish;
+mod product;
 mod report;
 mod six;
 mod swivel;
@@ -21,14 +22,18 @@ use crate::chain::Chain;
 use crate::measure;
 use closed::{Branching, Closed, Raw};
 use goal::Target;
-use nalgebra::{Isometry3, SMatrix, SVector};
+use nalgebra::{Isometry3, Point3, SMatrix, SVector};
 use numeric::{Descent, Landing, Stop};
 use std::f64::consts::PI;
 
 /// Restarts before a goal counts as not reached.
-const RESTARTS: u32 = 600;
+const RESTARTS: u32 = 1500;
 /// Restarts after which a position that is out of reach by itself ends the search.
 const PATIENCE: u32 = 40;
+/// Restarts before a position by itself counts as out of reach.
+const PLACES: u32 = 120;
+/// Values of the free parameter that are tried before a closed form gives up.
+const SWEEP: u32 = 360;
 /// Restarts of the search for all solutions.
 const SEARCH: u32 = 120;
 
@@ -153,6 +158,9 @@ impl<const N: usize> Solver<N> {
                     }
                 }
             }
+            if let Some(solution) = self.sweep(closed, pose, seed) {
+                return Ok(solution);
+            }
         }
         self.reach(&Goal::Pose(*pose), seed)
     }
@@ -202,17 +210,42 @@ impl<const N: usize> Solver<N> {
     /// pose. One value where there is no free parameter.
     #[must_use]
     pub fn parameters(&self, count: usize) -> Vec<f64> {
-        let range = self.closed.as_ref().and_then(|closed| {
-            let joint = closed.given::<N>();
-            let (low, high) = joint.map_or((-PI, PI), |i| numeric::window(&self.chain, i));
-            closed.spare().then_some((low, high))
-        });
-        let Some((low, high)) = range else {
-            return vec![0.0];
-        };
-        (0..count)
-            .map(|i| low + (high - low) * (i as f64 + 0.5) / count as f64)
-            .collect()
+        match &self.closed {
+            Some(closed) if closed.spare() => (0..count)
+                .map(|i| self.parameter_at(closed, (i as f64 + 0.5) / count as f64))
+                .collect(),
+            _ => vec![0.0],
+        }
+    }
+
+    /// The free parameter (rad) at a fraction of its range.
+    fn parameter_at(&self, closed: &Closed, fraction: f64) -> f64 {
+        let joint = closed.given::<N>();
+        let (low, high) = joint.map_or((-PI, PI), |i| numeric::window(&self.chain, i));
+        low + (high - low) * fraction
+    }
+
+    /// The nearest solution over the whole range of the free parameter, looked at closely:
+    /// near the edge of reach few values work.
+    #[cold]
+    fn sweep(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        seed: &SVector<f64, N>,
+    ) -> Option<Solution<N>> {
+        let mut best: Option<(f64, Solution<N>)> = None;
+        for i in 0..SWEEP {
+            let parameter = self.parameter_at(closed, (f64::from(i) + 0.5) / f64::from(SWEEP));
+            let Some(solution) = self.nearest_at(closed, pose, seed, parameter) else {
+                continue;
+            };
+            let distance = (solution.q - seed).norm_squared();
+            if best.as_ref().is_none_or(|(least, _)| distance < *least) {
+                best = Some((distance, solution));
+            }
+        }
+        best.map(|(_, solution)| solution)
     }
 
     /// Distance (m) and angle (rad) of the tool at `q` from a pose.
@@ -294,7 +327,7 @@ impl<const N: usize> Solver<N> {
     }
 
     /// One restart. Every first of two walks through the limits, which gets it past
-    /// corners that they form, and counts when it ends inside them.
+    /// corners that they form; where it ends outside it goes on from the nearest corner.
     fn restarted(&self, target: &Target, index: u32) -> Landing<N> {
         let seed = numeric::restart(&self.chain, index);
         let limits = index % 2 == 1;
@@ -309,11 +342,16 @@ impl<const N: usize> Solver<N> {
         if !limits {
             landing.q = turns::nearest(&self.chain, &landing.q, &seed);
             if !self.chain.within_limits(&landing.q, 0.0) {
-                landing.reached = false;
-                (landing.position, landing.rotation) = (f64::INFINITY, f64::INFINITY);
+                // Near the goal, but outside: from the nearest corner it may be reached.
+                landing = self.descend(target, &self.clamped(&landing.q), self.stop);
             }
         }
         landing
+    }
+
+    /// The nearest joint position inside the limits.
+    fn clamped(&self, q: &SVector<f64, N>) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| q[i].max(self.chain.lower()[i]).min(self.chain.upper()[i]))
     }
 
     fn solution(&self, landing: &Landing<N>, seed: &SVector<f64, N>) -> Solution<N> {
@@ -328,34 +366,18 @@ impl<const N: usize> Solver<N> {
         closed: &Closed,
         pose: &Isometry3<f64>,
         parameter: f64,
-        hold: &SVector<f64, N>,
+        seed: &SVector<f64, N>,
     ) -> Raw<N> {
+        let mut raw = Raw::none();
         self.chain.build().run(Branching {
+            chain: &self.chain,
             closed,
             pose,
             parameter,
-            hold,
-        })
-    }
-
-    /// The joint position of one branch, inside the limits and polished if need be.
-    #[inline]
-    fn branch(
-        &self,
-        closed: &Closed,
-        raw: &Raw<N>,
-        (group, lane): (usize, usize),
-        seed: &SVector<f64, N>,
-    ) -> Option<SVector<f64, N>> {
-        if !raw.real[group][lane] {
-            return None;
-        }
-        let q = SVector::from_fn(|i, _| raw.joints[group][i][lane]);
-        let q = turns::nearest(&self.chain, &q, seed);
-        if closed.exact() {
-            return self.chain.within_limits(&q, 0.0).then_some(q);
-        }
-        Some(q)
+            seed,
+            raw: &mut raw,
+        });
+        raw
     }
 
     fn branches_at(
@@ -371,12 +393,9 @@ impl<const N: usize> Solver<N> {
         let raw = self.raw(closed, pose, parameter, seed);
         let mut found = Branches::new();
         for id in 0..8_u8 {
-            let place = (usize::from(id / 4), usize::from(id % 4));
-            if let Some(q) = self.branch(closed, &raw, place, seed) {
-                found.push(Solution {
-                    q,
-                    branch: Some(id),
-                });
+            if let Some(q) = raw.inside(id) {
+                let branch = Some(id);
+                found.push(Solution { q, branch });
             }
         }
         found
@@ -389,8 +408,13 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         parameter: f64,
     ) -> Option<Solution<N>> {
+        if closed.exact() {
+            let (id, q) = self.raw(closed, pose, parameter, seed).nearest()?;
+            let branch = Some(id);
+            return Some(Solution { q, branch });
+        }
         let mut best: Option<(f64, Solution<N>)> = None;
-        for solution in &self.branches_at(closed, pose, seed, parameter) {
+        for solution in &self.near_branches(closed, pose, seed, parameter) {
             let distance = (solution.q - seed).norm_squared();
             if best.as_ref().is_none_or(|(least, _)| distance < *least) {
                 best = Some((distance, *solution));
@@ -435,7 +459,7 @@ impl<const N: usize> Solver<N> {
             return self.report_with(best, Obstacle::NotFinite);
         }
         // A failed search for the position alone settles that it is the distance.
-        let place = self.best_of(&Goal::Position(point), 12, self.stop, &best.q);
+        let place = self.best_place(point, &best.q);
         if !place.reached {
             return self.report_with(
                 best,
@@ -478,8 +502,23 @@ impl<const N: usize> Solver<N> {
             Goal::Pose(pose) => pose.translation.vector.into(),
             Goal::Position(point) | Goal::Axis(point, _) => *point,
         };
-        self.best_of(&Goal::Position(point), 12, self.stop, seed)
-            .reached
+        self.best_place(point, seed).reached
+    }
+
+    /// The nearest that the tool comes to a position, turned as it likes.
+    fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> Landing<N> {
+        let target = Goal::Position(point).target();
+        let mut best = self.descend(&target, seed, self.stop);
+        for index in 0..PLACES {
+            if best.reached {
+                break;
+            }
+            let next = self.restarted(&target, index);
+            if next.reached || score(&next) < score(&best) {
+                best = next;
+            }
+        }
+        best
     }
 
     fn best_of(&self, goal: &Goal, tries: u32, stop: Stop, seed: &SVector<f64, N>) -> Landing<N> {

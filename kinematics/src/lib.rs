@@ -20,6 +20,7 @@ pub mod ik;
 pub mod measure;
 pub mod reach;
 pub mod urdf;
+mod wide;
 
 pub use chain::Chain;
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};

@@ -245,8 +245,14 @@ impl<R: Robot> Driver<R> {
             self.stop(FaultCode::BadSetpoint, u32::MAX);
             return;
         }
+        // After a stall setpoints come together: then the time between them is that of their ticks.
+        let ticks = setpoint.tick.saturating_sub(self.last.tick);
+        let planned = ticks
+            .saturating_mul(session.period_ns)
+            .min(session.watchdog_ns);
         let elapsed = now_ns
             .saturating_sub(self.received_ns)
+            .max(planned)
             .max(session.period_ns);
         if let Some(joint) = self.unreachable_joint(setpoint, elapsed as f64 * 1e-9) {
             self.stop(FaultCode::OutOfRange, joint as u32);

@@ -199,7 +199,7 @@ class Driver:
         # A sum is finite only if all its parts are.
         if not (sane and math.isfinite(sum(map(sum, target)))):
             return self.stop(m.BAD_SETPOINT)
-        joint = self.unreachable(target, now_ns)
+        joint = self.unreachable(target, setpoint.tick, now_ns)
         if joint is not None:
             return self.stop(m.OUT_OF_RANGE, joint)
         self.last, self.target, self.received_ns, self.fresh = setpoint, target, now_ns, True
@@ -211,11 +211,14 @@ class Driver:
         else:
             self.state = m.ARMED if self.state == m.SYNCED else m.ACTIVE
 
-    def unreachable(self, target, now_ns):
+    def unreachable(self, target, tick, now_ns):
         """The first joint whose setpoint is out of range, too fast, or too far from the last."""
         first = self.state == m.SYNCED
         before = self.reference[0] if first else self.target[0]
-        elapsed = max(now_ns - self.received_ns, self.hello.period_ns) * 1e-9
+        # After a stall setpoints come together: then the time between them is that of their ticks.
+        hello = self.hello
+        planned = min((tick - self.last.tick) * hello.period_ns, hello.watchdog_ns)
+        elapsed = max(now_ns - self.received_ns, planned, hello.period_ns) * 1e-9
         room, grows = (1e-3, 0.0) if first else (2e-3, elapsed)
         robot = self.robot
         ends = zip(target[0], target[1], before, robot.lower, robot.upper, robot.velocity)

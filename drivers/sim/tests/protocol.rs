@@ -190,6 +190,30 @@ fn a_jump_or_nonsense_stops() {
     }
 }
 
+/// A stall of the machine: the engine leaves periods out, the driver reads what waited all at once.
+/// That is no jump, unless it goes further than a watchdog's time allows.
+#[test]
+fn setpoints_that_come_together_are_no_jump() {
+    let mut pair = Pair::new(options());
+    let mut send = |tick: u32, step: bool| {
+        let mut setpoint = pair.setpoint(swing(f64::from(tick) * 0.001));
+        setpoint.tick = u64::from(tick);
+        pair.driver.receive(&setpoint, pair.now);
+        if step {
+            pair.now += PERIOD;
+            pair.driver.step(pair.now, PERIOD);
+        }
+        pair.driver.state()
+    };
+    for tick in 0..500 {
+        send(tick, true);
+    }
+    for tick in [501, 502, 540, 541] {
+        assert_eq!(send(tick, false), DriverState::Active, "tick {tick}");
+    }
+    assert_eq!(send(5_000, false), DriverState::Stopping);
+}
+
 #[test]
 fn refuses_by_name() {
     let mut pair = Pair::new(options());

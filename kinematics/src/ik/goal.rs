@@ -2,6 +2,7 @@
 
 use crate::arith::{Arith, V4};
 use crate::chain::Frame;
+use crate::wide::F4;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 /// Length that counts as much as one radian, m.
@@ -81,25 +82,24 @@ impl Target {
         }
     }
 
-    /// Scales the position rows of a Jacobian (one row an array) and takes out of
-    /// the angular rows what the goal leaves free.
+    /// Scales the position rows of a Jacobian and takes out of the angular rows what the
+    /// goal leaves free.
     #[inline(always)]
-    pub(crate) fn shape<A: Arith>(&self, a: A, tool: &Frame, rows: &mut [[f64; 8]; 6]) {
+    pub(crate) fn shape<A: Arith>(&self, tool: &Frame, rows: &mut [[F4<A>; 2]; 6]) {
         for row in rows.iter_mut().take(3) {
-            for value in row {
-                *value *= 1.0 / LENGTH;
-            }
+            *row = [row[0] * (1.0 / LENGTH), row[1] * (1.0 / LENGTH)];
         }
+        let zero = F4::splat(rows[0][0].build(), 0.0);
         match self.kind {
             Kind::Pose => {}
-            Kind::Position => rows[3..].fill([0.0; 8]),
+            Kind::Position => rows[3..].fill([zero; 2]),
             Kind::Axis => {
                 let z = tool.z.0;
-                for column in 0..8 {
-                    let w = [rows[3][column], rows[4][column], rows[5][column]];
-                    let along = a.fma(w[0], z[0], a.fma(w[1], z[1], w[2] * z[2]));
+                for half in 0..2 {
+                    let w = [rows[3][half], rows[4][half], rows[5][half]];
+                    let along = w[0] * z[0] + w[1] * z[1] + w[2] * z[2];
                     for i in 0..3 {
-                        rows[3 + i][column] = w[i] - along * z[i];
+                        rows[3 + i][half] = w[i] - along * z[i];
                     }
                 }
             }

@@ -1,136 +1,99 @@
-//! Four branches side by side: numbers and vectors of four lanes, and the
-//! subproblems that closed forms are made of.
+//! Four branches side by side: vectors of four lanes, and the subproblems that closed
+//! forms are made of.
 //!
 //! # Source
 //! A. J. Elias and J. T. Wen, "IK-Geo: unified robot inverse kinematics using
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025: subproblems 1, 3 and 4.
 
 use crate::arith::Arith;
-
-/// One number in each of four lanes.
-pub(crate) type F4 = [f64; 4];
-
-/// One yes or no in each of four lanes.
-pub(crate) type B4 = [bool; 4];
+use crate::wide::{B4, F4};
 
 /// Signs that tell the branches of the first choice apart.
-pub(crate) const FIRST: F4 = [1.0, -1.0, 1.0, -1.0];
+pub(crate) const FIRST: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
 /// Signs that tell the branches of the second choice apart.
-pub(crate) const SECOND: F4 = [1.0, 1.0, -1.0, -1.0];
-
-/// Applies a function of up to three numbers in every lane.
-macro_rules! each {
-    ($f:expr) => {
-        [$f(0), $f(1), $f(2), $f(3)]
-    };
-}
-
-#[inline(always)]
-pub(crate) fn splat(x: f64) -> F4 {
-    [x; 4]
-}
-
-#[inline(always)]
-pub(crate) fn select(mask: B4, yes: F4, no: F4) -> F4 {
-    each!(|i: usize| if mask[i] { yes[i] } else { no[i] })
-}
-
-#[inline(always)]
-pub(crate) fn both(a: B4, b: B4) -> B4 {
-    each!(|i: usize| a[i] & b[i])
-}
-
-#[inline(always)]
-pub(crate) fn mul(a: F4, b: F4) -> F4 {
-    each!(|i: usize| a[i] * b[i])
-}
-
-#[inline(always)]
-pub(crate) fn sub(a: F4, b: F4) -> F4 {
-    each!(|i: usize| a[i] - b[i])
-}
-
-#[inline(always)]
-pub(crate) fn neg(a: F4) -> F4 {
-    each!(|i: usize| -a[i])
-}
-
-#[inline(always)]
-pub(crate) fn fma<A: Arith>(a: A, x: F4, y: F4, z: F4) -> F4 {
-    each!(|i: usize| a.fma(x[i], y[i], z[i]))
-}
-
-#[inline(always)]
-fn sqrt(x: F4) -> F4 {
-    each!(|i: usize| x[i].sqrt())
-}
-
-#[inline(always)]
-fn inverse(x: F4) -> F4 {
-    each!(|i: usize| 1.0 / x[i])
-}
+pub(crate) const SECOND: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
 
 /// Sine and cosine of an angle in each lane.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Angle {
-    pub(crate) sin: F4,
-    pub(crate) cos: F4,
+#[derive(Clone, Copy)]
+pub(crate) struct Angle<A: Arith> {
+    pub(crate) sin: F4<A>,
+    pub(crate) cos: F4<A>,
 }
 
-impl Angle {
-    #[inline(always)]
-    pub(crate) fn splat(sin: f64, cos: f64) -> Self {
-        Self {
-            sin: splat(sin),
-            cos: splat(cos),
-        }
-    }
-
+impl<A: Arith> Angle<A> {
     #[inline(always)]
     pub(crate) fn back(self) -> Self {
         Self {
-            sin: neg(self.sin),
-            cos: self.cos,
-        }
-    }
-
-    /// The angle or, for a sign of -1, the angle turned back.
-    #[inline(always)]
-    pub(crate) fn times(self, sign: f64) -> Self {
-        Self {
-            sin: mul(self.sin, splat(sign)),
+            sin: -self.sin,
             cos: self.cos,
         }
     }
 
     /// The sum of two angles.
     #[inline(always)]
-    pub(crate) fn plus<A: Arith>(self, a: A, o: Self) -> Self {
+    pub(crate) fn plus(self, o: Self) -> Self {
         Self {
-            sin: fma(a, self.sin, o.cos, mul(self.cos, o.sin)),
-            cos: fma(a, self.cos, o.cos, neg(mul(self.sin, o.sin))),
+            sin: self.sin.fma(o.cos, self.cos * o.sin),
+            cos: self.sin.taken_from(o.sin, self.cos * o.cos),
+        }
+    }
+
+    /// The angle, but `held` where `free` says so.
+    #[inline(always)]
+    fn unless(self, free: B4<A>, held: Held) -> Self {
+        let a = self.sin.build();
+        Self {
+            sin: free.select(F4::splat(a, held.sin), self.sin),
+            cos: free.select(F4::splat(a, held.cos), self.cos),
+        }
+    }
+}
+
+/// The angle of a joint that a singular pose leaves free.
+#[derive(Clone, Copy)]
+pub(crate) struct Held {
+    pub(crate) sin: f64,
+    pub(crate) cos: f64,
+}
+
+impl Held {
+    /// Of several angles, rad.
+    #[inline(always)]
+    pub(crate) fn all<A: Arith, const M: usize>(a: A, angles: [f64; M]) -> [Self; M] {
+        let (sin, cos) = crate::arith::sin_cos(a, angles);
+        let mut held = [Self { sin: 0.0, cos: 1.0 }; M];
+        for i in 0..M {
+            held[i] = Self {
+                sin: sin[i],
+                cos: cos[i],
+            };
+        }
+        held
+    }
+
+    #[inline(always)]
+    pub(crate) fn back(self) -> Self {
+        Self {
+            sin: -self.sin,
+            cos: self.cos,
         }
     }
 }
 
 /// A vector in each lane.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Vec4(pub(crate) [F4; 3]);
+#[derive(Clone, Copy)]
+pub(crate) struct Vec4<A: Arith>(pub(crate) [F4<A>; 3]);
 
-impl Vec4 {
+impl<A: Arith> Vec4<A> {
     #[inline(always)]
-    pub(crate) fn splat(v: [f64; 3]) -> Self {
-        Self([splat(v[0]), splat(v[1]), splat(v[2])])
+    pub(crate) fn splat(a: A, v: [f64; 3]) -> Self {
+        Self([F4::splat(a, v[0]), F4::splat(a, v[1]), F4::splat(a, v[2])])
     }
 
     #[inline(always)]
     pub(crate) fn plus(self, o: [f64; 3]) -> Self {
-        let [x, y, z] = self.0;
-        Self([
-            each!(|i: usize| x[i] + o[0]),
-            each!(|i: usize| y[i] + o[1]),
-            each!(|i: usize| z[i] + o[2]),
-        ])
+        let ([x, y, z], Self([u, v, w])) = (self.0, Self::splat(self.0[0].build(), o));
+        Self([x + u, y + v, z + w])
     }
 
     #[inline(always)]
@@ -140,147 +103,189 @@ impl Vec4 {
 
     #[inline(always)]
     pub(crate) fn less(self, o: Self) -> Self {
-        Self([
-            sub(self.0[0], o.0[0]),
-            sub(self.0[1], o.0[1]),
-            sub(self.0[2], o.0[2]),
-        ])
+        let ([x, y, z], [u, v, w]) = (self.0, o.0);
+        Self([x - u, y - v, z - w])
+    }
+
+    #[inline(always)]
+    pub(crate) fn times(self, s: F4<A>) -> Self {
+        let [x, y, z] = self.0;
+        Self([x * s, y * s, z * s])
+    }
+
+    /// `self * s + o`.
+    #[inline(always)]
+    pub(crate) fn times_plus(self, s: F4<A>, o: Self) -> Self {
+        let ([x, y, z], [u, v, w]) = (self.0, o.0);
+        Self([x.fma(s, u), y.fma(s, v), z.fma(s, w)])
     }
 
     /// Scalar product with the same vector in every lane.
     #[inline(always)]
-    pub(crate) fn along<A: Arith>(self, a: A, o: [f64; 3]) -> F4 {
-        let [x, y, z] = self.0;
-        fma(
-            a,
-            x,
-            splat(o[0]),
-            fma(a, y, splat(o[1]), mul(z, splat(o[2]))),
-        )
+    pub(crate) fn along(self, o: [f64; 3]) -> F4<A> {
+        self.dot(Self::splat(self.0[0].build(), o))
     }
 
     #[inline(always)]
-    pub(crate) fn dot<A: Arith>(self, a: A, o: Self) -> F4 {
+    pub(crate) fn dot(self, o: Self) -> F4<A> {
         let ([x, y, z], [u, v, w]) = (self.0, o.0);
-        fma(a, x, u, fma(a, y, v, mul(z, w)))
+        x.fma(u, y.fma(v, z * w))
+    }
+
+    /// `self x o`.
+    #[inline(always)]
+    pub(crate) fn cross(self, o: Self) -> Self {
+        let ([p, q, r], [x, y, z]) = (self.0, o.0);
+        Self([
+            r.taken_from(y, q * z),
+            p.taken_from(z, r * x),
+            q.taken_from(x, p * y),
+        ])
+    }
+
+    /// At length one.
+    #[inline(always)]
+    pub(crate) fn unit(self) -> Self {
+        let a = self.0[0].build();
+        self.times(F4::splat(a, 1.0) / self.dot(self).sqrt())
     }
 
     /// `k x self` for the same `k` in every lane.
     #[inline(always)]
-    fn crossed_by<A: Arith>(self, a: A, k: [f64; 3]) -> Self {
-        let [x, y, z] = self.0;
-        let [p, q, r] = k.map(splat);
-        Self([
-            fma(a, q, z, neg(mul(r, y))),
-            fma(a, r, x, neg(mul(p, z))),
-            fma(a, p, y, neg(mul(q, x))),
-        ])
+    fn crossed_by(self, k: [f64; 3]) -> Self {
+        Self::splat(self.0[0].build(), k).cross(self)
     }
 
     /// Turned about the unit axis `k` (Rodrigues).
     #[inline(always)]
-    pub(crate) fn turned<A: Arith>(self, a: A, k: [f64; 3], angle: Angle) -> Self {
-        let across = self.crossed_by(a, k);
-        let rest = mul(self.along(a, k), each!(|i: usize| 1.0 - angle.cos[i]));
-        let part = |i: usize| {
-            let turned = fma(a, self.0[i], angle.cos, mul(rest, splat(k[i])));
-            fma(a, across.0[i], angle.sin, turned)
-        };
-        Self([part(0), part(1), part(2)])
+    pub(crate) fn turned(self, k: [f64; 3], angle: Angle<A>) -> Self {
+        let a = angle.cos.build();
+        let axis = Self::splat(a, k);
+        let across = axis.cross(self);
+        let rest = self.dot(axis) * (F4::splat(a, 1.0) - angle.cos);
+        axis.times_plus(rest, across.times_plus(angle.sin, self.times(angle.cos)))
     }
 }
 
 /// Subproblem 1: the angle about `k` that turns `p` to `q`; where either lies
 /// along `k`, which leaves it free, `hold`.
 #[inline(always)]
-pub(crate) fn turn_to<A: Arith>(a: A, p: Vec4, q: Vec4, k: [f64; 3], hold: Angle) -> Angle {
-    let across = p.crossed_by(a, k);
-    let y = across.dot(a, q);
+pub(crate) fn turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
+    let (x, y, free) = swept(p, q, k);
+    let length = F4::splat(x.build(), 1.0) / x.fma(x, y * y).sqrt();
+    let angle = Angle {
+        sin: y * length,
+        cos: x * length,
+    };
+    angle.unless(free, hold)
+}
+
+/// The same for [`angle_of`], which needs no lengths of one.
+#[inline(always)]
+pub(crate) fn last_turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
+    let (cos, sin, free) = swept(p, q, k);
+    Angle { sin, cos }.unless(free, hold)
+}
+
+/// Cosine and sine, of any one length, of the angle about `k` between `p` and `q`, and
+/// where there is none.
+#[inline(always)]
+fn swept<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3]) -> (F4<A>, F4<A>, B4<A>) {
+    let across = p.crossed_by(k);
+    let y = across.dot(q);
     // Not p.q - (k.p)(k.q), which has no figures left where both lie near k.
-    let x = across.dot(a, q.crossed_by(a, k));
-    let square = fma(a, x, x, mul(y, y));
-    let scale = mul(p.dot(a, p), q.dot(a, q));
-    let free: B4 = each!(|i: usize| square[i] <= FREE * scale[i]);
-    let length = inverse(sqrt(square));
-    Angle {
-        sin: select(free, hold.sin, mul(y, length)),
-        cos: select(free, hold.cos, mul(x, length)),
-    }
+    let x = across.dot(q.crossed_by(k));
+    let free = x.fma(x, y * y).le(p.dot(p) * q.dot(q) * FREE);
+    (x, y, free)
 }
 
 /// Fourth power of the sine below which a direction counts as along an axis.
 const FREE: f64 = 1e-50;
 
-/// One of the two answers of a subproblem with two, and whether it is real.
-pub(crate) struct Choice {
-    pub(crate) angle: Angle,
-    pub(crate) real: B4,
-}
-
-/// Equation `x cos + y sin = d` with its two answers told apart by `sign`. Where both
-/// coefficients vanish against `scale`, `hold`. Misses of up to `slack` (relative,
-/// squared) count as rounding.
+/// The two answers of a subproblem with two: sine and cosine are the middle, plus or
+/// minus the offset.
 #[derive(Clone, Copy)]
-pub(crate) struct Wave {
-    pub(crate) x: F4,
-    pub(crate) y: F4,
-    pub(crate) d: F4,
-    pub(crate) scale: F4,
+pub(crate) struct Pair<A: Arith> {
+    middle: Angle<A>,
+    offset: Angle<A>,
+    free: B4<A>,
+    /// Whether there are answers.
+    pub(crate) real: B4<A>,
 }
 
-impl Wave {
+impl<A: Arith> Pair<A> {
+    /// The answers told apart by `sign`; `hold` where any angle would do.
+    #[inline(always)]
+    pub(crate) fn pick(self, sign: [f64; 4], hold: Held) -> Angle<A> {
+        let sign = F4::new(self.middle.sin.build(), sign);
+        let angle = Angle {
+            sin: self.offset.sin.fma(sign, self.middle.sin),
+            cos: self.offset.cos.fma(sign, self.middle.cos),
+        };
+        angle.unless(self.free, hold)
+    }
+}
+
+/// Equation `x cos + y sin = d`. Where both coefficients vanish against `scale`, any
+/// angle will do. Misses of up to `slack` (relative, squared) count as rounding.
+#[derive(Clone, Copy)]
+pub(crate) struct Wave<A: Arith> {
+    x: F4<A>,
+    y: F4<A>,
+    d: F4<A>,
+    scale: F4<A>,
+}
+
+impl<A: Arith> Wave<A> {
     /// Subproblem 4: the angle about `k` for which `h . turned(p) = d`.
     #[inline(always)]
-    pub(crate) fn of<A: Arith>(a: A, h: Vec4, k: [f64; 3], p: Vec4, d: F4) -> Self {
-        let (hk, pk) = (h.along(a, k), p.along(a, k));
-        let across = p.crossed_by(a, k);
+    pub(crate) fn of(h: Vec4<A>, k: [f64; 3], p: Vec4<A>, d: F4<A>) -> Self {
+        let across = p.crossed_by(k);
         Self {
-            x: across.dot(a, h.crossed_by(a, k)),
-            y: across.dot(a, h),
-            d: sub(d, mul(hk, pk)),
-            scale: mul(h.dot(a, h), p.dot(a, p)),
+            x: across.dot(h.crossed_by(k)),
+            y: across.dot(h),
+            d: h.along(k).taken_from(p.along(k), d),
+            scale: h.dot(h) * p.dot(p),
         }
     }
 
     #[inline(always)]
-    pub(crate) fn solve<A: Arith>(self, a: A, sign: F4, hold: Angle, slack: f64) -> Choice {
-        let Self { x, y, d, scale } = self;
-        let r2 = fma(a, x, x, mul(y, y));
-        let rest = fma(a, neg(d), d, r2);
-        self.with_rest(a, rest, sign, hold, slack, r2, scale)
+    pub(crate) fn solve(self, slack: f64) -> Pair<A> {
+        let r2 = self.x.fma(self.x, self.y * self.y);
+        let rest = self.d.taken_from(self.d, r2);
+        self.with_rest(rest, (r2, self.scale), slack)
     }
 
     /// The same with the discriminant `x^2 + y^2 - d^2` known to better accuracy.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "one formula in one place")]
-    pub(crate) fn with_rest<A: Arith>(
-        self,
-        a: A,
-        rest: F4,
-        sign: F4,
-        hold: Angle,
-        slack: f64,
-        r2: F4,
-        scale: F4,
-    ) -> Choice {
+    pub(crate) fn with_rest(self, rest: F4<A>, (r2, scale): (F4<A>, F4<A>), slack: f64) -> Pair<A> {
         let Self { x, y, d, .. } = self;
-        let free: B4 = each!(|i: usize| r2[i] <= 1e-20 * scale[i]);
-        let real: B4 =
-            each!(|i: usize| rest[i] >= -slack * (if free[i] { scale[i] } else { r2[i] }));
-        let over: B4 = each!(|i: usize| rest[i] < 0.0);
-        let r = sqrt(r2);
-        let clamped: F4 = each!(|i: usize| r[i].copysign(d[i]));
-        let d = select(over, clamped, d);
-        let root: F4 = mul(sign, sqrt(each!(|i: usize| rest[i].max(0.0))));
-        let scale = inverse(r2);
-        let sin = mul(fma(a, d, y, mul(x, root)), scale);
-        let cos = mul(fma(a, d, x, neg(mul(y, root))), scale);
-        let angle = Angle {
-            sin: select(free, hold.sin, sin),
-            cos: select(free, hold.cos, cos),
-        };
-        Choice { angle, real }
+        let zero = F4::splat(x.build(), 0.0);
+        let free = r2.le(scale * 1e-20);
+        let real = (free.select(scale, r2) * -slack).le(rest);
+        let d = zero.le(rest).select(d, r2.sqrt().signed(d));
+        let root = rest.max(zero).sqrt();
+        let inverse = F4::splat(x.build(), 1.0) / r2;
+        let (d, root) = (d * inverse, root * inverse);
+        Pair {
+            middle: Angle {
+                sin: d * y,
+                cos: d * x,
+            },
+            offset: Angle {
+                sin: x * root,
+                cos: -(y * root),
+            },
+            free,
+            real,
+        }
     }
+}
+
+/// Three angles as numbers, see [`angle_of`].
+#[inline(always)]
+pub(crate) fn angles_of<A: Arith>([x, y, z]: [Angle<A>; 3]) -> [F4<A>; 3] {
+    [angle_of(x), angle_of(y), angle_of(z)]
 }
 
 /// Angles from their sines and cosines, in (-pi, pi].
@@ -289,55 +294,68 @@ impl Wave {
 /// S. L. Moshier, Cephes Mathematical Library, 1989: arc tangent by a rational
 /// function after reduction at tan(pi/8).
 #[inline(always)]
-pub(crate) fn angle_of<A: Arith>(a: A, angle: Angle) -> F4 {
-    each!(|i: usize| arc(a, angle.sin[i], angle.cos[i]))
-}
-
-#[inline(always)]
-fn arc<A: Arith>(a: A, y: f64, x: f64) -> f64 {
+pub(crate) fn angle_of<A: Arith>(angle: Angle<A>) -> F4<A> {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let Angle { sin: y, cos: x } = angle;
+    let a = y.build();
+    let number = |x: f64| F4::splat(a, x);
+    let zero = number(0.0);
     let (ax, ay) = (x.abs(), y.abs());
-    let steep = ay > ax;
-    let (low, high) = if steep { (ax, ay) } else { (ay, ax) };
-    let upper = low > 0.414_213_562_373_095_03 * high;
-    let (top, bottom) = if upper {
-        (low - high, low + high)
-    } else {
-        (low, high)
-    };
+    let (low, high) = (ax.min(ay), ax.max(ay));
+    let lower = low.le(high * 0.414_213_562_373_095_03);
+    let top = lower.select(low, low - high);
+    let bottom = lower.select(high, low + high);
     let t = top / bottom;
     let z = t * t;
-    let mut p = a.fma(-8.750_608_600_031_904e-1, z, -1.615_753_718_733_365e1);
-    p = a.fma(p, z, -7.500_855_792_314_705e1);
-    p = a.fma(p, z, -1.228_866_684_490_136_1e2);
-    p = a.fma(p, z, -6.485_021_904_942_025e1);
-    let mut q = z + 2.485_846_490_142_306_3e1;
-    q = a.fma(q, z, 1.650_270_098_316_988_6e2);
-    q = a.fma(q, z, 4.328_810_604_912_902_6e2);
-    q = a.fma(q, z, 4.853_903_996_359_137e2);
-    q = a.fma(q, z, 1.945_506_571_482_614e2);
-    let mut angle = a.fma(t * z, p / q, t);
-    angle += if upper { FRAC_PI_4 } else { 0.0 };
-    angle = if steep { FRAC_PI_2 - angle } else { angle };
-    angle = if x < 0.0 { PI - angle } else { angle };
-    angle.copysign(y)
+    let mut p = number(-8.750_608_600_031_904e-1).fma(z, number(-1.615_753_718_733_365e1));
+    p = p.fma(z, number(-7.500_855_792_314_705e1));
+    p = p.fma(z, number(-1.228_866_684_490_136_1e2));
+    p = p.fma(z, number(-6.485_021_904_942_025e1));
+    let mut q = z + number(2.485_846_490_142_306_3e1);
+    q = q.fma(z, number(1.650_270_098_316_988_6e2));
+    q = q.fma(z, number(4.328_810_604_912_902_6e2));
+    q = q.fma(z, number(4.853_903_996_359_137e2));
+    q = q.fma(z, number(1.945_506_571_482_614e2));
+    let angle = (t * z).fma(p / q, t) + lower.select(zero, number(FRAC_PI_4));
+    let angle = ay.le(ax).select(angle, number(FRAC_PI_2) - angle);
+    let angle = zero.le(x).select(angle, number(PI) - angle);
+    angle.signed(y)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arith::Plain;
+    use crate::arith::{Build, Op};
+
+    /// One arc tangent in a build of the arithmetic.
+    struct Arc(f64, f64);
+
+    impl Op for Arc {
+        type Output = f64;
+
+        fn run<A: Arith>(self, a: A) -> f64 {
+            let number = |x| F4::splat(a, x);
+            angle_of(Angle {
+                sin: number(self.0),
+                cos: number(self.1),
+            })
+            .array()[2]
+        }
+    }
 
     /// The arc tangent agrees with the standard library in all directions.
     #[test]
     fn arc_agrees_with_std() {
-        for i in 0..200_000 {
-            let angle = f64::from(i) * 3e-5 - 3.0;
-            let (s, c) = angle.sin_cos();
-            assert!((arc(Plain, s, c) - s.atan2(c)).abs() < 1e-15, "{angle}");
-        }
-        for (s, c) in [(0.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (0.0, -1.0)] {
-            assert_eq!(arc(Plain, s, c), f64::atan2(s, c));
+        for build in [Build::Plain, Build::detect()] {
+            for i in 0..200_000 {
+                let angle = f64::from(i) * 3e-5 - 3.0;
+                let (s, c) = angle.sin_cos();
+                let found = build.run(Arc(s, c));
+                assert!((found - s.atan2(c)).abs() < 1e-15, "{angle}");
+            }
+            for (s, c) in [(0.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (0.0, -1.0)] {
+                assert_eq!(build.run(Arc(s, c)), f64::atan2(s, c));
+            }
         }
     }
 }

@@ -6,6 +6,7 @@
 use super::goal::Target;
 use crate::arith::{Arith, Op};
 use crate::chain::Chain;
+use crate::wide::F4;
 use nalgebra::SVector;
 
 /// When a descent stops.
@@ -35,6 +36,8 @@ pub(crate) struct Landing<const N: usize> {
 
 /// Largest step of a joint, rad (or m divided by [`super::goal::LENGTH`]).
 const LONGEST_STEP: f64 = 1.2;
+/// How often joints are held at their limits before a step is taken.
+const HELD: u32 = 3;
 /// Steps after which the squared distance must have halved.
 const PATIENCE: u32 = 4;
 
@@ -92,13 +95,26 @@ impl<const N: usize> Op for Descent<'_, N> {
             } else if step - marked_at >= PATIENCE || !square.is_finite() {
                 break;
             }
-            target.shape(a, &tool, &mut rows);
-            let gradient = gradient(a, &rows, &miss.rows);
-            if stop.limits {
-                freeze(chain, &seed, &gradient, &mut rows);
-            }
+            target.shape(&tool, &mut rows);
+            let mut rest = miss.rows;
             let damping = a.fma(0.03, square, 1e-12);
-            let step = solve_damped::<A, N>(a, &rows, gradient, damping);
+            let mut held = [None; 8];
+            let mut step = [0.0; 8];
+            for round in 0..=HELD {
+                let pull = gradient(a, &rows, &rest);
+                if stop.limits && round == 0 {
+                    freeze(a, chain, &seed, &pull, &mut rows);
+                }
+                step = solve_damped::<A, N>(a, &rows, &pull, damping);
+                for i in 0..N {
+                    step[i] = held[i].unwrap_or(step[i]);
+                }
+                if !stop.limits
+                    || !hold(a, chain, (&seed, &step), &mut held, (&mut rows, &mut rest))
+                {
+                    break;
+                }
+            }
             advance(chain, &mut seed, &step, stop.limits);
         }
         best
@@ -107,70 +123,125 @@ impl<const N: usize> Op for Descent<'_, N> {
 
 /// `J^T e`.
 #[inline(always)]
-fn gradient<A: Arith>(a: A, rows: &[[f64; 8]; 6], miss: &[f64; 6]) -> [f64; 8] {
-    let mut gradient = [0.0; 8];
-    for (row, e) in rows.iter().zip(miss) {
-        for i in 0..8 {
-            gradient[i] = a.fma(row[i], *e, gradient[i]);
-        }
+fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], miss: &[f64; 6]) -> [f64; 8] {
+    let mut sum = [F4::splat(a, 0.0); 2];
+    for r in 0..6 {
+        let e = F4::splat(a, miss[r]);
+        sum = [rows[r][0].fma(e, sum[0]), rows[r][1].fma(e, sum[1])];
     }
-    gradient
+    let ([a, b, c, d], [e, f, g, h]) = (sum[0].array(), sum[1].array());
+    [a, b, c, d, e, f, g, h]
 }
 
 /// Takes joints out that stand at a limit and would be pushed beyond it.
 #[inline(always)]
-fn freeze<const N: usize>(
+fn freeze<A: Arith, const N: usize>(
+    a: A,
     chain: &Chain<N>,
     q: &SVector<f64, N>,
     gradient: &[f64; 8],
-    rows: &mut [[f64; 8]; 6],
+    rows: &mut [[F4<A>; 2]; 6],
 ) {
+    let mut keep = [[1.0; 4]; 2];
+    let mut frozen = false;
     for i in 0..N {
         let outward = (q[i] >= chain.upper()[i] && gradient[i] > 0.0)
             || (q[i] <= chain.lower()[i] && gradient[i] < 0.0);
         if outward {
-            for row in rows.iter_mut() {
-                row[i] = 0.0;
-            }
+            keep[i / 4][i % 4] = 0.0;
+            frozen = true;
+        }
+    }
+    if frozen {
+        let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
+        for row in rows {
+            *row = [row[0] * keep[0], row[1] * keep[1]];
         }
     }
 }
 
+/// Holds joints that a step would bring beyond a limit: they go as far as the limit, and
+/// what that does is taken off the `rest` that the others are to do. Whether there are any.
+#[inline(always)]
+fn hold<A: Arith, const N: usize>(
+    a: A,
+    chain: &Chain<N>,
+    (q, step): (&SVector<f64, N>, &[f64; 8]),
+    held: &mut [Option<f64>; 8],
+    (rows, rest): (&mut [[F4<A>; 2]; 6], &mut [f64; 6]),
+) -> bool {
+    let (mut keep, mut moved) = ([[1.0; 4]; 2], [[0.0; 4]; 2]);
+    let mut any = false;
+    for i in 0..N {
+        let inside = (q[i] + step[i]).min(chain.upper()[i]).max(chain.lower()[i]) - q[i];
+        if held[i].is_none() && (inside - step[i]).abs() > 1e-9 {
+            (keep[i / 4][i % 4], moved[i / 4][i % 4]) = (0.0, inside);
+            held[i] = Some(inside);
+            any = true;
+        }
+    }
+    if any {
+        let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
+        let moved = [F4::new(a, moved[0]), F4::new(a, moved[1])];
+        for (row, rest) in rows.iter_mut().zip(rest) {
+            let [x, y, z, w] = row[0].fma(moved[0], row[1] * moved[1]).array();
+            *rest -= x + y + z + w;
+            *row = [row[0] * keep[0], row[1] * keep[1]];
+        }
+    }
+    any
+}
+
 /// Solves `(J^T J + damping) x = b` by elimination; the matrix is positive definite.
 #[inline(always)]
-pub(crate) fn solve_damped<A: Arith, const N: usize>(
+fn solve_damped<A: Arith, const N: usize>(
     a: A,
-    rows: &[[f64; 8]; 6],
-    mut b: [f64; 8],
+    rows: &[[F4<A>; 2]; 6],
+    b: &[f64; 8],
     damping: f64,
 ) -> [f64; 8] {
-    let mut m = [[0.0; 8]; N];
-    for i in 0..N {
-        for row in rows {
-            for j in 0..8 {
-                m[i][j] = a.fma(row[i], row[j], m[i][j]);
+    let mut columns = [[0.0; 6]; 8];
+    for r in 0..6 {
+        for half in 0..2 {
+            let part = rows[r][half].array();
+            for i in 0..4 {
+                columns[4 * half + i][r] = part[i];
             }
         }
-        m[i][i] += damping;
     }
-    let mut inverse = [0.0; N];
-    for k in 0..N {
-        inverse[k] = 1.0 / m[k][k];
-        for i in k + 1..N {
-            // The lower half is never stored: it mirrors the upper one.
-            let factor = -m[k][i] * inverse[k];
-            let pivot = m[k];
-            for j in 0..8 {
-                m[i][j] = a.fma(factor, pivot[j], m[i][j]);
+    // Only the upper half is kept: the lower one mirrors it.
+    let mut m = [[F4::splat(a, 0.0); 2]; N];
+    for i in 0..N {
+        let mut diagonal = [[0.0; 4]; 2];
+        diagonal[i / 4][i % 4] = damping;
+        for half in i / 4..2 {
+            let mut sum = F4::new(a, diagonal[half]);
+            for r in 0..6 {
+                sum = rows[r][half].fma(F4::splat(a, columns[i][r]), sum);
             }
-            b[i] = a.fma(factor, b[k], b[i]);
+            m[i][half] = sum;
+        }
+    }
+    let mut b = *b;
+    let (mut upper, mut inverse) = ([[0.0; 8]; N], [0.0; N]);
+    for k in 0..N {
+        for half in k / 4..2 {
+            upper[k][4 * half..4 * half + 4].copy_from_slice(&m[k][half].array());
+        }
+        inverse[k] = 1.0 / upper[k][k];
+        for i in k + 1..N {
+            let factor = upper[k][i] * inverse[k];
+            for half in i / 4..2 {
+                m[i][half] = m[k][half].taken_from(F4::splat(a, factor), m[i][half]);
+            }
+            b[i] = a.fma(-factor, b[k], b[i]);
         }
     }
     let mut x = [0.0; 8];
     for k in (0..N).rev() {
         let mut sum = b[k];
         for j in k + 1..N {
-            sum = a.fma(-m[k][j], x[j], sum);
+            sum = a.fma(-upper[k][j], x[j], sum);
         }
         x[k] = sum * inverse[k];
     }

@@ -29,8 +29,7 @@ impl<const N: usize> Solver<N> {
         let raw = self.raw(closed, pose, parameter, seed);
         let mut found = Branches::new();
         for id in 0..8_u8 {
-            let place = (usize::from(id / 4), usize::from(id % 4));
-            let Some(q) = self.branch(closed, &raw, place, seed) else {
+            let Some(q) = raw.any(id) else {
                 continue;
             };
             match self.polished(pose, &q) {

@@ -4,9 +4,11 @@
 //! about the line from shoulder to wrist, counted from the plane through that line
 //! and axis 1.
 
-use super::lanes::{Angle, B4, FIRST, SECOND, Vec4, Wave, both, splat};
-use super::six::{Line, Product, across, orient};
+use super::lanes::{FIRST, Held, SECOND, Vec4, Wave, angle_of, angles_of};
+use super::product::Product;
+use super::six::{Joints, Line, across, dot, minus, orient, orient_both};
 use crate::arith::{self, Arith};
+use crate::wide::F4;
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// Axes at q = 0 of an arm with spherical shoulder, one elbow joint and spherical wrist.
@@ -16,12 +18,6 @@ pub(crate) struct Swivel {
     shoulder: [f64; 3],
     wrist: [f64; 3],
     slack: f64,
-}
-
-/// Sines and cosines of seven joints in two groups of four branches.
-pub(crate) struct SevenAngles {
-    pub(crate) joints: [[Angle; 7]; 2],
-    pub(crate) real: [B4; 2],
 }
 
 impl Swivel {
@@ -81,87 +77,98 @@ impl Swivel {
     #[inline(always)]
     pub(crate) fn solve<A: Arith>(
         &self,
-        a: A,
-        g: &Product,
+        g: &Product<A>,
         swivel: f64,
         hold: &[f64; 7],
-    ) -> SevenAngles {
-        let (sin, cos) = arith::sin_cos(a, *hold);
-        let held: [Angle; 7] = std::array::from_fn(|i| Angle::splat(sin[i], cos[i]));
+    ) -> Joints<A, 7> {
+        let a = g.build();
+        let hold = Held::all(a, *hold);
         let h = |i: usize| self.lines[i].h;
         let (elbow, away) = (self.lines[3].p, minus(g.point(self.wrist), self.shoulder));
         let (reach, upper) = (minus(self.wrist, elbow), minus(self.shoulder, elbow));
-        let d = 0.5 * (square(reach) + square(upper) - square(away));
-        let bend = Wave::of(a, Vec4::splat(upper), h(3), Vec4::splat(reach), splat(d))
-            .solve(a, FIRST, held[3], self.slack);
+        let d = 0.5 * (dot(reach, reach) + dot(upper, upper) - dot(away, away));
+        let forearm = Vec4::splat(a, reach);
+        let wave = Wave::of(Vec4::splat(a, upper), h(3), forearm, F4::splat(a, d));
+        let bends = wave.solve(self.slack);
+        let bend = bends.pick(FIRST, hold[3]);
 
         // Axes 1 to 3 turn the plane of the arm onto the line to the wrist, at the swivel asked for.
-        let along = Vector3::from(away).normalize();
-        let reference = self.reference(&along);
-        let (s, c) = swivel.sin_cos();
-        let side = reference * c + along.cross(&reference) * s;
-        let target = frame_of(&along, &side);
-        let place = |lane: usize| {
-            let q4 = bend.angle.sin[lane].atan2(bend.angle.cos[lane]);
-            let bent = self.bent(q4).normalize();
-            let hinge = Vector3::from(h(3));
-            let across = (hinge - bent * bent.dot(&hinge)).normalize();
-            target * frame_of(&bent, &across).transpose()
-        };
-        let shoulders = [place(0), place(1)];
-        let column = |v: [f64; 3]| {
-            let turned = shoulders.map(|r| r * Vector3::from(v));
-            Vec4(std::array::from_fn(|i| {
-                [turned[0][i], turned[1][i], turned[0][i], turned[1][i]]
-            }))
-        };
+        let [along, side, normal] = self.plane(a, away, swivel);
+        let bent = forearm.turned(h(3), bend).minus(upper).unit();
+        let hinge = Vec4::splat(a, h(3));
+        let across_bent = bent.times_plus(-bent.dot(hinge), hinge).unit();
+        let frame = [bent, across_bent, bent.cross(across_bent)];
+        let plane = [
+            Vec4::splat(a, along),
+            Vec4::splat(a, side),
+            Vec4::splat(a, normal),
+        ];
         let spin = across(h(2));
-        let (arm, ok) = orient(
-            a,
-            [h(0), h(1), h(2)],
-            (column(h(2)), column(spin), spin),
-            SECOND,
-            [held[0], held[1], held[2]],
+        let goal = (
+            carried(Vec4::splat(a, h(2)), &frame, &plane),
+            carried(Vec4::splat(a, spin), &frame, &plane),
+            spin,
         );
-        let real = both(bend.real, ok);
-        let seen = |v: [f64; 3]| {
-            Vec4::splat(g.turn(v))
-                .turned(a, h(0), arm[0].back())
-                .turned(a, h(1), arm[1].back())
-                .turned(a, h(2), arm[2].back())
-                .turned(a, h(3), bend.angle.back())
-        };
+        let (arm, tilts) = orient(
+            [h(0), h(1), h(2)],
+            goal,
+            SECOND,
+            [hold[0], hold[1], hold[2]],
+        );
+        let real = bends.real & tilts.real;
         let spin = across(h(6));
-        let (axis, spun) = (seen(h(6)), seen(spin));
-        let half = |sign: f64| {
-            let hold = [held[4], held[5], held[6]];
-            let ([q5, q6, q7], ok) =
-                orient(a, [h(4), h(5), h(6)], (axis, spun, spin), splat(sign), hold);
-            (
-                [arm[0], arm[1], arm[2], bend.angle, q5, q6, q7],
-                both(real, ok),
-            )
-        };
-        let ((first, ok_first), (second, ok_second)) = (half(1.0), half(-1.0));
-        SevenAngles {
-            joints: [first, second],
-            real: [ok_first, ok_second],
+        let axis = carried(Vec4::splat(a, g.turn(h(6))), &plane, &frame);
+        let spun = carried(Vec4::splat(a, g.turn(spin)), &plane, &frame);
+        let goal = (
+            axis.turned(h(3), bend.back()),
+            spun.turned(h(3), bend.back()),
+            spin,
+        );
+        let hold = [hold[4], hold[5], hold[6]];
+        let [(first, ok_first), (second, ok_second)] = orient_both([h(4), h(5), h(6)], goal, hold);
+        let ([q1, q2, q3], q4) = (angles_of(arm), angle_of(bend));
+        let ([q5, q6, q7], [r5, r6, r7]) = (first, second);
+        Joints {
+            angles: [[q1, q2, q3, q4, q5, q6, q7], [q1, q2, q3, q4, r5, r6, r7]],
+            real: [real & ok_first, real & ok_second],
         }
+    }
+
+    /// Where the plane of the arm lies: the way to the wrist, the hinge of the elbow at a
+    /// swivel (rad), and the direction square to both.
+    #[inline(always)]
+    fn plane<A: Arith>(&self, a: A, away: [f64; 3], swivel: f64) -> [[f64; 3]; 3] {
+        let scale = |v: [f64; 3], s: f64| v.map(|x| x * s);
+        let along = scale(away, 1.0 / dot(away, away).sqrt());
+        let up = self.lines[0].h;
+        let mut reference = cross(up, along);
+        let mut square = dot(reference, reference);
+        if square <= 1e-8 {
+            let other = across(up);
+            reference = minus(other, scale(along, dot(along, other)));
+            square = dot(reference, reference);
+        }
+        let reference = scale(reference, 1.0 / square.sqrt());
+        let ([s], [c]) = arith::sin_cos(a, [swivel]);
+        let (one, other) = (scale(reference, c), scale(cross(along, reference), s));
+        let side = [one[0] + other[0], one[1] + other[1], one[2] + other[2]];
+        [along, side, cross(along, side)]
     }
 }
 
+/// A vector taken along from one frame of unit vectors to another.
 #[inline(always)]
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+fn carried<A: Arith>(v: Vec4<A>, from: &[Vec4<A>; 3], to: &[Vec4<A>; 3]) -> Vec4<A> {
+    let sum = to[0].times(from[0].dot(v));
+    let sum = to[1].times_plus(from[1].dot(v), sum);
+    to[2].times_plus(from[2].dot(v), sum)
 }
 
 #[inline(always)]
-fn square(v: [f64; 3]) -> f64 {
-    v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-}
-
-/// A rotation whose first two columns are two directions at right angles.
-#[inline(always)]
-fn frame_of(x: &Vector3<f64>, y: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
-    nalgebra::Matrix3::from_columns(&[*x, *y, x.cross(y)])
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }

@@ -1,6 +1,8 @@
 //! Whole turns of joints: the same pose, another joint position.
 
+use crate::arith::Arith;
 use crate::chain::Chain;
+use crate::wide::{B4, F4};
 use nalgebra::SVector;
 use std::f64::consts::TAU;
 
@@ -31,6 +33,24 @@ pub(crate) fn nearest<const N: usize>(
             moved.clamp(chain.lower()[i], chain.upper()[i])
         }
     })
+}
+
+/// The same for four angles of a turning joint; beside them whether they are inside.
+#[inline(always)]
+pub(crate) fn nearest_in<A: Arith>(q: F4<A>, seed: f64, [low, high]: [f64; 2]) -> (F4<A>, B4<A>) {
+    let number = |x: f64| F4::splat(q.build(), x);
+    let turn = 1.0 / TAU;
+    let near = ((number(seed) - q).fma(number(turn), number(0.5))).floor();
+    let most = ((number(high + SLACK) - q) * turn).floor();
+    let least = -((q - number(low - SLACK)) * turn).floor();
+    let inside = least.le(most);
+    let turns = inside.select(near.min(most).max(least), near);
+    let moved = turns.fma(number(TAU), q);
+    let held = moved.max(number(low)).min(number(high));
+    (
+        inside.select(held, moved),
+        inside & moved.abs().le(number(f64::MAX)),
+    )
 }
 
 /// Rounding that a limit forgives, rad.

@@ -36,6 +36,14 @@ pub(crate) const SIX: [&str; 9] = [
 ];
 pub(crate) const SEVEN: [&str; 5] = ["panda", "fr3", "iiwa7", "iiwa14", "xarm7"];
 
+/// How often to try: `usual`, unless `CANTER_POSES` asks for another number.
+pub(crate) fn cases(usual: u32) -> u32 {
+    std::env::var("CANTER_POSES")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(usual)
+}
+
 /// SplitMix64: small, and the same numbers everywhere.
 pub(crate) struct Random(pub(crate) u64);
 

@@ -180,6 +180,64 @@ fn a_wrist_singularity_is_passed() {
     );
 }
 
+/// A straight line of the tool, `u` from -1 to 1, `way` long to either side of a pose.
+fn line(pose: &Isometry3<f64>, way: Vector3<f64>) -> impl Fn(f64) -> TwistPoint + use<> {
+    let pose = *pose;
+    move |u| TwistPoint {
+        pose: Isometry3::from_parts(
+            Translation3::from(pose.translation.vector + way * u),
+            pose.rotation,
+        ),
+        linear: [way, Vector3::zeros(), Vector3::zeros()],
+        angular: [Vector3::zeros(); 3],
+    }
+}
+
+/// Straight lines in any direction through the pole of the wrist: passed exactly with joint
+/// 5 changing sign, and no joint fast about the pole.
+#[test]
+fn lines_through_the_wrist_pole_are_passed() {
+    for name in ["irb120", "irb1200_7_70", "lrmate200id", "tx2_60"] {
+        let solver = Solver::new(arms::chain::<6>(name));
+        let mut random = arms::Random(71);
+        let (mut passed, mut refused) = (0, Vec::new());
+        for _ in 0..50 {
+            let mut pole = ready::<6>(name);
+            pole[0] += random.between(-0.5, 0.5);
+            pole[3] = random.between(-1.2, 1.2);
+            pole[4] = 0.0;
+            let way = Vector3::from_fn(|_, _| random.between(-0.04, 0.04));
+            let tool = line(&solver.chain().forward(&pole), way);
+            let mut start = pole;
+            start[4] = 0.05;
+            let Ok(start) = solver.nearest(&tool(-1.0).pose, &start) else {
+                continue;
+            };
+            let grid: Vec<f64> = (-20..=20).map(|i| f64::from(i) / 20.0).collect();
+            let options = FollowOptions::default();
+            let points = match follow(&solver, &tool, &grid, &start.q, &options) {
+                Ok(points) => points,
+                Err(error) => {
+                    refused.push(error);
+                    continue;
+                }
+            };
+            passed += 1;
+            for point in &points {
+                let found = solver.chain().forward(&point.q[0]);
+                let (position, rotation) = error(&found, &tool(point.u).pose);
+                assert!(position < 1e-9 && rotation < 1e-9, "{name} at {}", point.u);
+            }
+            let (first, last) = (points[0].q[0][4], points[points.len() - 1].q[0][4]);
+            assert!(first * last < 0.0, "{name}: joint 5 from {first} to {last}");
+            let near = points.iter().filter(|point| point.u.abs() <= 0.1);
+            let fastest = near.map(|p| p.q[1].amax()).fold(0.0, f64::max);
+            assert!(fastest < 2.0, "{name}: {fastest} rad for 0.04 m");
+        }
+        assert!(passed >= 40, "{name}: {passed} passed, refused {refused:?}");
+    }
+}
+
 /// Smallest distance of a joint path from the limits.
 fn room<const N: usize>(solver: &Solver<N>, points: &[kinematics::FollowPoint<N>]) -> f64 {
     let chain = solver.chain();

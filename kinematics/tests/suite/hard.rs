@@ -30,7 +30,7 @@ fn singular_poses_are_reached() {
         let solver = Solver::new(arms::chain::<6>(name));
         let chain = *solver.chain();
         let mut random = Random(21);
-        for _ in 0..200 {
+        for _ in 0..arms::cases(200) {
             // The wrist straight.
             let mut q = random.joints(&chain);
             q[4] = inside(&chain, 4, 0.0);
@@ -49,7 +49,7 @@ fn singular_poses_are_reached() {
         let solver = Solver::new(arms::chain::<7>(name));
         let chain = *solver.chain();
         let mut random = Random(22);
-        for _ in 0..100 {
+        for _ in 0..arms::cases(100) {
             let mut q = random.joints(&chain);
             q[5] = inside(&chain, 5, 0.0);
             answered(name, &solver, &q);
@@ -71,7 +71,7 @@ fn axis_aligned_poses_are_reached_or_truly_refused() {
         let blind = Solver::numeric(*solver.chain());
         let mut random = Random(23);
         let (mut reached, mut refused) = (0, 0);
-        for _ in 0..60 {
+        for _ in 0..arms::cases(60) {
             let turns = Vector3::from_fn(|_, _| FRAC_PI_2 * random.between(0.0, 4.0).floor());
             let place = solver
                 .chain()
@@ -122,7 +122,7 @@ fn calibrated_arms_keep_their_branches() {
             (solver.family(), solver.is_exact()),
             ("three parallel axes", false)
         );
-        for _ in 0..400 {
+        for _ in 0..arms::cases(400) {
             let q = random.joints(solver.chain());
             let pose = solver.chain().forward(&q);
             let found = solver.solve_all_at(&pose, 0.0, &q);

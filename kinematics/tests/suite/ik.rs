@@ -2,7 +2,7 @@
 
 use crate::arms::{self, Random, SEVEN, SIX};
 use kinematics::{Goal, Obstacle, Solver};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, SVector, Vector3};
 
 /// Distance (m) and angle (rad) between two poses.
 pub(crate) fn error(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
@@ -68,18 +68,10 @@ const CLOSED_SEVEN: [(&str, &str); 5] = [
 fn closed_forms_find_every_branch() {
     CLOSED_SIX
         .iter()
-        .for_each(|(name, family)| all_branches::<6>(name, family, cases()));
+        .for_each(|(name, family)| all_branches::<6>(name, family, arms::cases(2000)));
     CLOSED_SEVEN
         .iter()
-        .for_each(|(name, family)| all_branches::<7>(name, family, cases()));
-}
-
-/// Poses tried for each arm; `CANTER_POSES` asks for more.
-fn cases() -> u32 {
-    std::env::var("CANTER_POSES")
-        .ok()
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(2000)
+        .for_each(|(name, family)| all_branches::<7>(name, family, arms::cases(2000)));
 }
 
 fn cold<const N: usize>(name: &str, count: u32) {
@@ -102,8 +94,44 @@ fn cold<const N: usize>(name: &str, count: u32) {
 
 #[test]
 fn every_reachable_pose_is_reached() {
-    SIX.iter().for_each(|name| cold::<6>(name, 1000));
-    SEVEN.iter().for_each(|name| cold::<7>(name, 1000));
+    SIX.iter()
+        .for_each(|name| cold::<6>(name, arms::cases(1000)));
+    SEVEN
+        .iter()
+        .for_each(|name| cold::<7>(name, arms::cases(1000)));
+}
+
+/// Poses at corners of the limits, where few restarts come through; each was refused once.
+#[test]
+fn poses_in_corners_are_reached() {
+    corner::<6>("xarm6", 7206);
+    corner::<7>("panda", 461);
+    corner::<7>("panda", 4412);
+    corner::<7>("panda", 9558);
+    corner::<7>("fr3", 626);
+    corner::<7>("iiwa7", 2912);
+}
+
+/// One pose of a random sequence, from the seed that goes with it, with and without the
+/// closed form.
+fn corner<const N: usize>(name: &str, index: usize) {
+    let chain = arms::chain::<N>(name);
+    let mut random = Random(5);
+    let mut draw = || {
+        SVector::from_fn(|i, _| {
+            let (low, high) = (chain.lower()[i].max(-6.3), chain.upper()[i].min(6.3));
+            random.between(low, high)
+        })
+    };
+    let joints: Vec<SVector<f64, N>> = (0..20_000).map(|_| draw()).collect();
+    let (pose, seed) = (chain.forward(&joints[index]), joints[10_000 + index]);
+    for solver in [Solver::numeric(chain), Solver::new(chain)] {
+        let solution = solver.nearest(&pose, &seed);
+        let solution = solution.unwrap_or_else(|report| panic!("{name} {index}: {report}"));
+        let (position, rotation) = solver.error(&pose, &solution.q);
+        assert!(position < 2e-9 && rotation < 2e-9, "{name} {index}");
+        assert!(chain.within_limits(&solution.q, 0.0), "{name} {index}");
+    }
 }
 
 #[test]

@@ -7,4 +7,5 @@ mod follow;
 mod fuzz;
 mod hard;
 mod ik;
+mod strangers;
 mod urdf;
