@@ -10,7 +10,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 use trajectory::ToolLimits;
-use trajectory::smooth::{SmoothOptions, measure};
+use trajectory::smooth::{SmoothOptions, Windows, measure};
 
 struct Case {
     name: &'static str,
@@ -151,6 +151,7 @@ fn main() {
         sum += (motion / case.reference).ln();
         worst = worst.max(motion / case.reference);
     }
+    lines.extend(long_lists(limits));
     for line in lines {
         println!("{line}");
     }
@@ -159,4 +160,38 @@ fn main() {
         "ratio motion-geomean {:.4}",
         (sum / cases.len() as f64).exp()
     );
+}
+
+/// A zigzag of 1000 and of 10 000 poses in windows: time until motion can
+/// start, and cost per pose. Budget: first motion within 50 ms, linear cost.
+fn long_lists(limits: ToolLimits) -> Vec<String> {
+    let [short, long] = [1_000, 10_000].map(|count| {
+        let poses: Vec<_> = (0..count)
+            .map(|i| Isometry3::translation(0.005 * f64::from(i), 0.004 * f64::from(i % 2), 0.0))
+            .collect();
+        let clock = std::time::Instant::now();
+        let mut windows = match Windows::new(&poses, &SmoothOptions::new(0.5e-3, limits)) {
+            Ok(windows) => windows,
+            Err(error) => return Err(error.to_string()),
+        };
+        windows.advance();
+        let first = clock.elapsed().as_secs_f64();
+        let plan = windows.finish();
+        let each = clock.elapsed().as_secs_f64() / f64::from(count);
+        println!(
+            "{count} poses: first {:.2} ms, {:.3} ms a pose, motion {:.2} s of {:.2} s with stops",
+            first * 1e3,
+            each * 1e3,
+            plan.duration(),
+            plan.exact_stop()
+        );
+        Ok((first, each))
+    });
+    match (short, long) {
+        (Ok(short), Ok(long)) => vec![
+            format!("ratio motion-first-10000-to-50ms {:.4}", long.0 / 0.05),
+            format!("ratio motion-cost-10000-to-1000 {:.4}", long.1 / short.1),
+        ],
+        (Err(error), _) | (_, Err(error)) => vec![error],
+    }
 }

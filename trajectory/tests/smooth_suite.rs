@@ -81,9 +81,15 @@ fn more_tolerance_is_never_slower() {
         for k in -4..4 {
             let tolerance = tolerance * 2_f64.powi(k);
             let plan = plan(&poses, &SmoothOptions::new(tolerance, limits)).unwrap();
-            assert!(plan.certificate().holds(), "{name} {tolerance}");
-            let time = plan.duration();
-            println!("{name} {:8.4} mm {time:.5} s", tolerance * 1e3);
+            let certificate = plan.certificate();
+            assert!(certificate.holds(), "{name} {tolerance}");
+            assert!(!certificate.active.is_empty());
+            let (time, least) = (plan.duration(), certificate.optimality());
+            println!(
+                "{name} {:8.4} mm {time:.5} s, over bound {least:.3}",
+                tolerance * 1e3
+            );
+            assert!(least >= 1.0, "{name} {tolerance} {least}");
             if time > before {
                 bad.push(format!("{name} {tolerance}: {time} after {before}"));
             }
