@@ -282,6 +282,9 @@ fn report(seed: u64) -> Result<[f64; 2], String> {
             plan.exact_stop()
         ));
     }
+    if plan.certificate().optimality() < 1.0 - 1e-9 {
+        return Err(format!("below its bound {:?}", plan.certificate()));
+    }
     check(&plan, &poses, &options)?;
     Ok([plan.duration(), plan.exact_stop()])
 }
@@ -331,13 +334,22 @@ fn windows_commit_in_order() {
     let options = SmoothOptions::new(0.001, limits);
     let mut windows = Windows::new(&poses, &options).unwrap();
     let (mut committed, mut count) = (0.0, 0);
+    let mut seen = Vec::new();
+    assert!(windows.at(0.0).is_none());
     while windows.advance() {
         assert!(windows.committed() > committed);
+        let time = 0.5 * (committed + windows.committed());
+        seen.push((time, windows.at(time).unwrap()));
         committed = windows.committed();
+        assert!(windows.at(committed + 1e-9).is_none());
         count += 1;
     }
     assert!(count > 3);
     let plan = windows.finish();
+    // What was committed is what the whole motion does.
+    for (time, point) in seen {
+        assert_eq!(plan.at(time), point);
+    }
     assert_eq!(plan.duration(), committed);
     assert!(plan.certificate().holds());
     check(&plan, &poses, &options).unwrap();

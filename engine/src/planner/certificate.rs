@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, SVector, Vector3};
 use serde::Serialize;
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
+use super::active::ActiveLimit;
 use crate::task::{Move, Shape};
 
 /// How one intermediate pose was passed.
@@ -76,6 +77,14 @@ impl Peaks {
 /// What holds of one planned move.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MoveCertificate {
+    /// Time of the move, s.
+    pub duration_s: f64,
+    /// No move through the same poses to the same joints within the limits is
+    /// shorter, s.
+    pub lower_bound_s: f64,
+    /// Which limit decides the speed when; where none does, the tolerance of
+    /// poses or the change from one limit to the next.
+    pub active: Vec<ActiveLimit>,
     /// Every intermediate pose, in the order of the command.
     pub poses: Vec<PassReport>,
     /// Whether the intermediate poses are passed in order, each within its tolerance.

@@ -128,7 +128,7 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    fn rest_to_rest(
+    pub(super) fn rest_to_rest(
         &self,
         start: &SVector<f64, N>,
         goal: &SVector<f64, N>,

@@ -3,6 +3,7 @@
 //! The planner is a pure function: the same move, arm and start give the same
 //! bytes. The dry run, the real run and the benchmarks call it alike.
 
+mod active;
 mod cartesian;
 mod certificate;
 mod goal;
@@ -11,8 +12,10 @@ mod motion_error;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
+use trajectory::smooth::{self, SmoothOptions};
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
+pub use active::ActiveLimit;
 pub use certificate::{MoveCertificate, PassReport, Peaks};
 pub use jog::Direction;
 pub use motion_error::MotionError;
@@ -174,7 +177,16 @@ impl<const N: usize> Planner<N> {
         let peaks = certificate::peaks(&trajectory, &samples, &self.limits, &motion.limits);
         let way = certificate::way(motion, self.chain(), &trajectory, &samples);
         let joint_margin = self.margin(&trajectory);
+        let active = active::active(
+            &trajectory,
+            &samples,
+            (&self.limits, &motion.limits),
+            &self.joint_names,
+        );
         let certificate = MoveCertificate {
+            duration_s: trajectory.duration(),
+            lower_bound_s: self.least_time(motion, start, &trajectory),
+            active,
             poses: way.poses,
             in_order: way.in_order,
             peaks,
@@ -191,6 +203,30 @@ impl<const N: usize> Planner<N> {
             end,
             blend: None,
         })
+    }
+
+    /// No motion between the same ends within the limits is shorter, s: of each
+    /// joint alone, and of the tool alone through the poses.
+    fn least_time(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        trajectory: &Trajectory<N>,
+    ) -> f64 {
+        let end = trajectory.sample(trajectory.duration()).position;
+        let joints = self.rest_to_rest(start, &end);
+        let joints = joints.map_or(0.0, |found| found.duration());
+        let tool = match motion.shape {
+            Shape::Joint => 0.0,
+            Shape::Straight | Shape::Smooth => {
+                let mut poses = vec![self.chain().forward(start)];
+                poses.extend_from_slice(&motion.poses);
+                let options = SmoothOptions::new(motion.tolerance, motion.limits);
+                smooth::least_time(&poses, &options).unwrap_or(0.0)
+            }
+        };
+        // Both are exact up to rounding where they are the motion itself.
+        joints.max(tool).min(trajectory.duration())
     }
 
     fn within_limits(&self, trajectory: Trajectory<N>, limits: &ToolLimits) -> Trajectory<N> {

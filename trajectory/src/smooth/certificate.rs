@@ -2,10 +2,12 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::active::Active;
 use super::options::SmoothOptions;
 use super::pass::{self, Pass, RESOLUTION};
 use super::poly::{bernstein, halve};
 use super::span::Span;
+use crate::timing::ActiveSpan;
 
 /// Greatest ratio of a quantity to its limit, and when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,6 +53,15 @@ pub struct Certificate {
     pub angular_acceleration: Peak,
     /// Angular jerk / limit.
     pub angular_jerk: Peak,
+    /// Which limit is used to 98 % or more when, in the order of time; spans of
+    /// different limits may overlap. Where none is, the tolerance or the
+    /// corridor decides, or the change from one limit to the next.
+    pub active: Vec<ActiveSpan>,
+    /// Time of the motion, s.
+    pub duration: f64,
+    /// No motion through these poses within these limits and tolerances is
+    /// shorter, s.
+    pub lower_bound: f64,
 }
 
 /// Room for rounding in a ratio: 1 part in 1e9.
@@ -71,6 +82,16 @@ impl Certificate {
             worst.raise(peak.ratio, 0.0);
         }
         worst.ratio
+    }
+
+    /// Duration over its lower bound, 1 at best.
+    #[must_use]
+    pub fn optimality(&self) -> f64 {
+        if self.lower_bound > 0.0 {
+            self.duration / self.lower_bound
+        } else {
+            1.0
+        }
     }
 
     /// The factor by which time must be stretched so that all limits hold; 1
@@ -108,18 +129,23 @@ pub(crate) fn certify(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
 ) -> (Certificate, Vec<Pass>) {
-    let mut certificate = Certificate::default();
+    let mut certificate = Certificate {
+        duration: spans.last().map_or(0.0, Span::end),
+        ..Certificate::default()
+    };
+    let mut active = Active::default();
     for span in spans {
-        limits_of(span, options, &mut certificate);
+        active.add(span.start, &limits_of(span, options, &mut certificate));
     }
+    certificate.active = active.finish(certificate.duration);
     let passes = pass::passes(spans, poses, options);
     certificate.in_order = passes.iter().all(Pass::holds);
     certificate.corridor = corridor(spans, poses, &passes, options.corridor());
     (certificate, passes)
 }
 
-/// Raises the six peaks by one span.
-fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate) {
+/// Raises the six peaks by one span; its own six ratios.
+fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate) -> [f64; 6] {
     let (limits, d) = (&options.limits, span.duration);
     let velocity = span.velocity_control(0.0, d);
     let acceleration = span.acceleration_control(0.0, d);
@@ -132,12 +158,15 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
     certificate.speed.raise(bounds[0], time);
     certificate.acceleration.raise(bounds[1], time);
     certificate.jerk.raise(bounds[2], time);
+    let mut angular = [0.0; 3];
     if !span.turns.is_empty() {
-        let angular = angular_bounds(span, options);
+        angular = angular_bounds(span, options);
         certificate.angular_speed.raise(angular[0], time);
         certificate.angular_acceleration.raise(angular[1], time);
         certificate.angular_jerk.raise(angular[2], time);
     }
+    let [a, b, c] = angular;
+    [bounds[0], bounds[1], bounds[2], a, b, c]
 }
 
 /// Upper bound of the norm of a Bernstein form over `limit`, refined by halving

@@ -12,9 +12,11 @@
 //! where joints need more time, the path timing stretches it, and stretching
 //! changes no geometry.
 
+mod active;
 mod certificate;
 mod choose;
 mod exact_stop;
+mod lower_bound;
 mod measure;
 mod options;
 mod pass;
@@ -26,6 +28,7 @@ mod spline;
 mod windows;
 
 pub use certificate::{Certificate, Peak};
+pub use lower_bound::least_time;
 pub use measure::{Measure, measure};
 pub use options::{SmoothError, SmoothOptions};
 pub use pass::{Pass, RESOLUTION};

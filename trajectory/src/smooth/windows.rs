@@ -5,11 +5,13 @@ use nalgebra::{Isometry3, UnitQuaternion};
 use super::certificate::certify;
 use super::choose::{Motion, from_motion, from_rest};
 use super::exact_stop;
+use super::lower_bound::lower_bound;
 use super::options::{SmoothError, SmoothOptions};
 use super::pass::passes;
 use super::plan::{Method, SmoothPlan};
 use super::span::Span;
 use super::spline::Moving;
+use crate::ToolPoint;
 use crate::line::body_turn;
 
 /// Longest part of a leg in one go, in time at full speed, s.
@@ -133,6 +135,19 @@ impl Windows {
         self.done.duration()
     }
 
+    /// Pose and derivatives of the controlled point (m, rad, s) at a time up to
+    /// [`Windows::committed`]; `None` beyond. What it gives for a time never
+    /// changes, so it may be executed while later windows are planned.
+    #[must_use]
+    pub fn at(&self, time: f64) -> Option<ToolPoint> {
+        if !(0.0..=self.committed()).contains(&time) {
+            return None;
+        }
+        let next = self.done.spans.partition_point(|span| span.start <= time);
+        let span = self.done.spans.get(next.saturating_sub(1))?;
+        Some(span.at((time - span.start).clamp(0.0, span.duration)))
+    }
+
     /// Plans what is left and certifies the whole.
     #[must_use]
     pub fn finish(self) -> SmoothPlan {
@@ -146,7 +161,9 @@ impl Windows {
         self.options = options.finite();
         let stop = exact_stop::plan(&self.given, &self.options.limits);
         let exact_stop = stop.last().map_or(0.0, Span::end);
-        let whole = certify(&self.done.spans, &self.given, &self.options);
+        let bound = lower_bound(&self.given, &self.options);
+        let mut whole = certify(&self.done.spans, &self.given, &self.options);
+        whole.0.lower_bound = bound;
         if whole.0.holds() && self.done.duration() <= exact_stop * (1.0 + 1e-12) {
             return SmoothPlan::new(&self.given, self.done, whole, exact_stop);
         }
@@ -155,7 +172,8 @@ impl Windows {
         } else {
             vec![(Method::ExactStop, stop.len())]
         };
-        let whole = certify(&stop, &self.given, &self.options);
+        let mut whole = certify(&stop, &self.given, &self.options);
+        whole.0.lower_bound = bound;
         SmoothPlan::new(
             &self.given,
             Motion { spans: stop, parts },

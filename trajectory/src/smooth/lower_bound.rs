@@ -1,0 +1,206 @@
+//! A time that no motion through the poses within the limits can beat.
+//!
+//! Two bounds that hold for every motion from rest to rest, whatever its shape:
+//!
+//! - **Length.** The speed is at most what the limits allow since the start and
+//!   until the end, so the way covered in a given time is bounded; the way is
+//!   at least the legs, less the tolerances at both of their ends.
+//! - **Turning back.** Seen along any one direction, the motion stands still
+//!   wherever it turns back. Between two such moments it covers a known
+//!   distance, from standing to standing.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::options::{SmoothError, SmoothOptions};
+use super::ramp::{self, Caps, Gate};
+use crate::line::body_turn;
+
+/// Legs whose directions are looked along, at most.
+const DIRECTIONS: usize = 16;
+
+/// A time (s) that no motion from rest to rest through these poses, within
+/// these limits and tolerances, can beat. Poses in m, the first is the start.
+///
+/// # Errors
+/// [`SmoothError`] when a number of the input is unusable.
+pub fn least_time(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<f64, SmoothError> {
+    options.check(poses)?;
+    Ok(lower_bound(poses, &options.finite()))
+}
+
+/// The better of the bounds, s.
+pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
+    let limits = &options.limits;
+    let linear = Caps {
+        speed: limits.speed,
+        acceleration: limits.acceleration,
+        jerk: limits.jerk,
+    };
+    let angular = Caps {
+        speed: limits.angular_speed,
+        acceleration: limits.angular_acceleration,
+        jerk: limits.angular_jerk,
+    };
+    let way = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        (b.translation.vector - a.translation.vector).norm()
+    };
+    let turn = |a: &Isometry3<f64>, b: &Isometry3<f64>| body_turn(&a.rotation, &b.rotation).norm();
+    let turned = length(poses, options.angular_tolerance(), turn);
+    shortest(length(poses, options.tolerance, way), &linear)
+        .max(shortest(turned, &angular))
+        .max(turning_back(poses, options.tolerance, &linear))
+}
+
+/// Least length of a way that passes the poses, by one measure of distance.
+fn length(
+    poses: &[Isometry3<f64>],
+    tolerance: f64,
+    distance: impl Fn(&Isometry3<f64>, &Isometry3<f64>) -> f64,
+) -> f64 {
+    let last = poses.len().saturating_sub(1);
+    let legs: f64 = (1..=last)
+        .map(|i| {
+            let slack = f64::from(u8::from(i > 1) + u8::from(i < last)) * tolerance;
+            (distance(&poses[i - 1], &poses[i]) - slack).max(0.0)
+        })
+        .sum();
+    match poses {
+        [first, .., goal] => legs.max(distance(first, goal)),
+        _ => 0.0,
+    }
+}
+
+/// Least time for a way of a length: the speed follows the limits from either
+/// end, up to the middle.
+fn shortest(length: f64, caps: &Caps) -> f64 {
+    if length <= 0.0 {
+        return 0.0;
+    }
+    // Way from rest after a time, with acceleration as soon as possible.
+    let covered = |time: f64| {
+        let rise = (caps.acceleration / caps.jerk).min((2.0 * caps.speed / caps.jerk).sqrt());
+        let mut state = ramp::advance([0.0; 3], time.min(rise), caps.jerk);
+        let full = ((caps.speed - state[1]) / state[2].max(1e-300)).max(0.0);
+        let pull = (time - rise).clamp(0.0, full);
+        state = ramp::advance(state, pull, 0.0);
+        state[0] + caps.speed * (time - rise - pull).max(0.0)
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    while covered(high) < 0.5 * length && high < 1e12 {
+        high *= 2.0;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if covered(middle) < 0.5 * length {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    2.0 * low
+}
+
+/// The greatest bound by turning back along some directions.
+fn turning_back(poses: &[Isometry3<f64>], tolerance: f64, caps: &Caps) -> f64 {
+    let place = |i: usize| poses[i].translation.vector;
+    let last = poses.len().saturating_sub(1);
+    let mut directions = vec![
+        Vector3::x(),
+        Vector3::y(),
+        Vector3::z(),
+        place(last) - place(0),
+    ];
+    let step = last.div_ceil(DIRECTIONS).max(1);
+    directions.extend((1..=last).step_by(step).map(|i| place(i) - place(i - 1)));
+    let along = |direction: &Vector3<f64>| {
+        let unit = direction.try_normalize(1e-300)?;
+        let places: Vec<f64> = poses
+            .iter()
+            .map(|pose| pose.translation.vector.dot(&unit))
+            .collect();
+        Some(standing_times(&turns(&places, tolerance), tolerance, caps))
+    };
+    directions.iter().filter_map(along).fold(0.0, f64::max)
+}
+
+/// The places at which a motion along one axis must turn back, with its ends:
+/// successive ones differ by more than both tolerances.
+fn turns(places: &[f64], tolerance: f64) -> Vec<f64> {
+    let (first, goal) = (places[0], places[places.len() - 1]);
+    let mut turns = vec![first];
+    let (mut extreme, mut sign) = (first, 0.0);
+    for place in places.iter().copied() {
+        if sign == 0.0 {
+            if (place - first).abs() > 2.0 * tolerance {
+                (extreme, sign) = (place, (place - first).signum());
+            }
+        } else if sign * (place - extreme) >= 0.0 {
+            extreme = place;
+        } else if sign * (extreme - place) > 2.0 * tolerance {
+            turns.push(extreme);
+            (extreme, sign) = (place, -sign);
+        }
+    }
+    // The way from the last turn to the goal may be shorter than to the last
+    // extreme; what is certain is the distance to the goal.
+    turns.push(goal);
+    turns
+}
+
+/// Sum of the least times between places of standing still.
+fn standing_times(turns: &[f64], tolerance: f64, caps: &Caps) -> f64 {
+    if let [first, goal] = turns {
+        let length = (goal - first).abs();
+        let pieces = ramp::leg(length, Gate::default(), Gate::default(), caps);
+        return pieces.map_or(0.0, |pieces| pieces.iter().map(|piece| piece.0).sum());
+    }
+    let last = turns.len() - 1;
+    (1..=last)
+        .map(|i| {
+            let slack = f64::from(u8::from(i > 1) + u8::from(i < last)) * tolerance;
+            let way = ((turns[i] - turns[i - 1]).abs() - slack).max(0.0);
+            // The acceleration may be anything where it turns back.
+            if way * caps.acceleration <= caps.speed * caps.speed {
+                2.0 * (way / caps.acceleration).sqrt()
+            } else {
+                way / caps.speed + caps.speed / caps.acceleration
+            }
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ToolLimits;
+
+    fn bound(places: &[[f64; 2]], tolerance: f64) -> f64 {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            ..ToolLimits::UNLIMITED
+        };
+        let poses: Vec<_> = places
+            .iter()
+            .map(|[x, y]| Isometry3::translation(*x, *y, 0.0))
+            .collect();
+        lower_bound(&poses, &SmoothOptions::new(tolerance, limits).finite())
+    }
+
+    /// A straight line is known exactly: 0.1/0.5 + 0.5/5 + 0.05 s.
+    #[test]
+    fn exact_on_a_line() {
+        assert!((bound(&[[0.0, 0.0], [0.1, 0.0]], 1e-3) - 0.35).abs() < 1e-9);
+        assert_eq!(bound(&[[0.0, 0.0], [0.0, 0.0]], 1e-3), 0.0);
+    }
+
+    /// There and back: two ways of 99 mm between moments of standing still.
+    #[test]
+    fn turning_back_takes_time() {
+        let there_and_back = bound(&[[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]], 1e-3);
+        assert!((there_and_back - 2.0 * (0.099 / 0.5 + 0.1)).abs() < 1e-9);
+        // Within the tolerance nothing has to move at all.
+        assert_eq!(bound(&[[0.0, 0.0], [5e-4, 0.0], [0.0, 0.0]], 1e-3), 0.0);
+    }
+}
