@@ -20,6 +20,7 @@ mod spline_path;
 pub mod timing;
 mod trajectory;
 pub mod verify;
+mod wide;
 
 pub use error::TimingError;
 pub use extrema::JointPeaks;

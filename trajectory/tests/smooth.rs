@@ -139,7 +139,12 @@ fn passes_in_order(
         }
         // Nothing before has been a closest approach.
         let (mut high, mut low) = (distance(at), f64::INFINITY);
-        if high <= tolerance - slack {
+        if (high - tolerance).abs() <= slack {
+            // Whether it is within tolerance here cannot be told.
+            at = named;
+            continue;
+        }
+        if high < tolerance {
             low = high;
         }
         for time in times.iter().copied().filter(|t| *t > at && *t < named) {
@@ -252,12 +257,7 @@ fn check(
         .iter()
         .map(|p| p.translation.vector)
         .collect();
-    passes_in_order(
-        plan,
-        &times,
-        &goals,
-        options.tolerance * 1.001 + 1e-6 * options.limits.speed * 1e-2,
-    )
+    passes_in_order(plan, &times, &goals, options.tolerance)
 }
 
 fn report(seed: u64) -> Result<[f64; 2], String> {

@@ -16,7 +16,12 @@ const EFFORT: Effort = Effort {
     search: 72,
     spread: Some(1.0),
     gap: 3e-3,
+    most: f64::INFINITY,
 };
+
+/// An attempt that breaks a bound by more than this (its first, a later one)
+/// is not followed by another.
+const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// Spread of a start in motion that was too fast.
 const SPREAD: f64 = 1.2;
@@ -61,7 +66,7 @@ pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Mo
     if poses.len() < 3 {
         return stop;
     }
-    if let Some(spans) = spline(poses, options, None)
+    if let Some(spans) = spline(poses, options, None, stop.duration())
         && spans.last().map_or(0.0, Span::end) <= stop.duration()
     {
         return Motion::new(spans, Method::Spline);
@@ -86,23 +91,25 @@ pub(crate) fn from_motion(
     moving: &Moving,
     most: f64,
 ) -> Option<Motion> {
-    let spans = spline(poses, options, Some(moving))?;
+    let spans = spline(poses, options, Some(moving), most)?;
     (spans.last()?.end() <= most).then(|| Motion::new(spans, Method::Spline))
 }
 
-/// A certified spline; bounds that a first attempt breaks are narrowed for the
-/// next one.
+/// A certified spline of at most about `most` seconds; bounds that a first
+/// attempt breaks are narrowed for the next one.
 fn spline(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
     moving: Option<&Moving>,
+    most: f64,
 ) -> Option<Vec<Span>> {
     if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
         return None;
     }
     let mut inner = options.clone();
-    let (mut coupled, mut effort) = (None, EFFORT);
-    for attempt in 0..5 {
+    let full = Effort { most, ..EFFORT };
+    let (mut coupled, mut effort) = (None, full);
+    for attempt in 0..5_usize {
         let narrowed = inner.clone();
         let mut request = Request {
             poses,
@@ -116,7 +123,7 @@ fn spline(
             if moving.is_some() && effort.spread.is_some() {
                 effort.spread = effort.spread.filter(|x| *x < SPREAD).map(|_| SPREAD);
             } else if !request.coupled && request.moves()[1] {
-                (coupled, effort) = (Some(true), EFFORT);
+                (coupled, effort) = (Some(true), full);
             } else {
                 return None;
             }
@@ -131,10 +138,28 @@ fn spline(
         if certificate.holds() {
             return Some(spans);
         }
+        // Narrower bounds make it slower still.
+        let slow = spans.last().map_or(0.0, Span::end) > most;
+        let last = request.coupled || !request.moves()[1];
+        if last && (slow || broken(&certificate, &passes) > HOPELESS[attempt.min(1)]) {
+            return None;
+        }
         narrow(&mut inner, &certificate, &passes, request.coupled);
         coupled = Some(request.coupled || ((attempt == 1 || over > 1.3) && request.moves()[1]));
     }
     None
+}
+
+/// The greatest ratio of a quantity to its bound.
+fn broken(certificate: &Certificate, passes: &[Pass]) -> f64 {
+    let miss = |pass: &Pass| {
+        (pass.deviation / pass.tolerance).max(pass.angle / pass.angular_tolerance.max(RESOLUTION))
+    };
+    let bounds = [certificate.corridor.ratio, certificate.worst_limit()];
+    bounds
+        .into_iter()
+        .chain(passes.iter().map(miss))
+        .fold(0.0, f64::max)
 }
 
 /// Narrows the options by what a motion exceeded.

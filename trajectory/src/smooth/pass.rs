@@ -147,11 +147,11 @@ fn closest(
     options: &SmoothOptions,
 ) -> (usize, f64) {
     let goal = pose.translation.vector;
-    let noise = 1e-14 * (1.0 + goal.norm()) * options.limits.speed;
+    let rounding = 1e-14 * (1.0 + goal.norm());
     let mut search = Search {
         falling: false,
         near: options.tolerance + RESOLUTION,
-        noise,
+        noise: 0.0,
     };
     for (index, span) in spans.iter().enumerate().skip(at) {
         let from = (time - span.start).clamp(0.0, span.duration);
@@ -162,7 +162,11 @@ fn closest(
         for c in &mut position {
             *c -= goal;
         }
-        let product = poly::dot(&position, &span.velocity_control(from, span.duration));
+        let velocity = span.velocity_control(from, span.duration);
+        // Where the motion is slow, so is the change of the distance.
+        let speed = velocity.iter().map(Vector3::norm).fold(0.0, f64::max);
+        search.noise = rounding * speed;
+        let product = poly::dot(&position, &velocity);
         let found = search.first_rise(&product, &position, [from, span.duration]);
         if let Some(local) = found {
             return (index, span.start + local);

@@ -166,8 +166,8 @@ impl ToolCurve for SmoothPlan {
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     let plan = Windows::new(poses, options)?.finish();
     // What keeps half of the tolerance keeps all of it. A second motion costs
-    // little where poses are close to each other.
-    let costly = plan.spans.len() > SPANS_PER_POSE * poses.len();
+    // little where poses are close to each other and fit in one window.
+    let costly = plan.spans.len() > SPANS_PER_POSE * poses.len() || plan.parts.len() > 1;
     if costly || poses.len() <= SHORT || plan.method() != Method::Spline {
         return Ok(plan);
     }

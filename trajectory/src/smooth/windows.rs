@@ -17,9 +17,12 @@ use crate::line::body_turn;
 /// Longest part of a leg in one go, in time at full speed, s.
 const LONGEST: f64 = 1.0;
 
-/// Least and most of a window, in braking times.
+/// Least and most of a window, in braking times. The first one of a list that
+/// takes long is shorter, so that motion can start sooner.
 const LEAST_BRAKES: f64 = 8.0;
 const MOST_BRAKES: f64 = 16.0;
+const FIRST_BRAKES: f64 = 4.0;
+const LONG_BRAKES: f64 = 64.0;
 
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
@@ -192,9 +195,18 @@ impl Windows {
     fn window(&self, from: usize) -> usize {
         let (mut end, mut time) = (from, 0.0);
         let most = MOST_BRAKES * self.brake();
+        let legs = self.poses.windows(2);
+        let whole = || {
+            legs.map(|leg| full_speed(&leg[0], &leg[1], &self.options))
+                .sum::<f64>()
+        };
+        let least = if from == 0 && whole() > LONG_BRAKES * self.brake() {
+            FIRST_BRAKES
+        } else {
+            LEAST_BRAKES
+        };
         while end + 1 < self.poses.len() && end - from < MOST_POSES {
-            let enough =
-                end - from >= self.options.window.max(2) && time >= LEAST_BRAKES * self.brake();
+            let enough = end - from >= self.options.window.max(2) && time >= least * self.brake();
             if end - from >= 3 && (enough || time >= most) {
                 break;
             }
@@ -319,4 +331,58 @@ fn divided(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f
         result.push(*pose);
     }
     result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ToolLimits;
+
+    /// What planning a zigzag in windows asks for.
+    #[derive(Debug, Default)]
+    struct Tally {
+        windows: usize,
+        /// Poses of all windows, and of the largest.
+        poses: usize,
+        largest: usize,
+        /// Most spans that are planned and not committed.
+        waiting: usize,
+    }
+
+    fn tally(count: u32) -> Tally {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            ..ToolLimits::UNLIMITED
+        };
+        let poses: Vec<_> = (0..count)
+            .map(|i| Isometry3::translation(0.01 * f64::from(i), 0.002 * f64::from(i % 2), 0.0))
+            .collect();
+        let mut windows = Windows::new(&poses, &SmoothOptions::new(1e-3, limits)).unwrap();
+        let mut tally = Tally::default();
+        let mut since = 0;
+        while windows.advance() {
+            let poses = windows.end - since;
+            tally.windows += 1;
+            tally.poses += poses;
+            tally.largest = tally.largest.max(poses);
+            tally.waiting = tally.waiting.max(windows.tail.spans.len());
+            since = windows.passed;
+        }
+        assert!(windows.finish().certificate().holds());
+        tally
+    }
+
+    /// Four times the poses are four times the windows, none of them larger, and
+    /// no more is planned ahead.
+    #[test]
+    fn cost_is_linear() {
+        let (short, long) = (tally(150), tally(600));
+        assert!(short.windows > 2, "{short:?}");
+        assert!(long.windows <= 4 * short.windows + 1, "{short:?} {long:?}");
+        assert!(long.poses <= 4 * short.poses + 60, "{short:?} {long:?}");
+        assert!(long.largest <= short.largest + 5, "{short:?} {long:?}");
+        assert!(long.waiting <= short.waiting + 20, "{short:?} {long:?}");
+    }
 }

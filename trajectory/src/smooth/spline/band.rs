@@ -1,17 +1,33 @@
 //! Symmetric positive definite systems with a narrow band.
 
+use crate::wide::{Four, LANES, Op, Wide};
+
 /// A symmetric band matrix, lower half, by columns: entry `[c][k]` is row
-/// `c + k`, column `c`. `B` is the number of diagonals of the lower half.
+/// `c + k`, column `c`. `B` is a multiple of [`LANES`], and the last
+/// [`SPARE`] of the `B` diagonals stay zero.
 #[derive(Clone, Debug)]
 pub(crate) struct Band<const B: usize> {
     pub(crate) columns: Vec<[f64; B]>,
+    wide: Wide,
 }
+
+/// Diagonals that stay zero.
+pub(crate) const SPARE: usize = 3;
+
+/// Columns eliminated together: each later number is read and written once for
+/// all of them, and always at the same place of a register.
+const PANEL: usize = LANES;
+
+/// Length of a panel column with zeros after it, for `B` up to 36.
+const ROOM: usize = 48;
 
 impl<const B: usize> Band<B> {
     /// A zero matrix of `size` rows.
     pub(crate) fn zeros(size: usize) -> Self {
+        const { assert!(B.is_multiple_of(LANES) && B + PANEL + LANES < ROOM) };
         Self {
             columns: vec![[0.0; B]; size],
+            wide: Wide::detect(),
         }
     }
 
@@ -24,62 +40,181 @@ impl<const B: usize> Band<B> {
     /// diagonal in place of the diagonal. False when the matrix is not positive
     /// definite.
     ///
-    /// Right-looking by columns, so that the inner loop is a sum of vectors and
-    /// not a dot product: it runs in vector registers without reordering sums.
-    ///
     /// # Source
     /// G. Golub, C. Van Loan, "Matrix Computations", 4th edition 2013, 4.3.5.
     pub(crate) fn factor(&mut self) -> bool {
-        let size = self.columns.len();
-        for c in 0..size {
-            let (done, rest) = self.columns.split_at_mut(c + 1);
-            let Some(column) = done.last_mut() else {
+        self.wide.run(Factor(&mut self.columns))
+    }
+
+    /// Solves with the factor, in place, for `M` right-hand sides at once, each
+    /// followed by `B` zeros or more.
+    pub(crate) fn solve<const M: usize>(&self, x: [&mut [f64]; M]) {
+        self.wide.run(Solve(&self.columns, x));
+    }
+}
+
+/// [`Band::factor`].
+struct Factor<'a, const B: usize>(&'a mut [[f64; B]]);
+
+impl<const B: usize> Op for Factor<'_, B> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> bool {
+        let mut rest = self.0;
+        let mut panel = [[0.0; ROOM]; PANEL];
+        while !rest.is_empty() {
+            let (columns, after) = rest.split_at_mut(PANEL.min(rest.len()));
+            if !eliminate(simd, columns, &mut panel) {
                 return false;
-            };
-            let pivot = column[0];
-            if pivot <= 0.0 || !pivot.is_finite() {
-                return false;
             }
-            let inverse = 1.0 / pivot.sqrt();
-            column[0] = inverse;
-            for value in &mut column[1..] {
-                *value *= inverse;
+            let reach = (B - SPARE - 1).min(after.len());
+            for (d, column) in after[..reach].iter_mut().enumerate() {
+                subtract(simd, column, &panel, d + 1);
             }
-            let reach = (B - 1).min(rest.len());
-            for (k, below) in rest[..reach].iter_mut().enumerate() {
-                let factor = column[k + 1];
-                for (target, value) in below.iter_mut().zip(&column[k + 1..]) {
-                    *target -= factor * value;
-                }
-            }
+            rest = after;
         }
         true
     }
+}
 
-    /// Solves with the factor, in place, for `M` right-hand sides at once.
-    pub(crate) fn solve<const M: usize>(&self, x: &mut [[f64; M]]) {
-        let size = self.columns.len().min(x.len());
-        for c in 0..size {
-            let column = &self.columns[c];
-            let (head, tail) = x.split_at_mut(c + 1);
-            let pivot = head[c].map(|value| value * column[0]);
-            head[c] = pivot;
-            for (target, factor) in tail.iter_mut().zip(&column[1..]) {
-                for m in 0..M {
-                    target[m] -= factor * pivot[m];
+/// Factors the columns of one panel, and copies them into `panel`.
+#[inline(always)]
+fn eliminate<S: Four, const B: usize>(
+    simd: S,
+    columns: &mut [[f64; B]],
+    panel: &mut [[f64; ROOM]; PANEL],
+) -> bool {
+    for (j, column) in columns.iter_mut().enumerate() {
+        for (i, done) in panel[..j].iter().enumerate() {
+            let (factor, done) = (simd.splat(done[j - i]), &done[j - i..]);
+            for (to, from) in lanes(column).zip(done.chunks_exact(LANES)) {
+                let product = simd.mul(factor, simd.load(from));
+                simd.store(simd.sub(simd.load(to), product), to);
+            }
+        }
+        let pivot = column[0];
+        if pivot <= 0.0 || !pivot.is_finite() {
+            return false;
+        }
+        let inverse = 1.0 / pivot.sqrt();
+        let factor = simd.splat(inverse);
+        for (to, copy) in lanes(column).zip(panel[j].chunks_exact_mut(LANES)) {
+            simd.store(simd.mul(factor, simd.load(to)), to);
+            simd.store(simd.load(to), copy);
+        }
+        column[0] = inverse;
+    }
+    true
+}
+
+/// Subtracts a panel's part from the column that comes `d` after its last.
+#[inline(always)]
+fn subtract<S: Four, const B: usize>(
+    simd: S,
+    column: &mut [f64; B],
+    [a, b, c, e]: &[[f64; ROOM]; PANEL],
+    d: usize,
+) {
+    let (a, b, c, e) = (&a[d + 3..], &b[d + 2..], &c[d + 1..], &e[d..]);
+    let factors = [a[0], b[0], c[0], e[0]].map(|x| simd.splat(x));
+    let count = (B - SPARE - d).div_ceil(LANES);
+    for (q, to) in lanes(column).take(count).enumerate() {
+        let at = q * LANES;
+        let mut value = simd.load(to);
+        value = simd.sub(value, simd.mul(factors[0], simd.load(&a[at..])));
+        value = simd.sub(value, simd.mul(factors[1], simd.load(&b[at..])));
+        value = simd.sub(value, simd.mul(factors[2], simd.load(&c[at..])));
+        value = simd.sub(value, simd.mul(factors[3], simd.load(&e[at..])));
+        simd.store(value, to);
+    }
+}
+
+/// A column in groups of four.
+#[inline(always)]
+fn lanes<const B: usize>(column: &mut [f64; B]) -> std::slice::ChunksExactMut<'_, f64> {
+    column.chunks_exact_mut(LANES)
+}
+
+/// [`Band::solve`].
+struct Solve<'a, const B: usize, const M: usize>(&'a [[f64; B]], [&'a mut [f64]; M]);
+
+impl<const B: usize, const M: usize> Op for Solve<'_, B, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) {
+        let Self(columns, mut x) = self;
+        for (p, panel) in columns.chunks(PANEL).enumerate() {
+            forward(simd, panel, &mut x, p * PANEL);
+        }
+        for (p, panel) in columns.chunks(PANEL).enumerate().rev() {
+            backward(simd, panel, &mut x, p * PANEL);
+        }
+    }
+}
+
+/// Solves for the unknowns of one panel and takes them out of the rows below.
+#[inline(always)]
+fn forward<S: Four, const B: usize, const M: usize>(
+    simd: S,
+    panel: &[[f64; B]],
+    x: &mut [&mut [f64]; M],
+    at: usize,
+) {
+    for x in x.iter_mut() {
+        let mut known = [0.0; PANEL];
+        for (j, column) in panel.iter().enumerate() {
+            let mut value = x[at + j];
+            for i in 0..j {
+                value -= panel[i][j - i] * known[i];
+            }
+            known[j] = value * column[0];
+            x[at + j] = known[j];
+        }
+        let Ok(panel) = <&[[f64; B]; PANEL]>::try_from(panel) else {
+            // No rows are left below a panel that is not full.
+            continue;
+        };
+        let factors = known.map(|x| simd.splat(x));
+        let below = &mut x[at + PANEL..at + B];
+        for (q, to) in below.chunks_exact_mut(LANES).enumerate() {
+            let mut value = simd.load(to);
+            for j in 0..PANEL {
+                let column = &panel[j][PANEL - j + q * LANES..];
+                value = simd.sub(value, simd.mul(factors[j], simd.load(column)));
+            }
+            simd.store(value, to);
+        }
+    }
+}
+
+/// Solves for the unknowns of one panel with those of the rows below.
+#[inline(always)]
+fn backward<S: Four, const B: usize, const M: usize>(
+    simd: S,
+    panel: &[[f64; B]],
+    x: &mut [&mut [f64]; M],
+    at: usize,
+) {
+    for x in x.iter_mut() {
+        let mut sums = [simd.splat(0.0); PANEL];
+        if let Ok(panel) = <&[[f64; B]; PANEL]>::try_from(panel) {
+            let below = &x[at + PANEL..at + B];
+            for (q, from) in below.chunks_exact(LANES).enumerate() {
+                let value = simd.load(from);
+                for j in 0..PANEL {
+                    let column = &panel[j][PANEL - j + q * LANES..];
+                    sums[j] = simd.add(sums[j], simd.mul(value, simd.load(column)));
                 }
             }
         }
-        for c in (0..size).rev() {
-            let column = &self.columns[c];
-            let (head, tail) = x.split_at_mut(c + 1);
-            let mut sum = head[c];
-            for (value, factor) in tail.iter().zip(&column[1..]) {
-                for m in 0..M {
-                    sum[m] -= factor * value[m];
-                }
+        for j in (0..panel.len()).rev() {
+            let mut value = x[at + j] - simd.sum(sums[j]);
+            for k in j + 1..panel.len() {
+                value -= panel[j][k - j] * x[at + k];
             }
-            head[c] = sum.map(|value| value * column[0]);
+            x[at + j] = value * panel[j][0];
         }
     }
 }
@@ -88,11 +223,17 @@ impl<const B: usize> Band<B> {
 mod tests {
     use super::*;
 
-    /// The solution of a random banded system solves it.
+    /// The solution of a random banded system solves it, in both builds alike.
     #[test]
     fn solves() {
-        const B: usize = 5;
-        let size = 40;
+        solves_with::<8>(5, 40);
+        solves_with::<20>(15, 3 * 31);
+        solves_with::<20>(15, 3);
+        solves_with::<36>(30, 6 * 17);
+        assert!(!Band::<8>::zeros(3).factor());
+    }
+
+    fn solves_with<const B: usize>(diagonals: usize, size: usize) {
         let mut state = 1_u64;
         let mut random = || {
             state = state
@@ -101,30 +242,38 @@ mod tests {
             (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
         };
         let mut band = Band::<B>::zeros(size);
-        for column in &mut band.columns {
-            for value in column.iter_mut() {
+        for (c, column) in band.columns.iter_mut().enumerate() {
+            for value in column.iter_mut().take(diagonals.min(size - c)) {
                 *value = random();
             }
-            column[0] = 6.0;
+            column[0] = diagonals as f64;
         }
         let matrix = band.clone();
-        let wanted: Vec<[f64; 2]> = (0..size).map(|_| [random(), random()]).collect();
-        let mut x = vec![[0.0; 2]; size];
-        for c in 0..size {
-            for k in 0..B.min(size - c) {
-                for m in 0..2 {
-                    x[c + k][m] += matrix.columns[c][k] * wanted[c][m];
+        let wanted: [Vec<f64>; 2] = [0, 1].map(|_| (0..size).map(|_| random()).collect());
+        let mut sides = [0, 1].map(|_| vec![0.0; size + B]);
+        for m in 0..2 {
+            for c in 0..size {
+                for k in 0..diagonals.min(size - c) {
+                    sides[m][c + k] += matrix.columns[c][k] * wanted[m][c];
                     if k > 0 {
-                        x[c][m] += matrix.columns[c][k] * wanted[c + k][m];
+                        sides[m][c] += matrix.columns[c][k] * wanted[m][c + k];
                     }
                 }
             }
         }
-        assert!(band.factor());
-        band.solve(&mut x);
-        for (got, wanted) in x.iter().zip(&wanted) {
-            assert!((got[0] - wanted[0]).abs() < 1e-12 && (got[1] - wanted[1]).abs() < 1e-12);
+        let solve = |mut band: Band<B>| {
+            let [mut x, mut y] = sides.clone();
+            assert!(band.factor());
+            band.solve([&mut x, &mut y]);
+            [x, y]
+        };
+        let x = solve(band.clone());
+        band.wide = Wide::plain();
+        assert_eq!(x, solve(band));
+        for m in 0..2 {
+            for (got, wanted) in x[m].iter().zip(&wanted[m]) {
+                assert!((got - wanted).abs() < 1e-12);
+            }
         }
-        assert!(!Band::<B>::zeros(3).factor());
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::basis::{self, START};
-use super::problem::{Group, Point, Problem};
+use super::problem::{Group, Point, Problem, ways};
 use super::solve::{Effort, solve};
 use super::start;
 use crate::ToolPoint;
@@ -82,10 +82,10 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
         moving: request.moving,
     };
     match request.moves() {
-        [true, false] => task.run::<3, 15>([true, false]),
-        [true, true] if !request.coupled => task.run::<3, 15>([true, false]),
-        [false, true] => task.run::<3, 15>([false, true]),
-        [true, true] => task.run::<6, 30>([true, true]),
+        [true, false] => task.run::<3, 20>([true, false]),
+        [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
+        [false, true] => task.run::<3, 20>([false, true]),
+        [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
     }
 }
@@ -190,6 +190,7 @@ impl Task<'_> {
         }
         let mut problem = Problem {
             groups: self.groups(used),
+            ways: ways(&vertices),
             vertices,
             start: begin,
             scale: 1.0,
@@ -308,9 +309,9 @@ impl Task<'_> {
             while leg < end && point.passes[leg - 1] <= time {
                 leg += 1;
             }
-            let (at, share) = problem.nearest(&[c[0], c[1], c[2]], leg, 0);
-            let turn = (self.vectors[at] - self.vectors[at - 1]) * share;
-            result.push(self.poses[at - 1].rotation * UnitQuaternion::from_scaled_axis(turn));
+            let foot = problem.nearest(&[c[0], c[1], c[2]], leg, 0);
+            let turn = (self.vectors[foot.leg] - self.vectors[foot.leg - 1]) * foot.share;
+            result.push(self.poses[foot.leg - 1].rotation * UnitQuaternion::from_scaled_axis(turn));
         }
         let Some(moving) = self.moving else {
             return result;

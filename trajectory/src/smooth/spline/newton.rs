@@ -5,7 +5,7 @@ use super::basis::{FIRST, SECOND, THIRD, weights};
 use super::problem::{Point, Problem, Room, part, sample_weights, square};
 
 /// Gradient and Hessian of the barrier: a band for the control points, one
-/// border column for `z`. `B = 5 D` diagonals.
+/// border column for `z`. `B` is `5 D` and the spare diagonals of [`Band`].
 pub(crate) struct System<const D: usize, const B: usize> {
     band: Band<B>,
     /// Gradient and border, side by side.
@@ -90,7 +90,7 @@ impl<const D: usize> Barrier<'_, D> {
             if self.problem.groups[g].width.is_finite() {
                 for k in 0..point.samples() {
                     let place = point.sample(k, g);
-                    let away = self.problem.offset(&place, self.room.legs[k], g).0;
+                    let away = self.problem.nearest(&place, self.room.legs[k], g).offset;
                     if !slacks.take(square(&away), self.room.widths[g][k].powi(2)) {
                         return None;
                     }
@@ -159,12 +159,16 @@ impl<const D: usize, const B: usize> System<D, B> {
         if !self.band.factor() {
             return None;
         }
-        let before: Vec<[f64; 2]> = self.sides.clone();
-        self.band.solve(&mut self.sides);
+        let [mut along, mut border] = [0, 1].map(|m| {
+            let values = self.sides.iter().map(|side| side[m]);
+            values.chain([0.0; B]).collect::<Vec<_>>()
+        });
+        self.band.solve([&mut along, &mut border]);
+        let solved = self.sides.iter().zip(along.iter().zip(&border));
         let (mut cross, mut bent) = (0.0, 0.0);
-        for (old, new) in before.iter().zip(&self.sides) {
-            cross += old[1] * new[0];
-            bent += old[1] * new[1];
+        for (side, (along, border)) in solved.clone() {
+            cross += side[1] * along;
+            bent += side[1] * border;
         }
         let pivot = self.hessian_z - bent;
         if pivot <= 0.0 || pivot.is_nan() {
@@ -173,9 +177,9 @@ impl<const D: usize, const B: usize> System<D, B> {
         let z = -(self.gradient_z - cross) / pivot;
         let mut slope = self.gradient_z * z;
         let mut control = Vec::with_capacity(self.sides.len());
-        for (old, new) in before.iter().zip(&self.sides) {
-            let step = -new[0] - new[1] * z;
-            slope += old[0] * step;
+        for (side, (along, border)) in solved {
+            let step = -along - border * z;
+            slope += side[0] * step;
             control.push(step);
         }
         (slope < 0.0 && slope.is_finite()).then_some(Step {
@@ -238,7 +242,8 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// Corridor samples of one group.
     fn corridor(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
         for k in 0..point.samples() {
-            let (y, slide) = problem.offset(&point.sample(k, g), room.legs[k], g);
+            let foot = problem.nearest(&point.sample(k, g), room.legs[k], g);
+            let (y, slide) = (foot.offset, problem.slide(&foot, g));
             let width = room.widths[g][k];
             let slack = 1.0 / (width * width - square(&y));
             let gradient = y.map(|x| 2.0 * x * slack);

@@ -27,6 +27,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) groups: [Group; 2],
     /// Corners of the way: start of the first leg, inner poses, goal.
     pub(crate) vertices: Vec<[f64; D]>,
+    /// The legs between them, by group; see [`ways`].
+    pub(crate) ways: [Vec<Way>; 2],
     /// Position, velocity, acceleration and jerk at the start.
     pub(crate) start: [[f64; D]; 4],
     /// Knot spacing at `z = 1`, s.
@@ -120,54 +122,46 @@ impl<const D: usize> Problem<D> {
         ]
     }
 
-    /// Nearest point of the way near a leg: its leg and share of that leg.
+    /// Offset of a point of group `g` from the nearest point of the way near a
+    /// leg, and where that is.
     ///
     /// Starts at the leg and moves on to the next or back to the one before
     /// while the nearest point is at the end of a leg and that helps: motion
     /// along a finely divided way is not held up by its division.
-    pub(crate) fn nearest(&self, point: &[f64; 3], leg: usize, g: usize) -> (usize, f64) {
-        let (mut best, mut share) = self.on(point, leg, g);
-        let mut at = leg;
+    #[inline]
+    pub(crate) fn nearest(&self, point: &[f64; 3], leg: usize, g: usize) -> Foot {
+        let ways = &self.ways[g];
+        let mut best = ways[leg - 1].foot(point, leg);
         for _ in 0..8 {
-            let next = if share <= 0.0 {
-                at - 1
-            } else if share >= 1.0 {
-                at + 1
+            let next = if best.share <= 0.0 {
+                best.leg - 1
+            } else if best.share >= 1.0 {
+                best.leg + 1
             } else {
                 break;
             };
-            if next < 1 || next >= self.vertices.len() {
+            if next < 1 || next > ways.len() {
                 break;
             }
-            let (other, there) = self.on(point, next, g);
-            if square(&other) >= square(&best) {
+            let other = ways[next - 1].foot(point, next);
+            if square(&other.offset) >= square(&best.offset) {
                 break;
             }
-            (best, share, at) = (other, there, next);
+            best = other;
         }
-        (at, share)
+        best
     }
 
-    /// Offset of a point of group `g` from the nearest point of the way near a
-    /// leg, and the direction along which that nearest point slides.
-    pub(crate) fn offset(&self, point: &[f64; 3], leg: usize, g: usize) -> ([f64; 3], [f64; 3]) {
-        let (at, share) = self.nearest(point, leg, g);
-        let (from, to) = (part(&self.vertices[at - 1], g), part(&self.vertices[at], g));
-        let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
-        let free = if share > 0.0 && share < 1.0 {
-            1.0 / square(&way).sqrt()
+    /// Direction along which the nearest point of the way slides; zero at a
+    /// corner.
+    pub(crate) fn slide(&self, foot: &Foot, g: usize) -> [f64; 3] {
+        let way = &self.ways[g][foot.leg - 1];
+        let free = if foot.share > 0.0 && foot.share < 1.0 {
+            way.inverse.sqrt()
         } else {
             0.0
         };
-        (self.on(point, at, g).0, way.map(|x| x * free))
-    }
-
-    fn on(&self, point: &[f64; 3], leg: usize, g: usize) -> ([f64; 3], f64) {
-        offset(
-            point,
-            &part(&self.vertices[leg - 1], g),
-            &part(&self.vertices[leg], g),
-        )
+        way.way.map(|x| x * free)
     }
 
     /// Barrier parameter: twice the number of norm constraints.
@@ -255,22 +249,58 @@ pub(crate) fn part<const D: usize>(x: &[f64; D], g: usize) -> [f64; 3] {
     [x[3 * g], x[3 * g + 1], x[3 * g + 2]]
 }
 
-/// Offset of a point from the nearest point of a segment, and the share of the
-/// segment where that is.
-fn offset(point: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> ([f64; 3], f64) {
-    let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
-    let off = [point[0] - from[0], point[1] - from[1], point[2] - from[2]];
-    let length = square(&way);
-    if length <= 0.0 {
-        return (off, 1.0);
-    }
-    let share = ((off[0] * way[0] + off[1] * way[1] + off[2] * way[2]) / length).clamp(0.0, 1.0);
-    (
-        [
+/// One leg in one group.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    from: [f64; 3],
+    way: [f64; 3],
+    /// 1 / length squared; zero for a leg of no length.
+    inverse: f64,
+}
+
+/// The point of the way nearest to a given one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Foot {
+    /// Offset of the given point from it.
+    pub(crate) offset: [f64; 3],
+    /// Its leg (index of the far vertex), and the share of that leg.
+    pub(crate) leg: usize,
+    pub(crate) share: f64,
+}
+
+/// The legs between vertices, by group.
+pub(crate) fn ways<const D: usize>(vertices: &[[f64; D]]) -> [Vec<Way>; 2] {
+    [0, 1].map(|g| {
+        let pairs = vertices.windows(2).filter(|_| 3 * g < D);
+        pairs
+            .map(|pair| {
+                let (from, to) = (part(&pair[0], g), part(&pair[1], g));
+                let way = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
+                let length = square(&way);
+                let inverse = if length > 0.0 { 1.0 / length } else { 0.0 };
+                Way { from, way, inverse }
+            })
+            .collect()
+    })
+}
+
+impl Way {
+    /// The nearest point of this leg, which is `leg` in the list.
+    #[inline]
+    fn foot(&self, point: &[f64; 3], leg: usize) -> Foot {
+        let (from, way) = (&self.from, &self.way);
+        let off = [point[0] - from[0], point[1] - from[1], point[2] - from[2]];
+        let along = off[0] * way[0] + off[1] * way[1] + off[2] * way[2];
+        let share = if self.inverse > 0.0 {
+            (along * self.inverse).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        let offset = [
             off[0] - share * way[0],
             off[1] - share * way[1],
             off[2] - share * way[2],
-        ],
-        share,
-    )
+        ];
+        Foot { offset, leg, share }
+    }
 }

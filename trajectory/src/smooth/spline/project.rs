@@ -212,5 +212,5 @@ fn away<const D: usize>(
     g: usize,
     leg: usize,
 ) -> f64 {
-    square(&problem.offset(&point.sample(k, g), leg, g).0).sqrt()
+    square(&problem.nearest(&point.sample(k, g), leg, g).offset).sqrt()
 }

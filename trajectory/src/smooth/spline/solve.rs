@@ -18,6 +18,9 @@ pub(crate) struct Effort {
     pub(crate) spread: Option<f64>,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
+    /// Time (s) that is of no use any more: an iterate is given up when its
+    /// optimum is above that.
+    pub(crate) most: f64,
 }
 
 /// Growth of the weight on `z` at each centre.
@@ -27,6 +30,10 @@ const GROWTH: f64 = 8.0;
 /// between walls far from its centre: the weight is then lowered, once.
 const SHORT: f64 = 0.1;
 const STUCK: usize = 4;
+
+/// Square of a Newton decrement from which steps are cut short for good reason:
+/// the weight has just been raised.
+const LOW: f64 = 100.0;
 
 /// Steps between two narrowings of widened bounds: the steps between take the
 /// iterate well inside, so that each narrowing is a large one.
@@ -48,14 +55,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     effort: Effort,
 ) -> Option<usize> {
     let mut system = System::<D, B>::new(point.control.len());
-    if effort.spread.is_some() && problem.moving() {
-        problem.anchor = Some(point.z);
-    }
-    problem.pin(point);
-    project(problem, point, None, 20);
-    if problem.anchor.is_some() || !problem.moving() {
-        slow_down(problem, point);
-    }
+    begin(problem, point, effort);
     let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
@@ -79,25 +79,30 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         };
         let share = search(problem, point, &room, weight, &step);
         let moved = share > 0.0;
-        short = if tight && share < SHORT { short + 1 } else { 0 };
+        short = if tight && share < SHORT && step.decrement < LOW {
+            short + 1
+        } else {
+            0
+        };
         if short == STUCK && !freed {
             (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
         }
         let centred = step.decrement < 3.0;
         if !moved || centred {
+            let least = (point.z - parameter / weight).max(0.0);
+            if done && point.spans() as f64 * problem.spacing(least) > effort.most {
+                return None;
+            }
             if tight && parameter / weight <= effort.gap * point.z {
                 return done.then_some(count);
             }
             if !tight {
-                let stuck = since == 0 && !moved;
-                if stuck {
-                    return None;
+                if since == 0 && !moved {
+                    return None; // Stuck.
                 }
-                since = if step.decrement < 0.1 || !moved {
-                    PATIENCE
-                } else {
-                    since
-                };
+                if step.decrement < 0.1 || !moved {
+                    since = PATIENCE;
+                }
             } else {
                 weight *= GROWTH;
                 weight = weight.min(1.01 * parameter / (effort.gap * point.z));
@@ -105,6 +110,18 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
     }
     (tight && problem.anchor.is_none()).then_some(effort.steps)
+}
+
+/// Brings a first iterate to where the descent can begin.
+fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort: Effort) {
+    if effort.spread.is_some() && problem.moving() {
+        problem.anchor = Some(point.z);
+    }
+    problem.pin(point);
+    project(problem, point, None, 20);
+    if problem.anchor.is_some() || !problem.moving() {
+        slow_down(problem, point);
+    }
 }
 
 /// Raises `z` until speed, acceleration and jerk hold with room to spare.

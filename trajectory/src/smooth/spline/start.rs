@@ -339,7 +339,7 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     }
     let offset = |place: &[f64; D], k: usize, g: usize| {
         let place = [place[3 * g], place[3 * g + 1], place[3 * g + 2]];
-        let (away, _) = problem.offset(&place, legs[k], g);
+        let away = problem.nearest(&place, legs[k], g).offset;
         (away, square(&away).sqrt())
     };
     // A start in motion may be farther away than that.
