@@ -4,7 +4,7 @@
 //! together (a fold: elbow straight, wrist straight), both seeds may fall on the same
 //! one or on none; then the other is looked for across the fold.
 
-use super::closed::Closed;
+use super::closed::{Closed, Raw};
 use super::goal::Goal;
 use super::numeric::Stop;
 use super::report::{Branches, Solution};
@@ -12,7 +12,7 @@ use super::{LENGTH, Solver, turns};
 use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// Smallest singular value below which a twin across a fold is looked for.
-const FOLD: f64 = 0.15;
+const FOLD: f64 = 0.3;
 /// Step along the fold when its middle is all that is known, rad.
 const ASIDE: f64 = 0.15;
 
@@ -26,26 +26,44 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         parameter: f64,
     ) -> Branches<N> {
-        let raw = self.raw(closed, pose, parameter, seed);
-        let mut found = Branches::new();
+        let mut raw = Raw::none();
+        self.branch(closed, (pose, parameter), seed, &mut raw);
+        // All that are found, beyond the limits too: a branch outside must not look lost.
+        let mut all = Branches::new();
+        let mut apart = 0;
         for id in 0..8_u8 {
             let Some(q) = raw.any(id) else {
                 continue;
             };
             match self.polished(pose, &q) {
-                Some(q) => self.add(&mut found, &q, id, seed),
+                Some(q) => apart += u8::from(self.add(&mut all, &q, id)),
                 None => {
                     let (along, _) = self.fold(&q);
                     for step in [ASIDE, -ASIDE] {
                         if let Some(q) = self.polished(pose, &(q + along * step)) {
-                            self.add(&mut found, &q, id, seed);
+                            self.add(&mut all, &q, id);
                         }
                     }
                 }
             }
         }
-        for index in 0..found.len() {
-            let Some(solution) = found.get(index).copied() else {
+        if apart < 8 {
+            self.add_twins(pose, &mut all);
+        }
+        let mut found = Branches::new();
+        for solution in &all {
+            let q = turns::nearest(&self.chain, &solution.q, seed);
+            if self.chain.within_limits(&q, 0.0) {
+                found.push(Solution { q, ..*solution });
+            }
+        }
+        found
+    }
+
+    /// Looks across every fold that is near for a branch that is not there yet.
+    fn add_twins(&self, pose: &Isometry3<f64>, all: &mut Branches<N>) {
+        for index in 0..all.len() {
+            let Some(solution) = all.get(index).copied() else {
                 continue;
             };
             let (along, smallest) = self.fold(&solution.q);
@@ -54,23 +72,22 @@ impl<const N: usize> Solver<N> {
             }
             let twin = solution.q + along * self.across(&solution.q, &along, smallest);
             if let Some(q) = self.polished(pose, &twin) {
-                let id = solution.branch.unwrap_or(0);
-                self.add(&mut found, &q, id, seed);
+                self.add(all, &q, solution.branch.unwrap_or(0));
             }
         }
-        found
     }
 
-    /// Adds a joint position that is inside the limits and new.
-    fn add(&self, found: &mut Branches<N>, q: &SVector<f64, N>, id: u8, seed: &SVector<f64, N>) {
-        let q = turns::nearest(&self.chain, q, seed);
-        let known = |other: &Solution<N>| turns::distance(&self.chain, &other.q, &q) < 1e-6;
-        if self.chain.within_limits(&q, 0.0) && !found.iter().any(known) {
-            found.push(Solution {
-                q,
+    /// Adds a joint position that is new; whether it was.
+    fn add(&self, all: &mut Branches<N>, q: &SVector<f64, N>, id: u8) -> bool {
+        let known = |other: &Solution<N>| turns::distance(&self.chain, &other.q, q) < 1e-6;
+        let new = !all.iter().any(known);
+        if new {
+            all.push(Solution {
+                q: *q,
                 branch: Some(id),
             });
         }
+        new
     }
 
     /// Brings a near branch onto the pose; `None` where it does not get there.
