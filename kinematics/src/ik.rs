@@ -11,6 +11,7 @@ mod polish;
 mod product;
 mod report;
 mod six;
+mod solving;
 mod swivel;
 mod turns;
 
