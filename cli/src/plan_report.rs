@@ -109,6 +109,6 @@ impl PlanReport {
 }
 
 /// A number with its noun.
-fn counted(count: usize, name: &str) -> String {
+pub(crate) fn counted(count: usize, name: &str) -> String {
     format!("{count} {name}{}", if count == 1 { "" } else { "s" })
 }

@@ -140,6 +140,7 @@ fn plans_are_checked() {
         (0, 0),
         "{found}"
     );
+    let found_own = found;
     let folder = tempfile::tempdir().unwrap();
     if let Some(work) = document(folder.path()) {
         let ran = canter([
@@ -161,6 +162,25 @@ fn plans_are_checked() {
         let counts = names.map(|name| count(&found, name));
         assert_eq!(counts, [5, 1, 17, 97, 13, 0], "{found}");
         assert_eq!(ran.code, 0);
+    }
+    // The same plan in its other forms.
+    for form in ["block", "json"] {
+        let other = folder.path().join(form);
+        std::fs::write(&other, canter(["plan-check", PLAN, "--to", form]).stdout).unwrap();
+        let ran = canter([
+            "plan-check",
+            other.to_str().unwrap(),
+            "--world",
+            WORLD,
+            "--json",
+        ]);
+        let (found, names) = (
+            report(&ran),
+            ["statements", "variables", "errors", "warnings"],
+        );
+        let counts = names.map(|name| count(&found, name));
+        let own = names.map(|name| count(&found_own, name));
+        assert_eq!(counts, own, "{form}: {found}");
     }
     let bad = folder.path().join("bad.plan");
     let text = std::fs::read_to_string(repository::root().join(PLAN)).unwrap();
