@@ -127,6 +127,29 @@ fn database_round_trip() {
     );
 }
 
+/// A world that replaces another is not taken for the one that a run was made in.
+#[test]
+fn runs_go_with_their_world() {
+    let text = crate::fixtures::repository_text("examples/kitting/workstation.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = Writer::open(&folder.path().join("w.db"), Durability::Process).unwrap();
+    writer.replace(&import_toml(&text).unwrap()).unwrap();
+    let mut run = plan::world::StoredRun {
+        id: 0,
+        plan: "p".into(),
+        source: "(greet robot_1)".into(),
+        parameters: "{}".into(),
+        stock: "{}".into(),
+        state: "{}".into(),
+        outcome: None,
+        under_way: None,
+    };
+    run.id = writer.begin_run(&run).unwrap();
+    assert_eq!(writer.last_run().unwrap(), Some(run));
+    writer.replace(&import_toml(&text).unwrap()).unwrap();
+    assert_eq!(writer.last_run().unwrap(), None);
+}
+
 /// A commit with one impossible change changes nothing.
 #[test]
 fn commits_are_whole() {
