@@ -93,7 +93,7 @@ fn bad_plans_fail_where_they_should() {
         g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_3.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
         g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt in g2g3-2013-2014/domain-kitting.pddl: step 1, (attach-endeffector robot_1 tray_gripper tray_gripper_holder changing_station_1): the precondition (endeffectorholder-has-endeffector tray_gripper_holder tray_gripper) is false
         g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt.1 in g2g3-2013-2014/domain-fluents.pddl: step 8, (take-part robot_1 part_c_1 part_c_tray part_gripper work_table_1 kit_a2b1c1): take-part takes 4 objects, not 6
-        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): (grasp-set-flag) has no value
+        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): the effect (increase (grasp-set-flag) 1) has no result: (grasp-set-flag) has no value
     "#]].assert_eq(&messages);
 }
 
