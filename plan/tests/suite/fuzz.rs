@@ -44,6 +44,8 @@ fn near(good: String) -> impl Strategy<Value = String> {
         "<X>",
         "nan",
         "-0",
+        "!",
+        "!!(-1 != -(-1))",
         "reference = \"KitTray_1\"",
         "[[object]]",
         ";",
