@@ -252,8 +252,19 @@ fn model_of(file: File) -> Result<Model, PlanError> {
     }
     model.designs = Arc::new(designs);
     add_objects(&mut model, file.object, f)?;
+    let volumes = volumes_in(&model, file.volume, f)?;
+    model.volumes = Arc::new(volumes);
+    model.workstation()?;
+    Ok(model)
+}
+
+fn volumes_in(
+    model: &Model,
+    entries: Vec<VolumeEntry>,
+    f: Factors,
+) -> Result<Vec<BoxVolume>, PlanError> {
     let mut volumes = Vec::new();
-    for entry in file.volume {
+    for entry in entries {
         let robot = model
             .named(&entry.robot)
             .ok_or_else(|| PlanError::NoObject(entry.robot))?
@@ -272,9 +283,7 @@ fn model_of(file: File) -> Result<Model, PlanError> {
             maximum,
         });
     }
-    model.volumes = Arc::new(volumes);
-    model.workstation()?;
-    Ok(model)
+    Ok(volumes)
 }
 
 fn sku_in(entry: SkuEntry, f: Factors) -> Result<Sku, PlanError> {
