@@ -45,6 +45,9 @@ pub fn import_nist(text: &str) -> Result<Model, PlanError> {
     let metres = units
         .metres()
         .ok_or_else(|| fail(root, "unknown length unit"))?;
+    if units.radians().is_none() {
+        return Err(fail(root, "unknown angle unit"));
+    }
     let mut import = Import {
         model: Model {
             units,

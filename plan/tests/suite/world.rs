@@ -154,6 +154,10 @@ fn impossible_descriptions_are_refused() {
         let first = "<Name>stock_keeping_unit_part_a</Name>";
         let twice = xml.replacen("<Name>stock_keeping_unit_part_b</Name>", first, 1);
         assert_ne!(twice, xml);
+        let unit = "<AngleUnit>degree</AngleUnit>";
+        let turned = xml.replacen(unit, "<AngleUnit>turn</AngleUnit>", 1);
+        assert_ne!(turned, xml);
+        cases.push((turned, "xml", "unknown angle unit"));
         cases.push((twice, "xml", "stock_keeping_unit_part_a"));
     }
     for (text, form, why) in cases {
