@@ -13,10 +13,10 @@ if [ "${1-}" != tests ]; then
     RUSTDOCFLAGS="-D warnings" step cargo doc --workspace --no-deps --locked
 fi
 if cargo nextest --version >/dev/null 2>&1; then
-    step cargo nextest run --workspace --locked
+    step cargo nextest run --workspace --locked --no-fail-fast
     step cargo test --workspace --doc --locked
 else
-    step cargo test --workspace --locked
+    step cargo test --workspace --locked --no-fail-fast
 fi
 if [ "${1-}" = tests ]; then
     exit

@@ -1,5 +1,6 @@
 //! Kinematics beside `k` and `rs-opw-kinematics`: forward kinematics with Jacobian,
 //! all branches, cold inverse kinematics, servo ticks. A 1 kHz loop has 1000 us for all.
+//! It needs no engine: `cargo bench -p benches --no-default-features --bench kinematics`.
 //!
 //! Every answer of ours is checked by forward kinematics. The poses and our times go
 //! to `target/kinematics-bench/`, where `benches/peers/kinematics_peers.py` takes them.

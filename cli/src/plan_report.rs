@@ -2,7 +2,6 @@
 
 use std::io::{self, Write};
 
-use plan::interp::PulledReport;
 use plan::run::Report;
 use serde::Serialize;
 
@@ -13,6 +12,8 @@ use crate::output;
 pub(crate) struct PlanReport {
     /// `stopped` at the end of the plan, `failed`, or `interrupted` by the operator.
     outcome: &'static str,
+    /// Reason given to EndCanon: 0, or positive when the plan failed.
+    code: i64,
     /// In words; null when all went well.
     reason: Option<String>,
     statements: usize,
@@ -25,11 +26,9 @@ pub(crate) struct PlanReport {
     kits: usize,
     motion_s: f64,
     wall_s: f64,
-    warnings: Vec<String>,
-    #[serde(skip)]
-    code: i64,
-    #[serde(skip)]
+    /// Time (s) by which the orders that the executor chose are shorter than the written ones.
     gained_s: f64,
+    warnings: Vec<String>,
 }
 
 impl From<Report> for PlanReport {
@@ -37,6 +36,7 @@ impl From<Report> for PlanReport {
         let counters = report.counters;
         Self {
             outcome: report.outcome,
+            code: report.code,
             reason: report.reason,
             statements: counters.statements,
             commands: counters.commands,
@@ -48,31 +48,8 @@ impl From<Report> for PlanReport {
             kits: counters.kits,
             motion_s: counters.motion_s,
             wall_s: report.wall_s,
-            warnings: report.warnings,
-            code: report.code,
             gained_s: counters.gained_s,
-        }
-    }
-}
-
-impl From<PulledReport> for PlanReport {
-    fn from(report: PulledReport) -> Self {
-        Self {
-            outcome: report.outcome,
-            reason: report.reason,
-            statements: report.steps,
-            commands: report.commands,
-            pick_ups: report.pick_ups,
-            put_downs: report.put_downs,
-            moves_above: 0,
-            end_effector_changes: report.end_effector_changes,
-            factotum_calls: 0,
-            kits: report.kits,
-            motion_s: report.motion_s,
-            wall_s: report.wall_s,
-            warnings: Vec::new(),
-            code: report.code,
-            gained_s: 0.0,
+            warnings: report.warnings,
         }
     }
 }
@@ -132,6 +109,6 @@ impl PlanReport {
 }
 
 /// A number with its noun.
-fn counted(count: usize, name: &str) -> String {
+pub(crate) fn counted(count: usize, name: &str) -> String {
     format!("{count} {name}{}", if count == 1 { "" } else { "s" })
 }

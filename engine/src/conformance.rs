@@ -289,7 +289,16 @@ impl Player {
             .fold(0.0, f64::max)
     }
 
+    /// Whether the driver has said anything in this session; what it has not is no position.
+    fn heard(&self) -> Result<(), String> {
+        if self.state.sequence == 0 {
+            return Err("it sent no state".to_owned());
+        }
+        Ok(())
+    }
+
     fn expect(&self, wanted: &[DriverState], seen: &str) -> Seen {
+        self.heard()?;
         let driver = self.state.driver();
         let text = format!(
             "{seen}driver is {}, {:.4} rad moved",
@@ -328,6 +337,7 @@ impl Player {
 
     fn holds(&mut self) -> Seen {
         self.hold(100);
+        self.heard()?;
         if self.moved() > 0.005 {
             return Err(format!("it moved by {:.4} rad", self.moved()));
         }
@@ -418,6 +428,7 @@ impl Player {
         change(&mut setpoint);
         self.period(Some(setpoint));
         self.hold(100);
+        self.heard()?;
         let reason = format!("{}; ", self.state.fault_code().reason());
         if self.moved() > 0.05 {
             return Err(format!("{reason}it moved by {:.3} rad", self.moved()));

@@ -2,13 +2,16 @@
 
 mod classify;
 mod closed;
+mod frames;
 mod goal;
 mod lanes;
 mod numeric;
+mod orient;
 mod polish;
 mod product;
 mod report;
 mod six;
+mod solving;
 mod swivel;
 mod turns;
 
@@ -361,23 +364,21 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    fn raw(
+    #[inline(always)]
+    fn branch(
         &self,
         closed: &Closed,
-        pose: &Isometry3<f64>,
-        parameter: f64,
+        (pose, parameter): (&Isometry3<f64>, f64),
         seed: &SVector<f64, N>,
-    ) -> Raw<N> {
-        let mut raw = Raw::none();
+        raw: &mut Raw<N>,
+    ) {
         self.chain.build().run(Branching {
-            chain: &self.chain,
             closed,
             pose,
             parameter,
             seed,
-            raw: &mut raw,
+            raw,
         });
-        raw
     }
 
     fn branches_at(
@@ -390,7 +391,8 @@ impl<const N: usize> Solver<N> {
         if !closed.exact() {
             return self.near_branches(closed, pose, seed, parameter);
         }
-        let raw = self.raw(closed, pose, parameter, seed);
+        let mut raw = Raw::none();
+        self.branch(closed, (pose, parameter), seed, &mut raw);
         let mut found = Branches::new();
         for id in 0..8_u8 {
             if let Some(q) = raw.inside(id) {
@@ -409,7 +411,9 @@ impl<const N: usize> Solver<N> {
         parameter: f64,
     ) -> Option<Solution<N>> {
         if closed.exact() {
-            let (id, q) = self.raw(closed, pose, parameter, seed).nearest()?;
+            let mut raw = Raw::none();
+            self.branch(closed, (pose, parameter), seed, &mut raw);
+            let (id, q) = raw.nearest()?;
             let branch = Some(id);
             return Some(Solution { q, branch });
         }

@@ -1,6 +1,7 @@
 //! Runs of plans that end by `kill -9` or by Ctrl-C, and go on with `--resume`.
 //!
-//! `CANTER_KILLS` sets how many runs are killed.
+//! `CANTER_KILLS` sets how many dry runs are killed, `CANTER_KILLS_MOVING` how many with the
+//! simulated driver in lock-step.
 
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -12,10 +13,10 @@ use crate::canter::{canter, command};
 use crate::plans::{objects, own, report, run, size, world};
 
 /// Starts a run in a copy of the world that is kept.
-fn start(database: &Path, more: &[&str]) -> Child {
+fn start(database: &Path, kits: usize, more: &[&str]) -> Child {
     let keep = ["--keep", database.to_str().unwrap()];
     let more: Vec<&str> = more.iter().chain(&keep).copied().collect();
-    command(run(&own(), 2, &more))
+    command(run(&own(), kits, &more))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -55,21 +56,25 @@ fn state(world: &Value) -> Vec<String> {
     objects(world).iter().map(line).collect()
 }
 
-/// Killed at random moments of a dry run: the database opens, is consistent, and the run goes on to
-/// the same end.
-#[test]
-fn a_killed_run_goes_on_to_the_same_end() {
+/// Kills runs for some kits, as many as asked for, and has each go on; all come to the same end.
+/// How often that was.
+fn kill_runs(kits: usize, kills: usize, mode: &dyn Fn(&str) -> Vec<String>) -> String {
     let folder = tempfile::tempdir().unwrap();
+    let begin = |database: &Path, name: &str| {
+        let mode = mode(name);
+        let mode: Vec<&str> = mode.iter().map(String::as_str).collect();
+        start(database, kits, &mode)
+    };
     let whole = folder.path().join("whole.db");
     let began = Instant::now();
-    assert!(start(&whole, &["--dry-run"]).wait().unwrap().success());
+    assert!(begin(&whole, "whole").wait().unwrap().success());
     let length = began.elapsed();
     let expected = state(&world(&whole));
-    let (kills, mut cut) = (size("CANTER_KILLS", 6), 0);
+    let mut cut = 0;
     // Moments spread over the run by the golden ratio, the same each time.
     for number in 1..=kills {
         let database = folder.path().join(format!("{number}.db"));
-        let mut process = start(&database, &["--dry-run"]);
+        let mut process = begin(&database, &number.to_string());
         std::thread::sleep(length.mul_f64((number as f64 * 0.618_033_988_75).fract()));
         process.kill().unwrap();
         process.wait().unwrap();
@@ -78,23 +83,70 @@ fn a_killed_run_goes_on_to_the_same_end() {
             // Killed before the plan had begun.
             continue;
         }
-        drop(world(&database));
+        let mut left = world(&database);
         if shown.contains("not ended") {
             cut += 1;
             let again = folder.path().join(format!("{number}-again.db"));
-            let report = resume(&database, &["--dry-run", "--keep", again.to_str().unwrap()]);
-            assert_eq!(
-                (report["kits"].as_u64(), report["pick_ups"].as_u64()),
-                (Some(2), Some(12)),
-                "{report}"
-            );
-            assert_eq!(state(&world(&again)), expected, "kill {number}");
-        } else {
-            assert_eq!(state(&world(&database)), expected, "kill {number}");
+            let keep = ["--keep".to_owned(), again.to_str().unwrap().to_owned()];
+            let more = [mode(&format!("{number}-again")), keep.into()].concat();
+            let more: Vec<&str> = more.iter().map(String::as_str).collect();
+            let report = resume(&database, &more);
+            let done = ["kits", "pick_ups"].map(|name| report[name].as_u64().unwrap() as usize);
+            assert_eq!(done, [kits, 6 * kits], "{report}");
+            left = world(&again);
         }
+        assert_eq!(state(&left), expected, "kill {number}");
     }
-    println!("{kills} kills, {cut} of them in the middle of the run, which takes {length:?}");
     assert!(cut > 0, "no kill hit the run");
+    format!("{kills} kills, {cut} of them in the middle of the run, which takes {length:?}")
+}
+
+/// Killed at random moments of a dry run: the database opens, is consistent, and the run goes on to
+/// the same end.
+#[test]
+fn a_killed_run_goes_on_to_the_same_end() {
+    let dry = |_: &str| vec!["--dry-run".into()];
+    println!("{}", kill_runs(2, size("CANTER_KILLS", 6), &dry));
+}
+
+/// The same while the simulated driver moves the arm.
+#[test]
+fn a_killed_arm_goes_on_to_the_same_end() {
+    let moving = |name: &str| {
+        let arm = format!("kills{}/{name}", std::process::id());
+        let options = ["--lock-step", "--speed", "100", "--arm", &arm];
+        options.map(str::to_owned).into()
+    };
+    let said = kill_runs(1, size("CANTER_KILLS_MOVING", 1), &moving);
+    println!("{said}");
+}
+
+/// A PDDL plan that the arm cannot go on with is tried again where it was.
+#[test]
+fn a_pddl_run_goes_on_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, database) = (folder.path().join("far.toml"), folder.path().join("far.db"));
+    let world = "examples/kitting/workstation-pddl.toml";
+    let text = std::fs::read_to_string(system_tests::repository::root().join(world)).unwrap();
+    let place = text.split("name = \"part_c_tray\"").nth(1).unwrap();
+    let place = place.lines().find(|line| line.starts_with("pose")).unwrap();
+    let far = text.replacen(place, "pose = { point = [2000, 0, 700] }", 1);
+    std::fs::write(&file, far).unwrap();
+    let (file, database) = (file.to_str().unwrap(), database.to_str().unwrap());
+    let plan = "examples/kitting/one-kit.pddl";
+    let start = ["plan-run", plan, "--world", file, "--keep", database];
+    let go_on = ["plan-run", "--resume", "--world", database];
+    for arguments in [&start[..], &go_on[..]] {
+        let more = ["--dry-run", "--json", "-r", "ur5e"];
+        let ran = canter(arguments.iter().chain(&more));
+        let report = report(&ran);
+        let said = ["outcome", "code", "statements"].map(|name| report[name].to_string());
+        assert_eq!(said, ["\"failed\"", "100", "6"], "{report}");
+        let reason = report["reason"].as_str().unwrap();
+        assert!(reason.starts_with("step 7: command"), "{reason}");
+    }
+    let shown = canter(["world", "show", database]).stdout;
+    assert!(shown.contains("6 statements, 0 kits; failed"), "{shown}");
 }
 
 /// With the simulated driver: killed while the arm moves, then stopped by Ctrl-C, then to its end.
@@ -122,8 +174,8 @@ fn a_moving_arm_is_killed_and_stopped_and_goes_on() {
         panic!("the run does not get as far as {statements} statements");
     };
     let fast = ["--lock-step", "--speed", "100", "--arm"];
-    let mut process = start(&database, &[&fast[..], &[&first]].concat());
-    moving(16);
+    let mut process = start(&database, 1, &[&fast[..], &[&first]].concat());
+    moving(8);
     process.kill().unwrap();
     process.wait().unwrap();
     drop(world(&database));
@@ -137,7 +189,7 @@ fn a_moving_arm_is_killed_and_stopped_and_goes_on() {
     .stderr(Stdio::null())
     .spawn()
     .unwrap();
-    moving(40);
+    moving(30);
     let interrupt = ["-INT", &process.id().to_string()];
     assert!(
         std::process::Command::new("kill")
@@ -156,10 +208,10 @@ fn a_moving_arm_is_killed_and_stopped_and_goes_on() {
     let report = resume(&database, &[&fast[..], &[&third]].concat());
     assert_eq!(
         (report["kits"].as_u64(), report["put_downs"].as_u64()),
-        (Some(2), Some(12)),
+        (Some(1), Some(6)),
         "{report}"
     );
     let whole = folder.path().join("whole.db");
-    assert!(start(&whole, &["--dry-run"]).wait().unwrap().success());
+    assert!(start(&whole, 1, &["--dry-run"]).wait().unwrap().success());
     assert_eq!(state(&world(&database)), state(&world(&whole)));
 }

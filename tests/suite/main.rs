@@ -10,6 +10,8 @@ mod command_line;
 mod documents;
 mod drivers;
 mod killed_plans;
+mod made_kits;
+mod plan_costs;
 mod planned_motions;
 mod plans;
 mod runs;

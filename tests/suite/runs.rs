@@ -404,10 +404,12 @@ fn a_jog_needs_its_client_alive() {
     let before = joint(&status(&arm));
     let ran = canter(["jog", "j1=0.1", "--seconds", "0.5", "--arm", &arm]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let now = wait_for(&arm, "rest", |now| now["idle"] == true);
-    let moved = joint(&now) - before;
     // A tenth of 3.14 rad/s, for as long as the client lived and a little longer.
-    assert!(moved > 0.02 && moved < 2.0, "{moved} rad");
+    let now = wait_for(&arm, "rest after a move", |now| {
+        now["idle"] == true && joint(now) - before > 0.02
+    });
+    let moved = joint(&now) - before;
+    assert!(moved < 2.0, "{moved} rad");
 
     let mut first = command(["jog", "z=0.02", "--arm", &arm]).spawn().unwrap();
     wait_for(&arm, "a jog", |now| now["command"] == "jog");

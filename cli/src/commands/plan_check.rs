@@ -1,14 +1,15 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use plan::finding::{Finding, Severity, has_errors};
-use plan::kitting::{Plan, check, read};
+use plan::kitting::{Plan, check, read, write};
 use plan::pddl::{PddlError, read_domain, read_plan, read_problem, simulate};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::pddl_file::{action_table, is_pddl};
+use crate::plan_report::counted;
 use crate::{output, world_file};
 
 /// Check a kitting process plan or a PDDL plan without executing it
@@ -33,8 +34,19 @@ pub(crate) struct PlanCheck {
     #[arg(long, value_name = "TABLE.toml")]
     actions: Option<PathBuf>,
     /// Print counts and findings as JSON
-    #[arg(long)]
+    #[arg(long, conflicts_with = "to")]
     json: bool,
+    /// Print the kitting plan itself in another form, when it can be read without errors
+    #[arg(long, value_enum)]
+    to: Option<Form>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Form {
+    /// The layout with begin and end.
+    Block,
+    /// JSON.
+    Json,
 }
 
 impl PlanCheck {
@@ -51,10 +63,10 @@ impl PlanCheck {
             findings.extend(check(&reading.plan, world.as_ref()));
             findings.sort_by_key(|finding| finding.span.start);
         }
-        if self.json {
-            self.print_json(&source, &reading.plan, &findings)?;
-        } else {
-            self.print(&source, &reading.plan, &findings)?;
+        match self.to {
+            Some(form) if !has_errors(&findings) => convert(&reading.plan, form)?,
+            _ if self.json => self.print_json(&source, &reading.plan, &findings)?,
+            _ => self.print(&source, &reading.plan, &findings)?,
         }
         Ok(if has_errors(&findings) {
             Exit::Refused
@@ -142,16 +154,29 @@ impl PlanCheck {
             writeln!(out, "{:?}", finding.report(&file, source))?;
         }
         let of = |severity| findings.iter().filter(|f| f.severity == severity).count();
+        let counts = [
+            (plan.requirements.len(), "requirement"),
+            (plan.parameters.len(), "parameter"),
+            (plan.variables.len(), "variable"),
+            (plan.statements().len(), "statement"),
+            (of(Severity::Error), "error"),
+            (of(Severity::Warning), "warning"),
+            (of(Severity::Note), "note"),
+        ];
+        let counts = counts.map(|(count, name)| counted(count, name));
         writeln!(
             out,
-            "{} requirements, {} parameters, {} variables, {} statements; {} errors, {} warnings, {} notes",
-            plan.requirements.len(),
-            plan.parameters.len(),
-            plan.variables.len(),
-            plan.statements().len(),
-            of(Severity::Error),
-            of(Severity::Warning),
-            of(Severity::Note),
+            "{}; {}",
+            counts[..4].join(", "),
+            counts[4..].join(", ")
         )
+    }
+}
+
+/// Prints the plan in a form that is read as the same plan.
+fn convert(plan: &Plan, form: Form) -> io::Result<()> {
+    match form {
+        Form::Block => io::stdout().lock().write_all(write(plan).as_bytes()),
+        Form::Json => output::json(plan),
     }
 }

@@ -6,12 +6,12 @@ use crcl::LengthUnit;
 use engine::dry_run::FailurePolicy;
 use engine::robot::Robot;
 use plan::PlanError;
-use plan::interp::{PddlInterpreter, PulledReport, pull};
+use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
     Cell, Controller, Event, Motion, Policy, Program, Report, RobotOptions, RunOptions,
     SimulatedFactotum, Stock, parameters, prepare,
 };
-use plan::world::{Model, Reader, Writer};
+use plan::world::{Model, Reader, StoredRun, Writer};
 
 use crate::arm_motion::ArmMotion;
 use crate::equipment::equip;
@@ -43,6 +43,9 @@ pub(crate) struct PlanRun {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    /// Refuse a kitting plan with another PlanId
+    #[arg(long, value_name = "ID", conflicts_with = "resume")]
+    plan_id: Option<String>,
     /// Value of a parameter of the plan
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
@@ -99,6 +102,11 @@ impl PlanRun {
         let (parameters, limits) = (self.parameters()?, self.limits()?);
         let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
         let model = writer.model().map_err(refused)?;
+        let stored = if self.resume {
+            writer.last_run().map_err(refused)?
+        } else {
+            None
+        };
         self.check(source.as_deref(), &parameters, &model)?;
         equip(&mut robot, &model).map_err(refused)?;
         let arm = if self.dry_run {
@@ -109,6 +117,7 @@ impl PlanRun {
         let task = Task {
             command: self,
             source,
+            stored,
             parameters,
             limits,
             database,
@@ -128,7 +137,18 @@ impl PlanRun {
             Some(source) if !is_pddl(source) => {
                 let (program, _) = prepare(source, model).map_err(refused)?;
                 parameters(&program, given).map_err(refused)?;
-                Ok(())
+                self.check_id(program.plan.about("PlanId"))
+            }
+            _ => self.check_id(""),
+        }
+    }
+
+    /// The plan is the one that was asked for.
+    fn check_id(&self, found: &str) -> Result<(), Failure> {
+        match &self.plan_id {
+            Some(wanted) if wanted != found => {
+                let message = anyhow::anyhow!("the id of the plan is {found:?}, not {wanted:?}");
+                Err(Failure::new(Exit::Refused, message))
             }
             _ => Ok(()),
         }
@@ -218,6 +238,8 @@ struct Task<'a> {
     command: &'a PlanRun,
     /// Text of the plan; none when a run is resumed.
     source: Option<String>,
+    /// The run that goes on; none when a plan is started.
+    stored: Option<StoredRun>,
     parameters: BTreeMap<String, String>,
     limits: BTreeMap<String, usize>,
     database: Database,
@@ -225,10 +247,17 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
+    /// Whether the plan, or the one whose run goes on, is PDDL.
+    fn is_pddl(&self) -> bool {
+        let stored = self.stored.as_ref().map(|run| run.source.as_str());
+        self.source.as_deref().or(stored).is_some_and(is_pddl)
+    }
+
     fn kitting(self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, PlanError> {
         let Self {
             command,
             source,
+            stored,
             parameters,
             limits,
             database,
@@ -240,9 +269,7 @@ impl Task<'_> {
                 Stock::of(&writer.model()?, &program.plan)
             }
             None => {
-                let stock = writer
-                    .last_run()?
-                    .map(|run| serde_json::from_str(&run.stock));
+                let stock = stored.map(|run| serde_json::from_str(&run.stock));
                 stock.and_then(Result::ok).unwrap_or_default()
             }
         };
@@ -262,20 +289,32 @@ impl Task<'_> {
         controller.run(&mut |event| command.observe(event))
     }
 
-    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<PulledReport, Failure> {
+    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, Failure> {
         let command = self.command;
         let table = action_table(command.actions.as_deref())?;
-        let options = command.robot_options(robot);
-        let mut interpreter = PddlInterpreter::new(&self.database.path, table, options);
-        let name = command.plan.as_ref().map(|path| path.display().to_string());
-        let name = name.unwrap_or_default();
+        let options = &command.robot_options(robot);
+        let mut interpreter = PddlInterpreter::new(&self.database.path, table, options.clone());
+        let run = match self.stored {
+            Some(stored) => PulledRun::resume(stored).map_err(refused)?,
+            None => {
+                let name = command.plan.as_ref().map(|path| path.display().to_string());
+                let source = self.source.as_deref().unwrap_or_default();
+                PulledRun::new(&name.unwrap_or_default(), source)
+            }
+        };
+        interpreter.go_on(run.source(), run.done());
         let mut step = |number| {
             if command.verbose {
                 output::note(&format!("done     step {number}"));
             }
         };
-        let plan = (name.as_str(), "PDDL");
-        pull(&mut interpreter, plan, &mut self.writer, motion, &mut step).map_err(refused)
+        let writer = &mut self.writer;
+        let place = Pull {
+            writer,
+            motion,
+            options,
+        };
+        pull(&mut interpreter, run, place, &mut step).map_err(refused)
     }
 }
 
@@ -286,11 +325,12 @@ fn execute<const N: usize>(
 ) -> Result<Exit, Failure> {
     let command = task.command;
     let mut motion = ArmMotion::<N>::new(robot, command.host.rate, arm)?;
-    let report: PlanReport = if task.source.as_deref().is_some_and(is_pddl) {
-        task.pddl(robot, &mut motion)?.into()
+    let report: PlanReport = if task.is_pddl() {
+        task.pddl(robot, &mut motion)?
     } else {
-        task.kitting(robot, &mut motion).map_err(refused)?.into()
-    };
+        task.kitting(robot, &mut motion).map_err(refused)?
+    }
+    .into();
     let blame = motion.blame();
     let off_path = motion.finish()?;
     report.print(command.json, off_path)?;

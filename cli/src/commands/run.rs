@@ -236,8 +236,11 @@ impl Running {
     /// Ends session and driver, writes the rest of the samples, sums up.
     fn finish(mut self, exit: Exit, done: usize, count: usize) -> Result<Exit, Failure> {
         self.progress.clear();
-        self.recording.take(&self.host.session.samples())?;
+        let duration = self.recording.duration();
         let status = self.host.session.status();
+        // The sample of a period is complete when the next state came: the last ones are still out.
+        self.host.session.close();
+        self.recording.take(&self.host.session.samples())?;
         let driver = self.host.session.driver.clone();
         let tracking = self.recording.worst();
         let exit = match exit {
@@ -245,7 +248,6 @@ impl Running {
             Exit::Done if done < count => Exit::Refused,
             exit => exit,
         };
-        let duration = self.recording.duration();
         drop(self.host);
         self.recording.finish()?;
         let mut out = io::stdout().lock();

@@ -32,7 +32,7 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// Make a database from a workstation file, or replace the world in it
+    /// Make a database from a workstation file, or replace the world in it; its runs are forgotten
     Import {
         /// Workstation file: .toml, .json, or NIST's .xml
         file: PathBuf,

@@ -125,13 +125,17 @@ impl<const N: usize> Loop<'_, N> {
         self.origin = now_ns().saturating_sub(self.tick * self.config.period_ns());
     }
 
-    /// Whether the thread shall end now: asked to, and the arm rests.
+    /// Whether the thread shall end now: it was asked to before this period, and the arm rests.
     fn leaves(&mut self) -> bool {
         if !self.shared.shutdown.load(Ordering::Acquire) {
             return false;
         }
-        let since = *self.leaving.get_or_insert_with(Instant::now);
         self.shared.control(Control::Pause);
+        let Some(since) = self.leaving else {
+            // One more period, so that a lock-step run ends with the same one each time.
+            self.leaving = Some(Instant::now());
+            return false;
+        };
         self.runner.may_leave() || since.elapsed() > LEAVE
     }
 
@@ -226,7 +230,11 @@ impl<const N: usize> Loop<'_, N> {
         // The first period of a session is what a sign of life repeats.
         let mine = last.session == self.runner.session();
         while self.config.wait_for_planner && mine && self.runner.may_stand() {
-            if self.shared.shutdown.load(Ordering::Acquire) || self.runner.wants_session() {
+            if self.shared.shutdown.load(Ordering::Acquire) {
+                self.leaving.get_or_insert_with(Instant::now);
+                break;
+            }
+            if self.runner.wants_session() {
                 break;
             }
             turns = turns.saturating_add(1);

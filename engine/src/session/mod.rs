@@ -262,8 +262,9 @@ impl Session {
         )
     }
 
-    /// Stops the arm on the path, says goodbye to the driver and ends both threads.
-    pub fn close(mut self) {
+    /// Stops the arm on the path, says goodbye to the driver and ends both threads. Afterwards
+    /// [`Session::samples`] has the rest of them, down to where the arm rests.
+    pub fn close(&mut self) {
         self.end();
     }
 

@@ -25,7 +25,7 @@ const EXACT: Tolerance = Tolerance {
 const CALIBRATED: Tolerance = Tolerance {
     length: 4e-3,
     angle: 0.012,
-    slack: 3e-2,
+    slack: 8e-2,
 };
 
 /// A closed form with up to one spare joint.
@@ -86,12 +86,7 @@ fn six(lines: &[Line; 6], tolerance: Tolerance) -> Option<Six> {
             lines.reverse();
         }
         let shape = wrist(&mut lines, tolerance).or_else(|| parallels(&mut lines, tolerance))?;
-        Some(Six {
-            lines,
-            shape,
-            reversed,
-            slack: tolerance.slack,
-        })
+        Some(Six::new(lines, shape, reversed, tolerance.slack))
     })
 }
 
@@ -118,18 +113,12 @@ fn parallels(lines: &mut [Line; 6], tolerance: Tolerance) -> Option<Shape> {
     }
     let point = meeting(&e, &f, tolerance)?;
     align(&mut lines[1..4]);
-    let sign = |i: usize| dot(lines[1].h, lines[i].h).signum();
-    let signs = [sign(2), sign(3)];
     (lines[4].p, lines[5].p) = (point, point);
-    Some(Shape::Parallels(point, signs))
+    Some(Shape::Parallels(point))
 }
 
 fn vector(v: [f64; 3]) -> Vector3<f64> {
     Vector3::from(v)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    vector(a).dot(&vector(b))
 }
 
 /// Gives axes that are parallel their mean direction, each keeping its way.

@@ -3,10 +3,10 @@
 use super::classify::{Class, Form, classify};
 use super::product::{Product, Zero};
 use super::six::Joints;
-use super::turns;
+use super::turns::Range;
 use crate::arith::{Arith, Op};
 use crate::chain::Chain;
-use crate::wide::F4;
+use crate::wide::{B4, F4};
 use nalgebra::{Isometry3, SVector};
 
 /// The closed form of one arm.
@@ -14,11 +14,12 @@ use nalgebra::{Isometry3, SVector};
 pub(crate) struct Closed {
     zero: Zero,
     class: Class,
+    ranges: [Range; 8],
 }
 
 /// Joint positions (rad) of eight branches, in two groups of four.
 pub(crate) struct Raw<const N: usize> {
-    joints: [[[f64; 4]; N]; 2],
+    joints: [[[f64; 4]; 2]; N],
     distance: [[f64; 4]; 2],
     real: [u8; 2],
     inside: [u8; 2],
@@ -29,7 +30,7 @@ impl<const N: usize> Raw<N> {
     #[inline]
     pub(crate) fn none() -> Self {
         Self {
-            joints: [[[0.0; 4]; N]; 2],
+            joints: [[[0.0; 4]; 2]; N],
             distance: [[0.0; 4]; 2],
             real: [0; 2],
             inside: [0; 2],
@@ -67,7 +68,7 @@ impl<const N: usize> Raw<N> {
 
     #[inline]
     fn joints_of(&self, group: usize, lane: usize) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| self.joints[group][i][lane])
+        SVector::from_fn(|i, _| self.joints[i][group][lane])
     }
 }
 
@@ -75,9 +76,19 @@ impl Closed {
     /// The closed form of a chain, if it has one.
     pub(crate) fn of<const N: usize>(chain: &Chain<N>) -> Option<Self> {
         let (lines, zero) = chain.lines()?;
+        let (class, zero) = (classify(&lines)?, Zero::new(&zero));
+        let mut ranges = [Range::new(0.0, 0.0); 8];
+        for (i, range) in ranges.iter_mut().enumerate().take(N) {
+            *range = Range::new(chain.lower()[i], chain.upper()[i]);
+        }
+        let zero = match &class.form {
+            Form::Six(six) => zero.times(six.right()),
+            _ => zero,
+        };
         Some(Self {
-            zero: Zero::new(&zero),
-            class: classify(&lines)?,
+            zero,
+            class,
+            ranges,
         })
     }
 
@@ -128,7 +139,6 @@ impl Closed {
 
 /// All branches of one pose as a dispatched computation.
 pub(crate) struct Branching<'a, const N: usize> {
-    pub(crate) chain: &'a Chain<N>,
     pub(crate) closed: &'a Closed,
     pub(crate) pose: &'a Isometry3<f64>,
     /// The free parameter, rad.
@@ -149,47 +159,69 @@ impl<const N: usize> Op for Branching<'_, N> {
         let (parameter, seed) = (self.parameter, self.seed);
         let (six, g, first) = match &self.closed.class.form {
             Form::Six(six) => (six, g, 0),
-            Form::Last(six, line) => (six, g.without_last(line, parameter), 0),
-            Form::First(six, line) => (six, g.without_first(line, parameter), 1),
+            Form::Last(six, line) => {
+                let rest = g.without_last(line, parameter);
+                (six, rest.times(six.right()), 0)
+            }
+            Form::First(six, line) => {
+                let rest = g.without_first(line, parameter);
+                (six, rest.times(six.right()), 1)
+            }
             Form::Swivel(swivel) => {
                 // Only seven joints have it; others need not carry its code.
                 if N == 7 {
                     let found = swivel.solve(&g, parameter, &held(seed, 0));
-                    self.settle(a, 0, &found);
+                    self.settle(a, (0, &[0, 1, 2, 3, 4, 5, 6]), &found);
                 }
                 return;
             }
         };
         let found = six.solve(&g, held(seed, first));
-        self.settle(a, first, &found);
+        self.settle(a, (first, six.slots()), &found);
     }
 }
 
 impl<const N: usize> Branching<'_, N> {
     /// Takes the turns of every joint that are nearest to the seed inside the limits; the
-    /// angles are those of the joints from `first` on, any other joint is the free parameter.
+    /// angle `i` is that of the joint `slots[i]` behind the first, any other joint is the
+    /// free parameter.
     #[inline(always)]
-    fn settle<A: Arith, const M: usize>(self, a: A, first: usize, found: &Joints<A, M>) {
-        let raw = self.raw;
+    fn settle<A: Arith, const M: usize>(
+        mut self,
+        a: A,
+        (first, slots): (usize, &[usize; M]),
+        found: &Joints<A, M>,
+    ) {
+        let zero = F4::splat(a, 0.0);
+        let mut sums = [(found.real[0], zero), (found.real[1], zero)];
+        for i in 0..M {
+            let angles = [found.angles[0][i], found.angles[1][i]];
+            self.put(first + slots[i], angles, &mut sums);
+        }
+        if let Some(joint) = self.closed.given::<N>() {
+            self.put(joint, [F4::splat(a, self.parameter); 2], &mut sums);
+        }
         for group in 0..2 {
-            let mut inside = found.real[group];
-            let mut distance = F4::splat(a, 0.0);
-            for i in 0..N {
-                let angle = if i >= first && i < first + M {
-                    found.angles[group][i - first]
-                } else {
-                    F4::splat(a, self.parameter)
-                };
-                let range = [self.chain.lower()[i], self.chain.upper()[i]];
-                let (q, ok) = turns::nearest_in(angle, self.seed[i], range);
-                let away = q - F4::splat(a, self.seed[i]);
-                distance = away.fma(away, distance);
-                inside = inside & ok;
-                raw.joints[group][i] = q.array();
-            }
-            raw.distance[group] = distance.array();
-            raw.real[group] = found.real[group].bits();
-            raw.inside[group] = inside.bits();
+            let (inside, distance) = sums[group];
+            let inside = inside & distance.le(F4::splat(a, f64::MAX));
+            self.raw.distance[group] = distance.array();
+            self.raw.real[group] = found.real[group].bits();
+            self.raw.inside[group] = inside.bits();
+        }
+    }
+
+    /// Settles one joint; the sums tell what is inside and how far away.
+    #[inline(always)]
+    fn put<A: Arith>(&mut self, joint: usize, angles: [F4<A>; 2], sums: &mut [(B4<A>, F4<A>); 2]) {
+        let joint = joint.min(N - 1);
+        let (seed, range) = (self.seed[joint], self.closed.ranges[joint & 7]);
+        let raw = &mut self.raw.joints[joint];
+        for group in 0..2 {
+            let (inside, distance) = sums[group];
+            let (q, ok) = range.nearest(angles[group], seed);
+            let away = q - F4::splat(q.build(), seed);
+            sums[group] = (inside & ok, away.fma(away, distance));
+            raw[group] = q.array();
         }
     }
 }

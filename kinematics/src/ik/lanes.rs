@@ -70,14 +70,6 @@ impl Held {
         }
         held
     }
-
-    #[inline(always)]
-    pub(crate) fn back(self) -> Self {
-        Self {
-            sin: -self.sin,
-            cos: self.cos,
-        }
-    }
 }
 
 /// A vector in each lane.
@@ -99,12 +91,6 @@ impl<A: Arith> Vec4<A> {
     #[inline(always)]
     pub(crate) fn minus(self, o: [f64; 3]) -> Self {
         self.plus([-o[0], -o[1], -o[2]])
-    }
-
-    #[inline(always)]
-    pub(crate) fn less(self, o: Self) -> Self {
-        let ([x, y, z], [u, v, w]) = (self.0, o.0);
-        Self([x - u, y - v, z - w])
     }
 
     #[inline(always)]

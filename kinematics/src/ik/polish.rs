@@ -4,17 +4,19 @@
 //! together (a fold: elbow straight, wrist straight), both seeds may fall on the same
 //! one or on none; then the other is looked for across the fold.
 
-use super::closed::Closed;
-use super::goal::Goal;
+use super::closed::{Closed, Raw};
+use super::goal::{Goal, Target};
 use super::numeric::Stop;
 use super::report::{Branches, Solution};
 use super::{LENGTH, Solver, turns};
 use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// Smallest singular value below which a twin across a fold is looked for.
-const FOLD: f64 = 0.15;
-/// Step along the fold when its middle is all that is known, rad.
-const ASIDE: f64 = 0.15;
+const FOLD: f64 = 0.3;
+/// Smallest singular value below which a fold is searched along its whole length.
+const NARROW: f64 = 0.05;
+/// Steps along a fold when its middle is all that is known, rad.
+const ASIDE: [f64; 10] = [0.15, -0.15, 0.5, -0.5, 1.0, -1.0, 1.7, -1.7, 2.6, -2.6];
 
 impl<const N: usize> Solver<N> {
     /// All branches at one parameter of an arm whose closed form is only near.
@@ -26,26 +28,79 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         parameter: f64,
     ) -> Branches<N> {
-        let raw = self.raw(closed, pose, parameter, seed);
-        let mut found = Branches::new();
+        let mut raw = Raw::none();
+        self.branch(closed, (pose, parameter), seed, &mut raw);
+        let target = Goal::Pose(*pose).target();
+        // All that are found, beyond the limits too: a branch outside must not look lost.
+        let (mut all, mut lost) = (Branches::new(), Branches::new());
+        let mut expected = 0;
         for id in 0..8_u8 {
             let Some(q) = raw.any(id) else {
                 continue;
             };
-            match self.polished(pose, &q) {
-                Some(q) => self.add(&mut found, &q, id, seed),
-                None => {
-                    let (along, _) = self.fold(&q);
-                    for step in [ASIDE, -ASIDE] {
-                        if let Some(q) = self.polished(pose, &(q + along * step)) {
-                            self.add(&mut found, &q, id, seed);
-                        }
-                    }
-                }
+            expected += 1;
+            // At the edge of reach two seeds are one.
+            let same = |other: u8| raw.any(other).is_some_and(|p| (p - q).amax() < 1e-9);
+            if (0..id).any(same) {
+                continue;
+            }
+            let found = self.polished(&target, &q);
+            if !found.is_some_and(|q| self.add(&mut all, &q, id)) {
+                let branch = Some(id);
+                lost.push(Solution { q, branch });
             }
         }
-        for index in 0..found.len() {
-            let Some(solution) = found.get(index).copied() else {
+        if all.len() < expected {
+            self.add_twins(&target, &mut all);
+            for seed in &lost {
+                self.add_along(&target, seed, expected, &mut all);
+            }
+        }
+        let mut found = Branches::new();
+        for solution in &all {
+            let q = turns::nearest(&self.chain, &solution.q, seed);
+            if self.chain.within_limits(&q, 0.0) {
+                found.push(Solution { q, ..*solution });
+            }
+        }
+        found
+    }
+
+    /// Looks along the fold of a seed that led nowhere new: where two axes nearly fall
+    /// together, small errors of the links turn the joints between them far.
+    fn add_along(
+        &self,
+        target: &Target,
+        seed: &Solution<N>,
+        expected: usize,
+        all: &mut Branches<N>,
+    ) {
+        if all.len() >= expected {
+            return;
+        }
+        let (along, smallest) = self.fold(&seed.q);
+        if smallest > FOLD {
+            return;
+        }
+        let steps = if smallest < NARROW {
+            &ASIDE[..]
+        } else {
+            &ASIDE[..2]
+        };
+        for step in steps {
+            if all.len() >= expected {
+                return;
+            }
+            if let Some(q) = self.polished(target, &(seed.q + along * *step)) {
+                self.add(all, &q, seed.branch.unwrap_or(0));
+            }
+        }
+    }
+
+    /// Looks across every fold that is near for a branch that is not there yet.
+    fn add_twins(&self, target: &Target, all: &mut Branches<N>) {
+        for index in 0..all.len() {
+            let Some(solution) = all.get(index).copied() else {
                 continue;
             };
             let (along, smallest) = self.fold(&solution.q);
@@ -53,31 +108,29 @@ impl<const N: usize> Solver<N> {
                 continue;
             }
             let twin = solution.q + along * self.across(&solution.q, &along, smallest);
-            if let Some(q) = self.polished(pose, &twin) {
-                let id = solution.branch.unwrap_or(0);
-                self.add(&mut found, &q, id, seed);
+            if let Some(q) = self.polished(target, &twin) {
+                self.add(all, &q, solution.branch.unwrap_or(0));
             }
         }
-        found
     }
 
-    /// Adds a joint position that is inside the limits and new.
-    fn add(&self, found: &mut Branches<N>, q: &SVector<f64, N>, id: u8, seed: &SVector<f64, N>) {
-        let q = turns::nearest(&self.chain, q, seed);
-        let known = |other: &Solution<N>| turns::distance(&self.chain, &other.q, &q) < 1e-6;
-        if self.chain.within_limits(&q, 0.0) && !found.iter().any(known) {
-            found.push(Solution {
-                q,
+    /// Adds a joint position that is new; whether it was.
+    fn add(&self, all: &mut Branches<N>, q: &SVector<f64, N>, id: u8) -> bool {
+        let known = |other: &Solution<N>| turns::distance(&self.chain, &other.q, q) < 1e-6;
+        let new = !all.iter().any(known);
+        if new {
+            all.push(Solution {
+                q: *q,
                 branch: Some(id),
             });
         }
+        new
     }
 
     /// Brings a near branch onto the pose; `None` where it does not get there.
-    fn polished(&self, pose: &Isometry3<f64>, q: &SVector<f64, N>) -> Option<SVector<f64, N>> {
-        let target = Goal::Pose(*pose).target();
+    fn polished(&self, target: &Target, q: &SVector<f64, N>) -> Option<SVector<f64, N>> {
         let landing = self.descend(
-            &target,
+            target,
             q,
             Stop {
                 limits: false,

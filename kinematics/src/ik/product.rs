@@ -6,7 +6,7 @@ use crate::wide::F4;
 use nalgebra::Isometry3;
 
 /// Columns of a rotation, and a position.
-type Columns = [[f64; 3]; 4];
+pub(crate) type Columns = [[f64; 3]; 4];
 
 /// A product of turns: the columns of a rotation and a translation, one wide number each.
 #[derive(Clone, Copy)]
@@ -45,7 +45,7 @@ impl<A: Arith> Product<A> {
 
     /// `self * right`.
     #[inline(always)]
-    fn times(&self, [x, y, z, p]: &Columns) -> Self {
+    pub(crate) fn times(&self, [x, y, z, p]: &Columns) -> Self {
         Self([
             self.turned(*x),
             self.turned(*y),
@@ -74,9 +74,11 @@ impl<A: Arith> Product<A> {
         ]
     }
 
+    /// `left * self`.
     #[inline(always)]
-    pub(crate) fn inverse(&self) -> Self {
-        Self::new(self.build(), inverse(&self.columns()))
+    pub(crate) fn seen_from(&self, left: &Columns) -> Columns {
+        let left = Self::new(self.build(), *left);
+        left.times(&self.columns()).columns()
     }
 
     /// Without a last turn by `angle` (rad) about a line.
@@ -112,10 +114,19 @@ impl Zero {
             back: inverse(&[x, y, z, [p.x, p.y, p.z]]),
         }
     }
+
+    /// With a constant that every product is multiplied with.
+    pub(crate) fn times(&self, right: &Columns) -> Self {
+        let left = Product::new(arith::Plain, self.back);
+        Self {
+            back: left.times(right).columns(),
+        }
+    }
 }
 
+/// The inverse of a rotation and position.
 #[inline(always)]
-fn inverse(&[x, y, z, p]: &Columns) -> Columns {
+pub(crate) fn inverse(&[x, y, z, p]: &Columns) -> Columns {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     [
         [x[0], y[0], z[0]],

@@ -5,8 +5,9 @@
 //! and axis 1.
 
 use super::lanes::{FIRST, Held, SECOND, Vec4, Wave, angle_of, angles_of};
+use super::orient::{orient, orient_both};
 use super::product::Product;
-use super::six::{Joints, Line, across, dot, minus, orient, orient_both};
+use super::six::{Joints, Line, across, dot, minus};
 use crate::arith::{self, Arith};
 use crate::wide::F4;
 use nalgebra::{Rotation3, Unit, Vector3};

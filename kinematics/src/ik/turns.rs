@@ -35,22 +35,35 @@ pub(crate) fn nearest<const N: usize>(
     })
 }
 
-/// The same for four angles of a turning joint; beside them whether they are inside.
-#[inline(always)]
-pub(crate) fn nearest_in<A: Arith>(q: F4<A>, seed: f64, [low, high]: [f64; 2]) -> (F4<A>, B4<A>) {
-    let number = |x: f64| F4::splat(q.build(), x);
-    let turn = 1.0 / TAU;
-    let near = ((number(seed) - q).fma(number(turn), number(0.5))).floor();
-    let most = ((number(high + SLACK) - q) * turn).floor();
-    let least = -((q - number(low - SLACK)) * turn).floor();
-    let inside = least.le(most);
-    let turns = inside.select(near.min(most).max(least), near);
-    let moved = turns.fma(number(TAU), q);
-    let held = moved.max(number(low)).min(number(high));
-    (
-        inside.select(held, moved),
-        inside & moved.abs().le(number(f64::MAX)),
-    )
+/// The range of a turning joint, ready for [`Range::nearest`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Range {
+    low: f64,
+    high: f64,
+    /// The same in turns, with what rounding is forgiven.
+    turns: [f64; 2],
+}
+
+impl Range {
+    /// From limits, rad.
+    pub(crate) fn new(low: f64, high: f64) -> Self {
+        let turns = [(low - SLACK) / TAU, (high + SLACK) / TAU];
+        Self { low, high, turns }
+    }
+
+    /// Four angles moved by whole turns to be nearest to `seed` inside the range; beside
+    /// them whether they are.
+    #[inline(always)]
+    pub(crate) fn nearest<A: Arith>(&self, q: F4<A>, seed: f64) -> (F4<A>, B4<A>) {
+        let number = |x: f64| F4::splat(q.build(), x);
+        let at = q * (1.0 / TAU);
+        let near = (number(seed * (1.0 / TAU) + 0.5) - at).floor();
+        let most = (number(self.turns[1]) - at).floor();
+        let least = -(at - number(self.turns[0])).floor();
+        let moved = near.min(most).max(least).fma(number(TAU), q);
+        let held = moved.max(number(self.low)).min(number(self.high));
+        (held, least.le(most))
+    }
 }
 
 /// Rounding that a limit forgives, rad.

@@ -138,6 +138,7 @@ fn calibrated_arms_keep_their_branches() {
             lost += u32::from(!found.iter().any(|branch| (branch.q - q).amax() < 1e-5));
         }
     }
+    println!("{lost} of {poses} lost, {branches} branches");
     assert!(
         f64::from(lost) <= 1e-3 * f64::from(poses),
         "{lost} of {poses} lost"

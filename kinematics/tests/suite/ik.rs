@@ -16,7 +16,8 @@ pub(crate) fn error(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
 }
 
 /// Every branch reproduces its pose, and the position that the pose came from is among them.
-fn all_branches<const N: usize>(name: &str, family: &str, count: u32) {
+/// What was lost, as a line.
+fn all_branches<const N: usize>(name: &str, family: &str, count: u32) -> String {
     let solver = Solver::new(arms::chain::<N>(name));
     assert_eq!(
         (solver.family(), solver.is_exact()),
@@ -24,7 +25,7 @@ fn all_branches<const N: usize>(name: &str, family: &str, count: u32) {
         "{name}"
     );
     let mut random = Random(17);
-    let (mut lost, mut branches) = (0, 0);
+    let (mut lost, mut branches) = (Vec::new(), 0);
     for i in 0..count {
         let q = random.joints(solver.chain());
         let pose = solver.chain().forward(&q);
@@ -38,13 +39,19 @@ fn all_branches<const N: usize>(name: &str, family: &str, count: u32) {
             );
             assert!(solver.chain().within_limits(&solution.q, 0.0), "{name} {i}");
         }
-        lost += u32::from(!found.iter().any(|solution| (solution.q - q).amax() < 1e-6));
+        if !found.iter().any(|solution| (solution.q - q).amax() < 1e-6) {
+            lost.push(format!("{i}: {:?}", q.as_slice()));
+        }
     }
     assert!(
-        f64::from(lost) <= 1e-4 * f64::from(count),
-        "{name}: {lost} of {count} lost"
+        lost.len() as f64 <= 1e-4 * f64::from(count),
+        "{name}: of {count} lost {lost:?}"
     );
     assert!(branches > count, "{name}: only {branches} branches");
+    format!(
+        "{name}: {count} poses, {branches} branches, lost {}: {lost:?}",
+        lost.len()
+    )
 }
 
 const CLOSED_SIX: [(&str, &str); 7] = [
@@ -66,12 +73,12 @@ const CLOSED_SEVEN: [(&str, &str); 5] = [
 
 #[test]
 fn closed_forms_find_every_branch() {
-    CLOSED_SIX
-        .iter()
-        .for_each(|(name, family)| all_branches::<6>(name, family, arms::cases(2000)));
-    CLOSED_SEVEN
-        .iter()
-        .for_each(|(name, family)| all_branches::<7>(name, family, arms::cases(2000)));
+    for (name, family) in CLOSED_SIX {
+        println!("{}", all_branches::<6>(name, family, arms::cases(2000)));
+    }
+    for (name, family) in CLOSED_SEVEN {
+        println!("{}", all_branches::<7>(name, family, arms::cases(2000)));
+    }
 }
 
 fn cold<const N: usize>(name: &str, count: u32) {
@@ -186,6 +193,33 @@ fn partial_goals_are_reached() {
                 "{name}"
             );
         }
+    }
+}
+
+/// Every branch, and the nearest, with every bit.
+fn bits<const N: usize>(name: &str) -> Vec<u64> {
+    let solver = Solver::new(arms::chain::<N>(name));
+    let mut random = Random(13);
+    let mut bits = Vec::new();
+    for _ in 0..200 {
+        let pose = solver.chain().forward(&random.joints(solver.chain()));
+        let nearest = solver.nearest(&pose, &random.joints(solver.chain()));
+        let all = solver.solve_all(&pose);
+        for solution in all.iter().chain(nearest.iter()) {
+            bits.extend(solution.q.iter().map(|x| x.to_bits()));
+        }
+    }
+    bits
+}
+
+/// Two solvers give the same bits.
+#[test]
+fn answers_are_the_same_to_the_bit() {
+    for name in SIX {
+        assert_eq!(bits::<6>(name), bits::<6>(name), "{name}");
+    }
+    for name in SEVEN {
+        assert_eq!(bits::<7>(name), bits::<7>(name), "{name}");
     }
 }
 

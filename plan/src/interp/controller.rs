@@ -3,39 +3,83 @@
 use std::time::Instant;
 
 use crcl::Command;
-use serde::Serialize;
 
 use super::{Code, CommandSink, PlanInterpreter};
 use crate::PlanError;
-use crate::run::{Batch, Motion, MotionFailure, Tool, situation};
-use crate::world::{Change, Class, Model, Writer};
+use crate::pddl::read_plan;
+use crate::run::{
+    Batch, Counters, Motion, MotionFailure, Outcome, Report, Robot, RobotOptions, State, Tool,
+    situation,
+};
+use crate::world::{Change, Class, Model, StoredRun, Writer};
 
-/// How a pulled plan went.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct PulledReport {
-    /// `stopped` (at its end), `failed`, or `interrupted` by the operator.
-    pub outcome: &'static str,
-    /// Last return value of the interpreter; 100 when the motion failed.
-    pub code: i64,
-    /// In words; none when all went well.
-    pub reason: Option<String>,
-    /// Steps of the plan executed.
-    pub steps: usize,
-    /// Canonical commands executed.
-    pub commands: usize,
-    /// Objects picked up.
-    pub pick_ups: usize,
-    /// Objects put down.
-    pub put_downs: usize,
-    /// End effectors attached.
-    pub end_effector_changes: usize,
-    /// Kits put into a container.
-    pub kits: usize,
-    /// Time of motion (s).
-    pub motion_s: f64,
-    /// Time that the run took (s).
-    pub wall_s: f64,
+/// A run of a plan: a new one, or one that goes on.
+#[derive(Clone, Debug)]
+pub struct PulledRun {
+    file: String,
+    source: String,
+    /// Its number in the database, when it goes on.
+    id: Option<i64>,
+    state: State,
 }
+
+impl PulledRun {
+    /// A new run of the plan in `file`, whose text is kept in the database.
+    #[must_use]
+    pub fn new(file: &str, source: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            source: source.to_owned(),
+            id: None,
+            state: State::default(),
+        }
+    }
+
+    /// The run of the database goes on: it was killed or interrupted, or its motion failed.
+    ///
+    /// # Errors
+    /// [`PlanError::Resume`] when it has ended.
+    pub fn resume(stored: StoredRun) -> Result<Self, PlanError> {
+        let state = State::reopened(&stored)?;
+        Ok(Self {
+            file: stored.plan,
+            source: stored.source,
+            id: Some(stored.id),
+            state,
+        })
+    }
+
+    /// Text of the plan.
+    #[must_use]
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// Steps executed so far.
+    #[must_use]
+    pub fn done(&self) -> usize {
+        self.state.counters.statements
+    }
+
+    fn begin(&self, writer: &mut Writer) -> Result<i64, PlanError> {
+        if let Some(id) = self.id {
+            return Ok(id);
+        }
+        writer.begin_run(&StoredRun {
+            id: 0,
+            plan: self.file.clone(),
+            source: self.source.clone(),
+            parameters: "{}".into(),
+            stock: "{}".into(),
+            state: self.state.to_json()?,
+            outcome: None,
+            under_way: None,
+        })
+    }
+}
+
+/// Reason given to EndCanon when the motion failed.
+const MOTION_FAILED: i64 = 100;
 
 /// Collects the commands of one step.
 #[derive(Default)]
@@ -58,117 +102,234 @@ impl CommandSink for Collector {
     }
 }
 
-/// Opens a plan, pulls it step by step, has each step's motion executed, commits its effects, and
-/// closes the plan. `observer` gets the number of each finished step.
+/// Why a plan was not pulled to its end.
+enum Trouble {
+    Motion(MotionFailure),
+    World(PlanError),
+}
+
+impl From<MotionFailure> for Trouble {
+    fn from(failure: MotionFailure) -> Self {
+        Self::Motion(failure)
+    }
+}
+
+impl From<PlanError> for Trouble {
+    fn from(error: PlanError) -> Self {
+        Self::World(error)
+    }
+}
+
+/// Where a plan is pulled: the world, what moves the arm, and how.
+pub struct Pull<'a> {
+    /// The controller's connection.
+    pub writer: &'a mut Writer,
+    /// What moves the arm.
+    pub motion: &'a mut dyn Motion,
+    /// How robot statements become commands.
+    pub options: &'a RobotOptions,
+}
+
+/// Opens a plan, pulls it step by step, has each step's motion executed, commits its effects
+/// together with the state of the run, and closes the plan. `observer` gets the number of each
+/// finished step. For a run that goes on the interpreter must begin with the step that was under
+/// way; the arm is first brought back to where the world has it.
 ///
 /// # Errors
 /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
 pub fn pull(
     interpreter: &mut dyn PlanInterpreter,
-    plan: (&str, &str),
-    writer: &mut Writer,
-    motion: &mut dyn Motion,
+    run: PulledRun,
+    place: Pull<'_>,
     observer: &mut dyn FnMut(usize),
-) -> Result<PulledReport, PlanError> {
+) -> Result<Report, PlanError> {
     let began = Instant::now();
-    let mut report = PulledReport {
-        outcome: "failed",
-        ..PulledReport::default()
-    };
-    let model = writer.model()?;
-    if let Some(arm) = motion.arm() {
-        writer.commit(&model.arm_changes(&arm)?, None)?;
+    let resumed = run.id.is_some();
+    if let Some(arm) = place.motion.arm().filter(|_| !resumed) {
+        let changes = place.writer.model()?.arm_changes(&arm)?;
+        place.writer.commit(&changes, None)?;
     }
     let mut opening = Collector::default();
     let mut code = interpreter.init();
     if code == Code::Ok {
-        code = interpreter.open_plan(plan.0, plan.1, &mut opening);
+        code = interpreter.open_plan(&run.file, "PDDL", &mut opening);
     }
-    let opened = code == Code::Ok;
-    let mut failure = None;
-    if opened {
-        failure = execute(opening, writer, motion, &mut report)?;
+    if code != Code::Ok {
+        let reason = interpreter.last_error().to_owned();
+        interpreter.exit();
+        let end = End::Over(failed(code as i64, reason));
+        return Ok(end.report(run.state.counters, began));
     }
-    while code == Code::Ok && failure.is_none() {
-        let mut collector = Collector::default();
-        code = interpreter.execute(&mut collector);
-        failure = execute(collector, writer, motion, &mut report)?;
-        if code == Code::Ok && failure.is_none() {
-            report.steps += 1;
-            observer(report.steps);
+    let steps = read_plan(&run.source).unwrap_or_default();
+    let mut puller = Puller {
+        id: run.begin(place.writer)?,
+        actions: steps.iter().map(ToString::to_string).collect(),
+        place,
+        state: run.state,
+    };
+    let end = match puller.run(interpreter, (opening.batch, resumed), observer) {
+        Ok(Code::EndOfPlan) => Ok(End::Over(Outcome::Stopped)),
+        Ok(code) => {
+            let reason = interpreter.last_error().to_owned();
+            Ok(End::Over(failed(code as i64, reason)))
         }
-    }
-    report.code = code as i64;
-    match (failure, code) {
-        (Some(failure), _) => {
-            report.code = 100;
-            report.reason = Some(format!("step {}: {failure}", report.steps + 1));
-            if failure.stopped {
-                report.outcome = "interrupted";
-            }
-            let mut end = Batch::default();
-            end.push(Command::EndCanon {
-                reason: report.code,
-            });
-            // The motion has failed already; there is nobody left to tell.
-            let _ = motion.execute(&situation(&writer.model()?)?, &end);
-        }
-        (None, Code::EndOfPlan) => (report.outcome, report.code) = ("stopped", 0),
-        (None, _) => report.reason = Some(interpreter.last_error().to_owned()),
-    }
-    if opened {
-        interpreter.close_plan();
-    }
+        Err(Trouble::Motion(failure)) => Ok(puller.after(&failure)),
+        Err(Trouble::World(error)) => Err(error),
+    };
+    interpreter.close_plan();
     interpreter.exit();
-    report.wall_s = began.elapsed().as_secs_f64();
-    Ok(report)
+    let end = end?;
+    if let End::Over(outcome) = &end {
+        puller.save(&[], Some(outcome))?;
+    }
+    Ok(end.report(puller.state.counters, began))
 }
 
-/// Executes the commands of a step and commits its effects; the failure of its motion, if any.
-fn execute(
-    collector: Collector,
-    writer: &mut Writer,
-    motion: &mut dyn Motion,
-    report: &mut PulledReport,
-) -> Result<Option<MotionFailure>, PlanError> {
-    let batch = collector.batch;
-    if batch.commands.is_empty() && batch.changes.is_empty() {
-        return Ok(None);
-    }
-    let model = writer.model()?;
-    if !batch.commands.is_empty() {
-        match motion.execute(&situation(&model)?, &batch) {
-            Ok(seconds) => report.motion_s += seconds,
-            Err(failure) => return Ok(Some(failure)),
+fn failed(code: i64, reason: String) -> Outcome {
+    Outcome::Failed { code, reason }
+}
+
+/// How a run ended.
+enum End {
+    Over(Outcome),
+    /// The operator stopped it; it can go on.
+    Interrupted(String),
+}
+
+impl End {
+    fn report(self, counters: Counters, began: Instant) -> Report {
+        let (outcome, code, reason) = match self {
+            Self::Over(Outcome::Stopped) => ("stopped", 0, None),
+            Self::Over(Outcome::Failed { code, reason }) => ("failed", code, Some(reason)),
+            Self::Interrupted(reason) => ("interrupted", 0, Some(reason)),
+        };
+        Report {
+            outcome,
+            code,
+            reason,
+            counters,
+            wall_s: began.elapsed().as_secs_f64(),
+            warnings: Vec::new(),
         }
-        report.commands += batch.commands.len();
     }
-    if !batch.changes.is_empty() {
-        writer.commit(&batch.changes, None)?;
-        report.count(&model, &batch);
-    }
-    Ok(None)
 }
 
-impl PulledReport {
-    /// Counts what a step did to a world.
-    fn count(&mut self, before: &Model, batch: &Batch) {
-        let attached = batch.tools.iter().filter(|(_, tool)| tool.is_some());
-        self.end_effector_changes += attached.count();
-        let effector = before.effector().map(|effector| effector.id);
-        let held = before.held().map(|held| held.id);
-        for change in &batch.changes {
-            let Change::Place { object, location } = change else {
-                continue;
-            };
-            if Some(location.reference) == effector {
-                self.pick_ups += 1;
-            } else if Some(*object) == held {
-                self.put_downs += 1;
-                let class = |id| before.object(id).map(|object| object.class).ok();
-                let boxed = class(location.reference).is_some_and(Class::is_container);
-                self.kits += usize::from(boxed && class(*object) == Some(Class::KitInstance));
+/// A plan that is being pulled.
+struct Puller<'a> {
+    id: i64,
+    /// The plan's actions as texts, for people.
+    actions: Vec<String>,
+    place: Pull<'a>,
+    state: State,
+}
+
+impl Puller<'_> {
+    /// Pulls steps until the interpreter has no more; what it said then.
+    fn run(
+        &mut self,
+        interpreter: &mut dyn PlanInterpreter,
+        (opening, resumed): (Batch, bool),
+        observer: &mut dyn FnMut(usize),
+    ) -> Result<Code, Trouble> {
+        self.perform(&opening)?;
+        if resumed {
+            self.bring_back()?;
+        }
+        loop {
+            let mut collector = Collector::default();
+            let code = interpreter.execute(&mut collector);
+            if code != Code::Ok {
+                let ended = self.perform(&collector.batch);
+                return if code == Code::EndOfPlan {
+                    ended.map(|()| code)
+                } else {
+                    Ok(code)
+                };
             }
+            self.step(&collector.batch)?;
+            observer(self.state.counters.statements);
+        }
+    }
+
+    fn bring_back(&mut self) -> Result<(), Trouble> {
+        let Some(arm) = self.place.motion.arm() else {
+            return Ok(());
+        };
+        let model = &self.place.writer.model()?;
+        let options = self.place.options;
+        match (Robot { model, options }).way_back(&arm)? {
+            Some(batch) => self.perform(&batch),
+            None => Ok(()),
+        }
+    }
+
+    /// Has the commands of a step executed; then its effects come true, with the state of the run.
+    fn step(&mut self, batch: &Batch) -> Result<(), Trouble> {
+        let number = self.state.counters.statements + 1;
+        let before = self.place.writer.model()?;
+        let action = self.actions.get(number - 1).map_or("", String::as_str);
+        let mark = format!("step {number}, ({action}),");
+        self.place.writer.mark_under_way(self.id, &mark)?;
+        self.perform(batch)?;
+        count(&mut self.state.counters, &before, batch);
+        self.state.counters.statements = number;
+        Ok(self.save(&batch.changes, None)?)
+    }
+
+    fn perform(&mut self, batch: &Batch) -> Result<(), Trouble> {
+        if batch.commands.is_empty() {
+            return Ok(());
+        }
+        let start = situation(&self.place.writer.model()?)?;
+        let seconds = self.place.motion.execute(&start, batch)?;
+        self.state.counters.motion_s += seconds;
+        self.state.counters.commands += batch.commands.len();
+        Ok(())
+    }
+
+    /// What a failure of the motion means for the run. One that the operator did not want is told
+    /// to the arm with EndCanon.
+    fn after(&mut self, failure: &MotionFailure) -> End {
+        let number = self.state.counters.statements + 1;
+        let reason = format!("step {number}: {failure}");
+        if failure.stopped {
+            return End::Interrupted(reason);
+        }
+        let (mut end, code) = (Batch::default(), MOTION_FAILED);
+        end.push(Command::EndCanon { reason: code });
+        // The motion has failed already; there is nobody left to tell.
+        let _ = self.perform(&end);
+        End::Over(failed(code, reason))
+    }
+
+    fn save(&mut self, changes: &[Change], outcome: Option<&Outcome>) -> Result<(), PlanError> {
+        let (state, outcome) = (
+            self.state.to_json()?,
+            outcome.map(Outcome::to_json).transpose()?,
+        );
+        let run = (self.id, state.as_str(), outcome.as_deref());
+        self.place.writer.commit(changes, Some(run))?;
+        Ok(())
+    }
+}
+
+/// Counts what a step did to a world.
+fn count(counters: &mut Counters, before: &Model, batch: &Batch) {
+    let attached = batch.tools.iter().filter(|(_, tool)| tool.is_some());
+    counters.end_effector_changes += attached.count();
+    let effector = before.effector().map(|effector| effector.id);
+    let held = before.held().map(|held| held.id);
+    for change in &batch.changes {
+        let Change::Place { object, location } = change else {
+            continue;
+        };
+        if Some(location.reference) == effector {
+            counters.pick_ups += 1;
+        } else if Some(*object) == held {
+            counters.put_downs += 1;
+            let class = |id| before.object(id).map(|object| object.class).ok();
+            let boxed = class(location.reference).is_some_and(Class::is_container);
+            counters.kits += usize::from(boxed && class(*object) == Some(Class::KitInstance));
         }
     }
 }

@@ -5,7 +5,7 @@ mod controller;
 pub mod ffi;
 mod pddl;
 
-pub use controller::{PulledReport, pull};
+pub use controller::{Pull, PulledRun, pull};
 pub use pddl::PddlInterpreter;
 
 use crcl::Command;

@@ -18,6 +18,8 @@ pub struct PddlInterpreter {
     options: RobotOptions,
     reader: Option<Reader>,
     plan: Option<(Vec<PlanStep>, usize)>,
+    /// Text and first step of the plan that is opened next, when its run goes on.
+    resumed: Option<(String, usize)>,
     error: String,
 }
 
@@ -32,8 +34,14 @@ impl PddlInterpreter {
             options,
             reader: None,
             plan: None,
+            resumed: None,
             error,
         }
+    }
+
+    /// The plan that is opened next has this text, and its first steps have been executed already.
+    pub fn go_on(&mut self, source: &str, done: usize) {
+        self.resumed = Some((source.to_owned(), done));
     }
 
     /// Steps of the open plan and the position of the next.
@@ -111,9 +119,14 @@ impl PlanInterpreter for PddlInterpreter {
                 format!("no plan type {plan_type}"),
             );
         }
-        let text = match std::fs::read_to_string(file_name) {
-            Ok(text) => text,
-            Err(error) => return self.fail(Code::CannotReadFile, format!("{file_name}: {error}")),
+        let (text, done) = match self.resumed.take() {
+            Some(resumed) => resumed,
+            None => match std::fs::read_to_string(file_name) {
+                Ok(text) => (text, 0),
+                Err(error) => {
+                    return self.fail(Code::CannotReadFile, format!("{file_name}: {error}"));
+                }
+            },
         };
         let steps = match read_plan(&text) {
             Ok(steps) => steps,
@@ -132,7 +145,8 @@ impl PlanInterpreter for PddlInterpreter {
         {
             return self.fail(Code::SinkFull, "the controller does not take InitCanon");
         }
-        self.plan = Some((steps, 0));
+        let done = done.min(steps.len());
+        self.plan = Some((steps, done));
         self.error.clear();
         Code::Ok
     }

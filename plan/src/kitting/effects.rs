@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use super::ast::{Action, Expression, Statement, Term};
 use super::types::Scope;
 
-/// Variables that a statement uses.
+/// Variables that a statement uses, and properties of objects by their name alone: whose they are
+/// is known only when the plan runs. What follows from motion is not among them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Effects {
     /// Read before the statement itself surely wrote them.
@@ -22,7 +23,10 @@ impl Effects {
     fn read(&mut self, expression: &Expression, scope: &Scope) {
         match &expression.term {
             Term::Name(name) => self.read_name(name, scope),
-            Term::Property(object, _) => self.read(object, scope),
+            Term::Property(object, property) => {
+                self.read(object, scope);
+                self.reads.insert(property.clone());
+            }
             Term::Call(_, list) => list.iter().for_each(|argument| self.read(argument, scope)),
             Term::Unary(_, operand) => self.read(operand, scope),
             Term::Binary(_, left, right) => {
@@ -62,6 +66,10 @@ impl Effects {
                 self.read(value, scope);
                 match &target.term {
                     Term::Name(name) => self.write(name, scope),
+                    Term::Property(object, property) => {
+                        self.read(object, scope);
+                        self.writes.insert(property.clone());
+                    }
                     _ => self.read(target, scope),
                 }
             }

@@ -29,9 +29,9 @@ pub(super) struct Token {
     pub(super) first: bool,
 }
 
-const SYMBOLS: [&str; 20] = [
+const SYMBOLS: [&str; 21] = [
     "||", "&&", "==", "!=", "<=", ">=", "(", ")", "{", "}", ",", ".", "=", "<", ">", "+", "-", "*",
-    "/", "%",
+    "/", "%", "!",
 ];
 
 /// Splits a text into tokens; the last is always [`Kind::End`].

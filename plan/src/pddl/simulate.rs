@@ -180,13 +180,18 @@ impl State {
                     self.facts.insert(ground(fact, binding));
                 }
                 Effect::Change(verb, function, amount) => {
-                    let amount = self.value(amount, binding)?;
                     let function = ground(function, binding);
+                    let text = describe_number(amount, binding);
+                    let fail = |missing: String| {
+                        let what = show(&function);
+                        format!("the effect ({verb} {what} {text}) has no result: {missing}")
+                    };
+                    let amount = self.value(amount, binding).map_err(fail)?;
                     let before = self.numbers.get(&function).copied();
                     let before = match (*verb, before) {
                         ("assign", _) => 0.0,
                         (_, Some(before)) => before,
-                        (_, None) => return Err(format!("{} has no value", show(&function))),
+                        (_, None) => return Err(fail(format!("{} has no value", show(&function)))),
                     };
                     let after = if *verb == "decrease" {
                         before - amount

@@ -120,7 +120,7 @@ fn json<T: Serialize>(value: &T) -> Result<String, PlanError> {
 }
 
 impl<'a> Controller<'a> {
-    /// Prepares a new run of a plan with the given id (or any, if none is given).
+    /// Prepares a new run of a plan.
     ///
     /// # Errors
     /// [`PlanError`] when plan, parameters or world do not fit; nothing has moved then.
@@ -152,7 +152,7 @@ impl<'a> Controller<'a> {
             source: source.to_owned(),
             parameters: json(given)?,
             stock: json(stock)?,
-            state: json(&state)?,
+            state: state.to_json()?,
             outcome: None,
             under_way: None,
         })?;
@@ -188,20 +188,8 @@ impl<'a> Controller<'a> {
     /// [`PlanError::Resume`] when there is none, or it has ended.
     pub fn resume(cell: Cell<'a>, options: RunOptions) -> Result<Self, PlanError> {
         let missing = || PlanError::Resume("the database knows no run".into());
-        let broken = |error: serde_json::Error| PlanError::Resume(error.to_string());
         let stored = cell.writer.last_run()?.ok_or_else(missing)?;
-        let mut state: State = serde_json::from_str(&stored.state).map_err(broken)?;
-        match state.outcome.take() {
-            None => {}
-            Some(outcome) if outcome.can_be_resumed() => {}
-            Some(Outcome::Stopped) => {
-                return Err(PlanError::Resume("the last run came to its end".into()));
-            }
-            Some(Outcome::Failed { reason, .. }) => {
-                let why = format!("the last run gave up: {reason}");
-                return Err(PlanError::Resume(why));
-            }
-        }
+        let state = State::reopened(&stored)?;
         let model = cell.reader.model()?;
         let program = Program::new(read(&stored.source).plan);
         let Cell {
@@ -313,39 +301,21 @@ impl<'a> Controller<'a> {
         Ok(())
     }
 
-    /// Brings the arm from wherever it is to where the model has it: up, across, down. The gripper
-    /// is left alone: a step that was under way is executed again from its beginning, and all steps
-    /// come to the same end when some of their motion has been made before.
+    /// Brings the arm from wherever it is to where the model has it. The gripper is left alone: a
+    /// step that was under way is executed again from its beginning, and all steps come to the same
+    /// end when some of their motion has been made before.
     fn bring_back(&mut self) -> Result<(), MotionFailure> {
         let Some(arm) = self.motion.arm() else {
             return Ok(());
         };
-        let wanted = situation(&self.model).map_err(unmoved)?;
-        let from_tip = wanted
-            .tool
-            .as_ref()
-            .map(|tool| tool.arm_from_tip())
-            .unwrap_or_default();
-        let (here, there) = (arm * from_tip, wanted.arm * from_tip);
-        let difference = here.inv_mul(&there);
-        if difference.translation.vector.norm() < 1e-3 && difference.rotation.angle() < 1e-2 {
-            return Ok(());
-        }
         let robot = Robot {
             model: &self.model,
             options: &self.options.robot,
         };
-        let height = robot.travel_height().map_err(unmoved)?;
-        let raised = |pose: &nalgebra::Isometry3<f64>| {
-            let mut raised = *pose;
-            raised.translation.z = raised.translation.z.max(height);
-            raised
-        };
-        let mut batch = Batch::default();
-        batch.straight(&raised(&here));
-        batch.straight(&raised(&there));
-        batch.straight(&there);
-        self.move_only(&batch)
+        match robot.way_back(&arm).map_err(unmoved)? {
+            Some(batch) => self.move_only(&batch),
+            None => Ok(()),
+        }
     }
 
     fn step(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<(), PlanError> {
@@ -463,8 +433,8 @@ impl<'a> Controller<'a> {
     /// Changes of the world and state of the plan, together or not at all.
     fn commit(&mut self, changes: &[Change], state: State) -> Result<(), PlanError> {
         self.model.apply_all(changes)?;
-        let outcome = state.outcome.as_ref().map(json).transpose()?;
-        let run = (self.run, json(&state)?, outcome);
+        let outcome = state.outcome.as_ref().map(Outcome::to_json).transpose()?;
+        let run = (self.run, state.to_json()?, outcome);
         self.model.revision = self
             .writer
             .commit(changes, Some((run.0, run.1.as_str(), run.2.as_deref())))?;

@@ -128,6 +128,29 @@ impl Robot<'_> {
         Ok(())
     }
 
+    /// From where the end of the arm is to where the model has it: up, across, down. None when it
+    /// is there.
+    pub(crate) fn way_back(&self, arm: &Isometry3<f64>) -> Result<Option<Batch>, PlanError> {
+        let wanted = situation(self.model)?;
+        let from_tip = wanted
+            .tool
+            .as_ref()
+            .map(Tool::arm_from_tip)
+            .unwrap_or_default();
+        let (here, there) = (arm * from_tip, wanted.arm * from_tip);
+        let difference = here.inv_mul(&there);
+        if difference.translation.vector.norm() < 1e-3 && difference.rotation.angle() < 1e-2 {
+            return Ok(None);
+        }
+        let height = self.travel_height()?;
+        let raised = |pose: &Isometry3<f64>| at_height(pose, pose.translation.z.max(height));
+        let mut batch = Batch::default();
+        batch.straight(&raised(&here));
+        batch.straight(&raised(&there));
+        batch.straight(&there);
+        Ok(Some(batch))
+    }
+
     /// Above a pose (m, frame of the workstation), turned so that what is held has the direction of
     /// the pose, or an empty gripper could take something there. From lower down the controlled
     /// point first rises to the travel height.

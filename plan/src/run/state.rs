@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::batch::{Batch, Request};
 use super::value::Value;
+use crate::PlanError;
 use crate::kitting::ast::Span;
-use crate::world::Change;
+use crate::world::{Change, StoredRun};
 
 /// How a plan ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,7 +17,8 @@ pub enum Outcome {
     Stopped,
     /// The plan gave up, or could not go on.
     Failed {
-        /// Reason for EndCanon, positive: 1 Quit, 2 a statement, 3 the motion, 4 the factotum.
+        /// Reason for EndCanon, positive: 1 Quit, 2 a statement, 3 the motion, 4 the factotum; for
+        /// PDDL plans a [`crate::interp::Code`], or 100 for the motion.
         code: i64,
         /// In words.
         reason: String,
@@ -27,7 +29,17 @@ impl Outcome {
     /// Whether the arm or the factotum failed, not the plan: then the step can be tried again.
     #[must_use]
     pub fn can_be_resumed(&self) -> bool {
-        matches!(self, Self::Failed { code: 3 | 4, .. })
+        matches!(
+            self,
+            Self::Failed {
+                code: 3 | 4 | 100,
+                ..
+            }
+        )
+    }
+
+    pub(crate) fn to_json(&self) -> Result<String, PlanError> {
+        serde_json::to_string(self).map_err(|error| PlanError::Resume(error.to_string()))
     }
 }
 
@@ -77,7 +89,7 @@ pub struct Counters {
 }
 
 /// Where a plan is: program counter, variables, counters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     pub(crate) stack: Vec<Frame>,
     /// Values of parameters and variables.
@@ -86,6 +98,32 @@ pub struct State {
     pub counters: Counters,
     /// How it ended, when it has.
     pub outcome: Option<Outcome>,
+}
+
+impl State {
+    pub(crate) fn to_json(&self) -> Result<String, PlanError> {
+        serde_json::to_string(self).map_err(|error| PlanError::Resume(error.to_string()))
+    }
+
+    /// The state of a stored run, to go on from.
+    ///
+    /// # Errors
+    /// [`PlanError::Resume`] when the run has ended, or its state cannot be read.
+    pub(crate) fn reopened(stored: &StoredRun) -> Result<Self, PlanError> {
+        let broken = |error: serde_json::Error| PlanError::Resume(error.to_string());
+        let mut state: Self = serde_json::from_str(&stored.state).map_err(broken)?;
+        let outcome = stored.outcome.as_deref().map(serde_json::from_str);
+        let outcome = outcome.transpose().map_err(broken)?;
+        match state.outcome.take().or(outcome) {
+            Some(Outcome::Stopped) => Err(PlanError::Resume("the last run came to its end".into())),
+            Some(outcome) if outcome.can_be_resumed() => Ok(state),
+            Some(Outcome::Failed { reason, .. }) => {
+                let why = format!("the last run gave up: {reason}");
+                Err(PlanError::Resume(why))
+            }
+            None => Ok(state),
+        }
+    }
 }
 
 /// What a step asks for.

@@ -1,7 +1,7 @@
 //! Is the world consistent?
 
-use super::class::stored_property;
-use super::{Class, Model, Object};
+use super::class::{Kind, stored_property};
+use super::{Class, Model, Object, Scalar};
 use crate::finding::Severity;
 
 /// Something wrong (or odd) about the world.
@@ -93,6 +93,12 @@ fn check_properties(model: &Model, object: &Object, concerns: &mut Concerns) {
             concerns.error("property", &object.name, message);
         }
     }
+    for (name, value) in &object.properties {
+        let length = stored_property(object.class, name) == Some(Kind::Length);
+        if length && matches!(value, Scalar::Number(number) if *number < 0.0) {
+            concerns.error("size", &object.name, format!("{name} is negative"));
+        }
+    }
     let Some(property) = object.class.sku_property() else {
         return;
     };
@@ -161,7 +167,7 @@ fn check_contents(model: &Model, object: &Object, concerns: &mut Concerns) {
 /// A finished kit holds exactly the parts of its design, in a tray of the right kind.
 fn check_kit(model: &Model, object: &Object, concerns: &mut Concerns) {
     let finished = object.properties.get("isKitInstance_Finished");
-    if object.class != Class::KitInstance || finished != Some(&super::Scalar::Truth(true)) {
+    if object.class != Class::KitInstance || finished != Some(&Scalar::Truth(true)) {
         return;
     }
     let Some(design) = object.sku().and_then(|id| model.design(id)) else {

@@ -252,23 +252,38 @@ fn model_of(file: File) -> Result<Model, PlanError> {
     }
     model.designs = Arc::new(designs);
     add_objects(&mut model, file.object, f)?;
+    let volumes = volumes_in(&model, file.volume, f)?;
+    model.volumes = Arc::new(volumes);
+    model.workstation()?;
+    Ok(model)
+}
+
+fn volumes_in(
+    model: &Model,
+    entries: Vec<VolumeEntry>,
+    f: Factors,
+) -> Result<Vec<BoxVolume>, PlanError> {
     let mut volumes = Vec::new();
-    for entry in file.volume {
+    for entry in entries {
         let robot = model
             .named(&entry.robot)
             .ok_or_else(|| PlanError::NoObject(entry.robot))?
             .id;
         let corner = |corner: [f64; 3]| corner.map(|c| c * f.metres);
         let (minimum, maximum) = (corner(entry.minimum), corner(entry.maximum));
+        if !minimum.iter().chain(&maximum).all(|c| c.is_finite()) {
+            let robot = &model.object(robot)?.name;
+            return Err(PlanError::Import(format!(
+                "volume of {robot}: it is not finite"
+            )));
+        }
         volumes.push(BoxVolume {
             robot,
             minimum,
             maximum,
         });
     }
-    model.volumes = Arc::new(volumes);
-    model.workstation()?;
-    Ok(model)
+    Ok(volumes)
 }
 
 fn sku_in(entry: SkuEntry, f: Factors) -> Result<Sku, PlanError> {
@@ -283,35 +298,16 @@ fn sku_in(entry: SkuEntry, f: Factors) -> Result<Sku, PlanError> {
         height: shape.height * f.metres,
         has_top: shape.has_top,
     });
-    let Some(shape) = shape else {
-        let (id, description) = (entry.id, entry.description);
-        let (weight, effectors) = (entry.weight, entry.end_effectors);
-        return Ok(Sku {
-            id,
-            description,
-            shape: None,
-            weight,
-            effectors,
-            grasp,
-        });
-    };
-    if ![shape.length, shape.width, shape.height]
-        .iter()
-        .all(|c| c.is_finite() && *c > 0.0)
-    {
-        return Err(PlanError::Import(format!(
-            "shape of {}: sizes must be positive",
-            entry.id
-        )));
-    }
-    Ok(Sku {
+    let sku = Sku {
         id: entry.id,
         description: entry.description,
-        shape: Some(shape),
+        shape,
         weight: entry.weight,
         effectors: entry.end_effectors,
         grasp,
-    })
+    };
+    sku.check().map_err(PlanError::Import)?;
+    Ok(sku)
 }
 
 /// Two passes, because an object may refer to one that comes later.

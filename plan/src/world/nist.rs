@@ -45,6 +45,9 @@ pub fn import_nist(text: &str) -> Result<Model, PlanError> {
     let metres = units
         .metres()
         .ok_or_else(|| fail(root, "unknown length unit"))?;
+    if units.radians().is_none() {
+        return Err(fail(root, "unknown angle unit"));
+    }
     let mut import = Import {
         model: Model {
             units,
@@ -64,6 +67,12 @@ fn fail(node: Node<'_, '_>, why: impl std::fmt::Display) -> PlanError {
     let at = node.document().text_pos_at(node.range().start);
     let name = node.tag_name().name();
     PlanError::Import(format!("line {}, column {}, {name}: {why}", at.row, at.col))
+}
+
+/// A description whose name another has.
+fn twice(node: Node<'_, '_>) -> PlanError {
+    let name = text_of(node, "Name").unwrap_or_default();
+    fail(node, format!("there is another {name}"))
 }
 
 fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
@@ -149,12 +158,14 @@ impl Import {
             return Ok(None);
         }
         let (length, width, height) = (size("Length")?, size("Width")?, size("Height")?);
-        Ok(Some(Shape {
+        let known = Shape {
             length,
             width,
             height,
             has_top,
-        }))
+        };
+        known.check().map_err(|why| fail(shape, why))?;
+        Ok(Some(known))
     }
 
     fn descriptions(&mut self, root: Node<'_, '_>) -> Result<(), PlanError> {
@@ -178,7 +189,10 @@ impl Import {
                         effectors,
                         grasp: child(node, "GraspPose").map(|g| self.pose(g)).transpose()?,
                     };
-                    skus.insert(id, sku);
+                    sku.check().map_err(|why| fail(node, why))?;
+                    if skus.insert(id, sku).is_some() {
+                        return Err(twice(node));
+                    }
                 }
                 ("KitDesign", Some(id)) => {
                     let tray_sku = text_of(node, "KitTraySkuName").unwrap_or_default().into();
@@ -198,7 +212,9 @@ impl Import {
                             pose: self.pose(part)?,
                         });
                     }
-                    designs.insert(id, design);
+                    if designs.insert(id, design).is_some() {
+                        return Err(twice(node));
+                    }
                 }
                 _ => {}
             }

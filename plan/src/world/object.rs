@@ -143,6 +143,34 @@ pub struct Sku {
     pub grasp: Option<Isometry3<f64>>,
 }
 
+impl Shape {
+    /// Says what is wrong with sizes that no thing has.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let sizes = [self.length, self.width, self.height];
+        if sizes.iter().all(|size| size.is_finite() && *size > 0.0) {
+            Ok(())
+        } else {
+            Err("sizes must be positive".into())
+        }
+    }
+}
+
+impl Sku {
+    /// Says what is wrong with a description of nothing that can be.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let describe = |why: String| format!("shape of {}: {why}", self.id);
+        self.shape
+            .map_or(Ok(()), |shape| shape.check())
+            .map_err(describe)?;
+        match self.weight {
+            Some(weight) if !(weight.is_finite() && weight >= 0.0) => {
+                Err(format!("weight of {}: it must not be negative", self.id))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A part of a kit design: which unit, and its pose (m) relative to the kit tray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignPart {

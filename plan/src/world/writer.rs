@@ -54,7 +54,7 @@ impl Writer {
         load(&transaction)
     }
 
-    /// Replaces the whole world by `model`; runs stay.
+    /// Replaces the whole world by `model`; runs in the world that was there are forgotten.
     ///
     /// # Errors
     /// [`PlanError::Database`].
@@ -63,7 +63,7 @@ impl Writer {
         transaction.execute_batch(
             "DELETE FROM volume; DELETE FROM property; DELETE FROM object;
              DELETE FROM design_part; DELETE FROM design; DELETE FROM sku_effector;
-             DELETE FROM sku; DELETE FROM workstation;",
+             DELETE FROM sku; DELETE FROM workstation; DELETE FROM run;",
         )?;
         let units = &model.units;
         transaction.execute(

@@ -11,4 +11,5 @@ mod ordering;
 mod pddl;
 mod reading;
 mod running;
+mod statements;
 mod world;

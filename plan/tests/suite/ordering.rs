@@ -194,3 +194,26 @@ fn orders_respect_conflicts() {
     };
     runner.run(&strategy, test).unwrap();
 }
+
+/// What one member sets in the world and another reads keeps their written order as well, though
+/// the other order is shorter.
+#[test]
+fn orders_respect_properties() {
+    let source = "About PlanId = \"p\" PlanWorkstation = \"workstation1\" TargetSKU = \"kitABC\"
+         PlanRequirements item name = \"box\" type = \"LargeContainer\" location = WORKSTATION end
+         PlanParameters item name = \"NumberOfKitsToMake\" type = \"positiveInteger\" end
+         InternalVariables item name = \"Box\" type = \"LargeContainer\" requirement = \"box\" end
+         item name = \"n\" type = \"integer\" initialValue = 0 end
+         ToDo Start() Bind(Box, WORKSTATION, ANY, QUIT) DoInAnyOrder begin
+         DoInGivenOrder begin Set(Box.hasLargeContainer_Capacity, 13) RobotMoveAbove(Pose(Point(600, 300, 0), RollPitchYaw(0, 0, 0), WORKSTATION)) end
+         DoInGivenOrder begin Set(n, FIRST) RobotMoveAbove(Pose(Point(350, 0, 0), RollPitchYaw(0, 0, 0), WORKSTATION)) end
+         end Stop()\n";
+    let order = |first: &str| {
+        let world = "examples/kitting/workstation.toml";
+        let result = Trial::new(&source.replace("FIRST", first), world, 1).run();
+        assert_eq!(result.report.outcome, "stopped", "{:?}", result.report);
+        executed(&result.events, 7)
+    };
+    assert_eq!(order("1"), [1, 0], "the near one first");
+    assert_eq!(order("Box.hasLargeContainer_Capacity"), [0, 1]);
+}

@@ -1,10 +1,10 @@
 //! PDDL plans: simulated and executed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use plan::interp::{Code, CommandSink, PddlInterpreter, PlanInterpreter, PulledReport, pull};
+use plan::interp::{Code, CommandSink, PddlInterpreter, PlanInterpreter, Pull, PulledRun, pull};
 use plan::pddl::{ActionTable, Failure, read_domain, read_plan, read_problem, simulate};
-use plan::run::{RobotOptions, SimulatedMotion};
+use plan::run::{Report, RobotOptions, SimulatedMotion};
 use plan::world::{Class, Durability, Model, Writer, import_toml};
 
 use crate::fixtures::{repository_text, shared, shared_text};
@@ -93,31 +93,44 @@ fn bad_plans_fail_where_they_should() {
         g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_3.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
         g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt in g2g3-2013-2014/domain-kitting.pddl: step 1, (attach-endeffector robot_1 tray_gripper tray_gripper_holder changing_station_1): the precondition (endeffectorholder-has-endeffector tray_gripper_holder tray_gripper) is false
         g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt.1 in g2g3-2013-2014/domain-fluents.pddl: step 8, (take-part robot_1 part_c_1 part_c_tray part_gripper work_table_1 kit_a2b1c1): take-part takes 4 objects, not 6
-        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): (grasp-set-flag) has no value
+        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): the effect (increase (grasp-set-flag) 1) has no result: (grasp-set-flag) has no value
     "#]].assert_eq(&messages);
 }
 
-/// Executes a plan file with a simulated arm in the example workstation for PDDL plans.
-fn execute(plan: &Path, table: &ActionTable) -> (PulledReport, Model) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("world.db");
+/// The example workstation for PDDL plans as a database.
+fn fresh_world(folder: &Path) -> PathBuf {
+    let path = folder.join("world.db");
     let mut writer = Writer::open(&path, Durability::Process).unwrap();
     let world = repository_text("examples/kitting/workstation-pddl.toml");
     writer.replace(&import_toml(&world).unwrap()).unwrap();
-    let mut interpreter = PddlInterpreter::new(&path, table.clone(), RobotOptions::default());
+    path
+}
+
+/// Executes a run with an arm that fails at these commands.
+fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]) -> Report {
+    let options = &RobotOptions::default();
+    let mut interpreter = PddlInterpreter::new(path, table.clone(), options.clone());
+    interpreter.go_on(run.source(), run.done());
     let mut motion = SimulatedMotion {
         reach: Some(0.85),
+        failures: failures.to_vec(),
         ..SimulatedMotion::default()
     };
-    let plan = (plan.to_str().unwrap(), "PDDL");
-    let report = pull(
-        &mut interpreter,
-        plan,
-        &mut writer,
-        &mut motion,
-        &mut |_| {},
-    )
-    .unwrap();
+    let place = Pull {
+        writer: &mut Writer::open(path, Durability::Process).unwrap(),
+        motion: &mut motion,
+        options,
+    };
+    pull(&mut interpreter, run, place, &mut |_| {}).unwrap()
+}
+
+/// Executes a plan file with a simulated arm in the example workstation for PDDL plans.
+fn execute(plan: &Path, table: &ActionTable) -> (Report, Model) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fresh_world(folder.path());
+    let source = std::fs::read_to_string(plan).unwrap();
+    let run = PulledRun::new(plan.to_str().unwrap(), &source);
+    let report = pull_run(&path, table, run, &[]);
     (report, read_world(&path))
 }
 
@@ -157,12 +170,59 @@ fn pddl_plans_make_a_kit() {
     for plan in plans {
         let (report, world) = execute(&plan, &table);
         assert_eq!(
-            (report.outcome, report.code, report.steps),
+            (report.outcome, report.code, report.counters.statements),
             ("stopped", 0, 18),
             "{report:?}"
         );
         assert_one_kit(&world);
     }
+}
+
+/// A run whose motion fails at any command goes on from its database to the same kit; one that
+/// came to its end, or that the interpreter gave up, does not.
+#[test]
+fn a_failed_pddl_run_is_resumed() {
+    let table = ActionTable::own().unwrap();
+    let source = repository_text("examples/kitting/one-kit.pddl");
+    let last = |path: &Path| Writer::open(path, Durability::Process).unwrap().last_run();
+    let folder = tempfile::tempdir().unwrap();
+    let path = fresh_world(folder.path());
+    let good = pull_run(&path, &table, PulledRun::new("plan", &source), &[]);
+    let whole = read_world(&path);
+    let again = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap_err();
+    assert!(again.to_string().contains("came to its end"), "{again}");
+    for at in (5..good.counters.commands - 1).step_by(3) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = fresh_world(folder.path());
+        let failed = pull_run(&path, &table, PulledRun::new("plan", &source), &[at]);
+        assert_eq!(
+            (failed.outcome, failed.code),
+            ("failed", 100),
+            "{failed:#?}"
+        );
+        let run = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap();
+        assert_eq!(run.done(), failed.counters.statements);
+        let report = pull_run(&path, &table, run, &[]);
+        let counters = &report.counters;
+        assert_eq!(
+            (
+                report.outcome,
+                counters.statements,
+                counters.pick_ups,
+                counters.kits
+            ),
+            ("stopped", 18, 6, 1),
+            "command {at}: {report:#?}"
+        );
+        crate::world::assert_same(&whole, &read_world(&path));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = fresh_world(folder.path());
+    let ghost = PulledRun::new("plan", "(attach-eff robot_1 ghost ghost_holder)");
+    let report = pull_run(&path, &table, ghost, &[]);
+    assert_eq!((report.outcome, report.code), ("failed", 9), "{report:#?}");
+    let again = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap_err();
+    assert!(again.to_string().contains("gave up"), "{again}");
 }
 
 /// A user's table adds an action.
@@ -181,11 +241,15 @@ fn a_table_adds_an_action() {
     std::fs::write(&plan, "(greet robot_1)\n0.5: (GREET robot_1) [0.5]\n").unwrap();
     let (report, _) = execute(&plan, &table);
     assert_eq!(
-        (report.outcome, report.steps, report.commands),
+        (
+            report.outcome,
+            report.counters.statements,
+            report.counters.commands
+        ),
         ("stopped", 2, 8),
         "{report:?}"
     );
-    assert!(report.motion_s >= 1.0);
+    assert!(report.counters.motion_s >= 1.0);
     let wrong = more.replace("{ dwell = 0.5 }", "{ pick_up = \"part\" }");
     let error = table.with(&wrong).unwrap_err().to_string();
     assert!(error.contains("no argument is called part"), "{error}");

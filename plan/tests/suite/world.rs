@@ -127,6 +127,83 @@ fn database_round_trip() {
     );
 }
 
+/// Sizes that are not positive, numbers that are none and names that are used twice are refused,
+/// in all forms of files.
+#[test]
+fn impossible_descriptions_are_refused() {
+    let toml = crate::fixtures::repository_text("examples/kitting/workstation.toml");
+    let json = export_json(&import_toml(&toml).unwrap()).unwrap();
+    let mut cases: Vec<(String, &str, &str)> = [
+        ("length = 25", "length = 0", "sizes must be positive"),
+        ("length = 25", "length = -inf", "sizes must be positive"),
+        ("weight = 0.02", "weight = nan", "weight"),
+        ("weight = 0.02", "weight = -1.0", "weight"),
+        ("id = \"PartB\"", "id = \"PartA\"", "PartA"),
+    ]
+    .map(|(from, to, why)| (toml.replacen(from, to, 1), "toml", why))
+    .into();
+    let volume = "[[volume]]\nrobot = \"Robot1\"\nminimum = [0, 0, 0]\nmaximum = [1, inf, 1]\n";
+    cases.push((format!("{toml}\n{volume}"), "toml", "volume"));
+    let flat = json.replacen("\"length\": 25.0", "\"length\": -25.0", 1);
+    cases.push((flat, "json", "sizes must be positive"));
+    if let Some(xml) = shared_text("data/nist/workstation/kittingInstancesInit1.xml") {
+        let (start, length) = (xml.find("<Length>").unwrap(), "<Length>".len());
+        let end = start + xml[start..].find("</Length>").unwrap();
+        let flat = format!("{}-0.0{}", &xml[..start + length], &xml[end..]);
+        cases.push((flat, "xml", "sizes must be positive"));
+        let first = "<Name>stock_keeping_unit_part_a</Name>";
+        let twice = xml.replacen("<Name>stock_keeping_unit_part_b</Name>", first, 1);
+        assert_ne!(twice, xml);
+        let unit = "<AngleUnit>degree</AngleUnit>";
+        let turned = xml.replacen(unit, "<AngleUnit>turn</AngleUnit>", 1);
+        assert_ne!(turned, xml);
+        cases.push((turned, "xml", "unknown angle unit"));
+        cases.push((twice, "xml", "stock_keeping_unit_part_a"));
+    }
+    for (text, form, why) in cases {
+        let import = match form {
+            "toml" => import_toml,
+            "json" => import_json,
+            _ => import_nist,
+        };
+        let said = import(&text).map(|_| ()).unwrap_err().to_string();
+        assert!(said.contains(why), "{form}, {why}: {said}");
+    }
+    let mut model = import_toml(&toml).unwrap();
+    let table = model.named("Table1").unwrap().id;
+    let (property, value) = ("hasBox_Length".into(), Scalar::Number(-1.0));
+    let change = Change::Set {
+        object: table,
+        property,
+        value,
+    };
+    model.apply(&change).unwrap();
+    assert!(errors(&model).iter().any(|e| e.contains("hasBox_Length")));
+}
+
+/// A world that replaces another is not taken for the one that a run was made in.
+#[test]
+fn runs_go_with_their_world() {
+    let text = crate::fixtures::repository_text("examples/kitting/workstation.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = Writer::open(&folder.path().join("w.db"), Durability::Process).unwrap();
+    writer.replace(&import_toml(&text).unwrap()).unwrap();
+    let mut run = plan::world::StoredRun {
+        id: 0,
+        plan: "p".into(),
+        source: "(greet robot_1)".into(),
+        parameters: "{}".into(),
+        stock: "{}".into(),
+        state: "{}".into(),
+        outcome: None,
+        under_way: None,
+    };
+    run.id = writer.begin_run(&run).unwrap();
+    assert_eq!(writer.last_run().unwrap(), Some(run));
+    writer.replace(&import_toml(&text).unwrap()).unwrap();
+    assert_eq!(writer.last_run().unwrap(), None);
+}
+
 /// A commit with one impossible change changes nothing.
 #[test]
 fn commits_are_whole() {

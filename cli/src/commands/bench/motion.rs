@@ -17,7 +17,7 @@ use crate::{output, robot};
 /// Smooth motions through pose lists: motion time beside exact stop, planning time, certificate
 ///
 /// Without a robot the controlled point moves freely. With one, each list is laid before it with
-/// its middle where the tool is at home, and planned by the planner that runs programs. The
+/// its middle where the flange is at home, and planned by the planner that runs programs. The
 /// planning time is the shortest of three, so that the machine's stalls do not count.
 #[derive(Args, Debug)]
 pub(crate) struct Motion {

@@ -1,0 +1,65 @@
+//! Three turns that bring one orientation to another, four branches side by side.
+
+use super::lanes::{Angle, Held, Pair, Vec4, Wave, angle_of, angles_of, last_turn_to, turn_to};
+use super::six::dot;
+use crate::arith::Arith;
+use crate::wide::{B4, F4};
+use std::f64::consts::PI;
+
+/// Turns about three axes whose product brings the third axis to `axis`, and `spin`,
+/// at right angles to it, to `spun`. Where the first and third axis fall together the
+/// first is held. Beside them both answers for the middle one. The sine and cosine
+/// of the last turn may have any length.
+#[inline(always)]
+pub(crate) fn orient<A: Arith>(
+    [first, middle, last]: [[f64; 3]; 3],
+    (axis, spun, spin): (Vec4<A>, Vec4<A>, [f64; 3]),
+    sign: [f64; 4],
+    hold: [Held; 3],
+) -> ([Angle<A>; 3], Pair<A>) {
+    let a = axis.0[0].build();
+    let level = axis.along(first);
+    let wave = Wave::of(Vec4::splat(a, first), middle, Vec4::splat(a, last), level);
+    // With the middle axis square to both, the discriminant is the squared sine between
+    // first axis and target; taken from their product it stays exact when small.
+    let tilts = if square([first, middle, last]) {
+        let across = Vec4::splat(a, first).cross(axis);
+        let one = F4::splat(a, 1.0);
+        wave.with_rest(across.dot(across), (one, one), 1e-12)
+    } else {
+        wave.solve(1e-12)
+    };
+    let tilt = tilts.pick(sign, hold[1]);
+    let tilted = Vec4::splat(a, last).turned(middle, tilt);
+    let swing = turn_to(tilted, axis, first, hold[0]);
+    let left = spun.turned(first, swing.back()).turned(middle, tilt.back());
+    let roll = last_turn_to(Vec4::splat(a, spin), left, last, hold[2]);
+    ([swing, tilt, roll], tilts)
+}
+
+/// Whether the middle axis is square to both others.
+#[inline(always)]
+fn square([first, middle, last]: [[f64; 3]; 3]) -> bool {
+    dot(first, middle).abs() < 1e-12 && dot(middle, last).abs() < 1e-12
+}
+
+/// Both answers of [`orient`] as angles (rad), each with whether it is real.
+#[inline(always)]
+pub(crate) fn orient_both<A: Arith>(
+    axes: [[f64; 3]; 3],
+    goal: (Vec4<A>, Vec4<A>, [f64; 3]),
+    hold: [Held; 3],
+) -> [([F4<A>; 3], B4<A>); 2] {
+    let (turns, tilts) = orient(axes, goal, [1.0; 4], hold);
+    let first = angles_of(turns);
+    if square(axes) {
+        // Half a turn of the outer two and the middle one mirrored is the same.
+        let half = F4::splat(first[0].build(), PI);
+        let tilt = angle_of(tilts.pick([-1.0; 4], hold[1]));
+        let swing = first[0] - half.signed(first[0]);
+        let second = [swing, tilt, first[2] - half.signed(first[2])];
+        return [(first, tilts.real), (second, tilts.real)];
+    }
+    let (turns, other) = orient(axes, goal, [-1.0; 4], hold);
+    [(first, tilts.real), (angles_of(turns), other.real)]
+}
