@@ -36,7 +36,9 @@ impl<const N: usize> Planner<N> {
             return Ok(Trajectory::new(Vec::new()));
         }
         let line = Line::new(from, goal);
-        let points = self.followed((&line, false), start, &|_| 1)?;
+        let points = self
+            .followed((&line, false), start, &|_| 1)
+            .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
@@ -76,7 +78,9 @@ impl<const N: usize> Planner<N> {
                 .take_while(|pass| pass.time <= u)
                 .count()
         };
-        let points = self.followed((&plan, true), start, &towards)?;
+        let points = self
+            .followed((&plan, true), start, &towards)
+            .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
         let samples = certificate::tool_samples(self.chain(), &direct);
         let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
@@ -149,6 +153,28 @@ impl<const N: usize> Planner<N> {
             .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
+    /// Why the way is blocked, or, where the pose ahead is farther away than the arm reaches and
+    /// the tolerance allows, that: no other way would help.
+    #[cold]
+    fn blamed(&self, blocked: MotionError, motion: &Move, start: &SVector<f64, N>) -> MotionError {
+        let MotionError::Blocked { pose, .. } = &blocked else {
+            return blocked;
+        };
+        let ahead = pose
+            .checked_sub(1)
+            .and_then(|index| motion.poses.get(index));
+        match ahead.map(|goal| self.solver.nearest(goal, start)) {
+            Some(Err(report)) => match report.obstacle {
+                Obstacle::OutOfReach { distance } if distance > motion.tolerance => {
+                    self.refusal(*pose, &report)
+                }
+                _ => blocked,
+            },
+            _ => blocked,
+        }
+    }
+
+    #[cold]
     fn blocked(
         &self,
         error: &FollowError,

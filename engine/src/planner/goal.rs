@@ -165,7 +165,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The report of the solver in the words of a command.
-    fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
+    pub(super) fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
         match report.obstacle {
             Obstacle::OutOfReach { distance } => MotionError::OutOfReach {
                 pose,
