@@ -19,6 +19,7 @@ mod exit;
 mod failure;
 mod host;
 mod logging;
+mod mobility;
 mod moving_arm;
 mod output;
 mod pddl_file;

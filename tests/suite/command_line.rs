@@ -88,6 +88,11 @@ fn shipped_robots_are_listed_and_shown() {
         let shown = canter(["robots", "show", robot, "--json"]);
         let shown: serde_json::Value = serde_json::from_str(&shown.stdout).unwrap();
         assert_eq!(shown["name"], robot);
+        let mobility = &shown["mobility"];
+        let [near, far] = ["nearest_m", "farthest_m"].map(|end| mobility["reach"][end].as_f64());
+        assert!(near < far && far > Some(0.5), "{robot}: {mobility}");
+        assert!(mobility["condition"].as_f64() > Some(1.0), "{robot}");
+        assert!(mobility["manipulability"].as_f64() > Some(0.0), "{robot}");
         let joints = shown["dof"].as_u64().unwrap() as usize;
         for list in ["name", "lower", "upper", "velocity", "acceleration", "jerk"] {
             assert_eq!(

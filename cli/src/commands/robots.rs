@@ -3,11 +3,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use engine::robot::{self, Robot};
-use nalgebra::{Isometry3, SVector};
+use nalgebra::Isometry3;
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::mobility::{Mobility, mobility};
 use crate::output;
 use crate::robot::{load, with_joints};
 
@@ -105,23 +106,13 @@ fn import(
 }
 
 fn show(robot: &Robot, json: bool) -> Result<Exit, Failure> {
-    let home = with_joints!(robot.dof(), home_pose(robot))?;
+    let mobility = with_joints!(robot.dof(), mobility(robot))?;
     if json {
-        output::json(&description(robot, &home))?;
+        output::json(&description(robot, &mobility))?;
     } else {
-        table(robot, &home)?;
+        table(robot, &mobility)?;
     }
     Ok(Exit::Done)
-}
-
-/// Pose of the controlled point in the workstation at the home position.
-fn home_pose<const N: usize>(robot: &Robot) -> Result<Isometry3<f64>, Failure> {
-    let chain = robot
-        .chain_with::<N>(robot.mounted)
-        .map_err(|error| Failure::new(Exit::Unreadable, error))?;
-    Ok(chain.forward(&SVector::from_fn(|joint, _| {
-        robot.home.get(joint).copied().unwrap_or(0.0)
-    })))
 }
 
 fn pose(pose: &Isometry3<f64>) -> Value {
@@ -129,7 +120,7 @@ fn pose(pose: &Isometry3<f64>) -> Value {
     json!({"position_m": [p.x, p.y, p.z], "quaternion_wxyz": [r.w, r.i, r.j, r.k]})
 }
 
-fn description(robot: &Robot, home: &Isometry3<f64>) -> Value {
+fn description(robot: &Robot, mobility: &Mobility) -> Value {
     let finite = |values: &[f64]| -> Vec<Option<f64>> {
         values
             .iter()
@@ -176,13 +167,14 @@ fn description(robot: &Robot, home: &Isometry3<f64>) -> Value {
             "source": robot.tool.source,
         },
         "workstation_from_base": pose(&robot.workstation_from_base),
-        "home": {"joints": robot.home, "workstation_from_tool": pose(home)},
+        "home": {"joints": robot.home, "workstation_from_tool": pose(&mobility.home)},
+        "mobility": mobility.json(),
         "mounted": mounted.map(|tool| &tool.name),
         "end_effectors": end_effectors,
     })
 }
 
-fn table(robot: &Robot, home: &Isometry3<f64>) -> io::Result<()> {
+fn table(robot: &Robot, mobility: &Mobility) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(out, "{}: {}\n", robot.name, robot.description)?;
     joint_table(&mut out, robot)?;
@@ -203,7 +195,9 @@ fn table(robot: &Robot, home: &Isometry3<f64>) -> io::Result<()> {
         "base in the workstation: {}",
         millimetres(&robot.workstation_from_base)
     )?;
-    writeln!(out, "controlled point at home: {}", millimetres(home))?;
+    let at_home = millimetres(&mobility.home);
+    writeln!(out, "controlled point at home: {at_home}")?;
+    mobility.lines(&mut out)?;
     end_effectors(&mut out, robot)
 }
 

@@ -153,8 +153,8 @@ impl<const N: usize> Planner<N> {
             .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
-    /// Why the way is blocked, or, where the pose ahead is farther away than the arm reaches and
-    /// the tolerance allows, that: no other way would help.
+    /// Why the way is blocked, or, where the pose ahead is beyond what the arm reaches and the
+    /// tolerance allows, that: no other way would help.
     #[cold]
     fn blamed(&self, blocked: MotionError, motion: &Move, start: &SVector<f64, N>) -> MotionError {
         let MotionError::Blocked { pose, .. } = &blocked else {
@@ -168,6 +168,7 @@ impl<const N: usize> Planner<N> {
                 Obstacle::OutOfReach { distance } if distance > motion.tolerance => {
                     self.refusal(*pose, &report)
                 }
+                Obstacle::Orientation { .. } => self.refusal(*pose, &report),
                 _ => blocked,
             },
             _ => blocked,

@@ -222,6 +222,7 @@ fn backward<S: Four, const B: usize, const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::linalg::solvers::Solve as _;
 
     /// The solution of a random banded system solves it, in both builds alike.
     #[test]
@@ -268,6 +269,10 @@ mod tests {
             [x, y]
         };
         let x = solve(band.clone());
+        let other = by_faer(&matrix, diagonals, &sides[0]);
+        for (got, wanted) in x[0].iter().zip(&other) {
+            assert!((got - wanted).abs() < 1e-12, "{got} here, {wanted} by faer");
+        }
         band.wide = Wide::plain();
         assert_eq!(x, solve(band));
         for m in 0..2 {
@@ -275,5 +280,21 @@ mod tests {
                 assert!((got - wanted).abs() < 1e-12);
             }
         }
+    }
+    /// The solution by faer's dense Cholesky factorisation.
+    fn by_faer<const B: usize>(band: &Band<B>, diagonals: usize, side: &[f64]) -> Vec<f64> {
+        let size = band.columns.len();
+        let entry = |i: usize, j: usize| {
+            let (row, column) = (i.max(j), i.min(j));
+            if row - column < diagonals {
+                band.columns[column][row - column]
+            } else {
+                0.0
+            }
+        };
+        let matrix = faer::Mat::from_fn(size, size, entry);
+        let side = faer::Col::from_fn(size, |i| side[i]);
+        let x = matrix.llt(faer::Side::Lower).unwrap().solve(&side);
+        x.iter().copied().collect()
     }
 }
