@@ -223,6 +223,7 @@ impl Host {
             clients,
             ownership,
             notes,
+            count,
             shutdown,
             ..
         } = self;
@@ -234,7 +235,11 @@ impl Host {
                 return refusal;
             }
             match request.ask {
-                Verb::Status => Answer::accept(json!({"status": status, "notes": notes})),
+                Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
+                Verb::Notes { since } => {
+                    let later = notes.iter().filter(|note| note["number"].as_u64() > Some(since));
+                    Answer::accept(json!({"notes": later.collect::<Vec<_>>()}))
+                }
                 Verb::Shutdown => {
                     *shutdown = true;
                     Answer::accept(Value::Null)

@@ -63,6 +63,11 @@ pub enum Verb {
     },
     /// Report.
     Status,
+    /// What has happened.
+    Notes {
+        /// Number of the last note that is known; only later ones are asked for.
+        since: u64,
+    },
     /// Stop on the path and end the engine.
     Shutdown,
 }

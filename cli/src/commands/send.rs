@@ -37,10 +37,8 @@ impl Send {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
-        let seen = self.arm.ask(Verb::Status)?.body["notes"]
-            .as_array()
-            .and_then(|notes| notes.last()?["number"].as_u64())
-            .unwrap_or(0);
+        let before = self.arm.ask(Verb::Status)?.body;
+        let seen = before["last_note"].as_u64().unwrap_or(0);
         let answer = self.arm.ask(Verb::Submit {
             format: program.form().to_owned(),
             name: program.name().to_owned(),
@@ -58,13 +56,9 @@ impl Send {
     /// Prints what happens until the last command is over.
     fn follow(&self, mut seen: u64, last: u64) -> Result<Exit, Failure> {
         loop {
-            let body = self.arm.ask(Verb::Status)?.body;
+            let body = self.arm.ask(Verb::Notes { since: seen })?.body;
             for entry in body["notes"].as_array().into_iter().flatten() {
-                let number = entry["number"].as_u64().unwrap_or(0);
-                if number <= seen {
-                    continue;
-                }
-                seen = number;
+                seen = entry["number"].as_u64().unwrap_or(seen);
                 let note = &entry["note"];
                 writeln!(io::stdout().lock(), "{note}")?;
                 if let Some(exit) = over(note, last) {
