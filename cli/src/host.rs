@@ -237,7 +237,9 @@ impl Host {
             match request.ask {
                 Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
                 Verb::Notes { since } => {
-                    let later = notes.iter().filter(|note| note["number"].as_u64() > Some(since));
+                    let later = notes
+                        .iter()
+                        .filter(|note| note["number"].as_u64() > Some(since));
                     Answer::accept(json!({"notes": later.collect::<Vec<_>>()}))
                 }
                 Verb::Shutdown => {

@@ -95,7 +95,10 @@ impl MovingArm {
             .host
             .session
             .submit(program.commands)
-            .map_err(|full| MotionFailure::new(0, format!("the queue is full: {full}")))?;
+            .map_err(|error| {
+                self.read_blame();
+                MotionFailure::new(0, error.to_string())
+            })?;
         let Some(last) = ids.last().copied() else {
             return Ok(());
         };
@@ -108,10 +111,7 @@ impl MovingArm {
                     return Err(MotionFailure::new(position(id), error.to_string()));
                 }
                 Note::Faulted { blame, reason, .. } => {
-                    self.blame = Some(match blame {
-                        Blame::Guard => Exit::Aborted,
-                        Blame::Driver => Exit::DriverFault,
-                    });
+                    self.blame = Some(exit_of(blame));
                     return Err(MotionFailure::new(0, reason));
                 }
                 Note::Stopped if self.signalled > 0 => return Err(MotionFailure::stopped()),
@@ -122,6 +122,15 @@ impl MovingArm {
                     output::note(&text);
                 }
                 _ => {}
+            }
+        }
+    }
+
+    /// Learns of a fault that came between two executions.
+    fn read_blame(&mut self) {
+        while let Ok(Some(note)) = self.turn() {
+            if let Note::Faulted { blame, .. } = note {
+                self.blame = Some(exit_of(blame));
             }
         }
     }
@@ -187,5 +196,13 @@ impl MovingArm {
         drop(self.host);
         self.recording.finish()?;
         Ok(worst)
+    }
+}
+
+/// How a process ends after a fault.
+fn exit_of(blame: Blame) -> Exit {
+    match blame {
+        Blame::Guard => Exit::Aborted,
+        Blame::Driver => Exit::DriverFault,
     }
 }

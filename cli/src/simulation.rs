@@ -36,16 +36,12 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// Starts `canter driver sim` or `canter driver mujoco` for an arm; MuJoCo is waited for,
-    /// because a Python takes its time, or ends without its packages.
+    /// Starts `canter driver sim` or `canter driver mujoco` for an arm and waits for it: a Python
+    /// takes its time or ends without its packages, and another driver may have the arm.
     ///
     /// # Errors
-    /// [`Exit::NoPeer`] when the process cannot be started.
+    /// [`Exit::NoPeer`] when the process cannot be started or ends at once.
     pub(crate) fn start(kind: Kind<'_>, robot: &str, arm: &Arm) -> Result<Self, Failure> {
-        let output = match kind {
-            Kind::Servos => Stdio::null(),
-            Kind::Mujoco { .. } => Stdio::piped(),
-        };
         let program = env::current_exe().context("cannot find the program's own file");
         let child = program.and_then(|program| {
             let mut command = Command::new(program);
@@ -58,7 +54,7 @@ impl Simulation {
                 .args(["--until-end-of-input", "--robot", robot, "--arm"])
                 .arg(arm.to_string())
                 .stdin(Stdio::piped())
-                .stdout(output)
+                .stdout(Stdio::piped())
                 .process_group(0)
                 .spawn()
                 .context("cannot start the simulated driver")
@@ -69,7 +65,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Waits for the line that a driver with a piped output says when it is there.
+    /// Waits for the line that a driver says when it is there.
     fn wait_until_ready(&mut self) -> Result<(), Failure> {
         let Some(output) = self.child.stdout.take() else {
             return Ok(());

@@ -117,7 +117,7 @@ fn a_killed_arm_goes_on_to_the_same_end() {
         let options = ["--lock-step", "--speed", "100", "--arm", &arm];
         options.map(str::to_owned).into()
     };
-    let said = kill_runs(1, size("CANTER_KILLS_MOVING", 1), &moving);
+    let said = kill_runs(1, size("CANTER_KILLS_MOVING", 2), &moving);
     println!("{said}");
 }
 
@@ -149,33 +149,64 @@ fn a_pddl_run_goes_on_where_it_was() {
     assert!(shown.contains("6 statements, 0 kits; failed"), "{shown}");
 }
 
+/// Waits until a run has done some statements and another is under way.
+fn moving(database: &str, statements: usize) {
+    let deadline = Instant::now() + Duration::from_secs(300);
+    while Instant::now() < deadline {
+        let shown = canter(["world", "show", database]).stdout;
+        let last = shown.lines().last().unwrap_or_default();
+        let count = last
+            .split(", ")
+            .nth(1)
+            .and_then(|part| part.split(' ').next()?.parse().ok());
+        if count.is_some_and(|count: usize| count >= statements) && last.contains("under way") {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    panic!("the run does not get as far as {statements} statements");
+}
+
+/// A driver that dies is a fault of the arm: the run ends, at once and with its exit code.
+#[test]
+fn a_plan_whose_driver_dies_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("world.db");
+    let arm = format!("killed{}/driver", std::process::id());
+    let driver = ["driver", "sim", "-r", "ur5e", "--arm", &arm];
+    let mut driver = command(driver).stderr(Stdio::null()).spawn().unwrap();
+    let external = ["--lock-step", "--driver", "external", "--arm", &arm];
+    let mut process = start(&database, 3, &external);
+    moving(database.to_str().unwrap(), 8);
+    driver.kill().unwrap();
+    driver.wait().unwrap();
+    let deadline = Instant::now() + Duration::from_secs(60);
+    let code = loop {
+        if let Some(status) = process.try_wait().unwrap() {
+            break status.code();
+        }
+        if Instant::now() > deadline {
+            process.kill().unwrap();
+            panic!("the run goes on without a driver");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert_eq!(code, Some(7));
+    drop(world(&database));
+}
+
 /// With the simulated driver: killed while the arm moves, then stopped by Ctrl-C, then to its end.
 #[test]
 fn a_moving_arm_is_killed_and_stopped_and_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("world.db");
     let path = database.to_str().unwrap();
+    // The same arm again at once: what is left of the killed process must not be in the way.
     let name = |number: u32| format!("killed{}/{number}", std::process::id());
-    let (first, second, third) = (name(1), name(2), name(3));
-    let moving = |statements: usize| {
-        let deadline = Instant::now() + Duration::from_secs(300);
-        while Instant::now() < deadline {
-            let shown = canter(["world", "show", path]).stdout;
-            let last = shown.lines().last().unwrap_or_default();
-            let count = last
-                .split(", ")
-                .nth(1)
-                .and_then(|part| part.split(' ').next()?.parse().ok());
-            if count.is_some_and(|count: usize| count >= statements) && last.contains("under way") {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("the run does not get as far as {statements} statements");
-    };
+    let (first, second, third) = (name(1), name(1), name(2));
     let fast = ["--lock-step", "--speed", "100", "--arm"];
     let mut process = start(&database, 1, &[&fast[..], &[&first]].concat());
-    moving(8);
+    moving(path, 8);
     process.kill().unwrap();
     process.wait().unwrap();
     drop(world(&database));
@@ -189,7 +220,7 @@ fn a_moving_arm_is_killed_and_stopped_and_goes_on() {
     .stderr(Stdio::null())
     .spawn()
     .unwrap();
-    moving(30);
+    moving(path, 30);
     let interrupt = ["-INT", &process.id().to_string()];
     assert!(
         std::process::Command::new("kill")

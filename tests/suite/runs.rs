@@ -429,6 +429,18 @@ fn a_jog_needs_its_client_alive() {
     assert_eq!(engine.end(), Some(0));
 }
 
+/// An arm that has a driver gets no second one, and the first is left alone.
+#[test]
+fn an_arm_that_is_taken_is_left_alone() {
+    let arm = arm("taken");
+    let mut other = driver(&arm, &[]);
+    std::thread::sleep(Duration::from_millis(500));
+    let ran = canter(["run", EXAMPLE, "-r", "ur5e", "--arm", &arm]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (4, ""), "{}", ran.stderr);
+    assert!(ran.stderr.contains("already taken"), "{}", ran.stderr);
+    assert_eq!(other.0.try_wait().unwrap(), None);
+}
+
 #[test]
 fn without_a_driver_nothing_starts() {
     let arm = arm("lonely");

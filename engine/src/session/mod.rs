@@ -111,9 +111,24 @@ pub struct RunSample {
     pub measured_pose: Isometry3<f64>,
 }
 
+/// Why commands were not taken.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SubmitError {
+    /// There is no room for all of them.
+    #[error(transparent)]
+    Full(#[from] Full),
+    /// A fault is latched: what is queued now would be forgotten when it is cleared.
+    #[error("a fault is latched ({0}); canter recover clears it")]
+    Fault(String),
+    /// The session is over.
+    #[error("the session has ended")]
+    Closed,
+}
+
 /// What is asked of the worker.
 enum Order {
-    Submit(Vec<Located>, Sender<Result<Vec<u32>, Full>>),
+    Submit(Vec<Located>, Sender<Result<Vec<u32>, SubmitError>>),
     Control(Control),
     Jog(Jog, Sender<Result<(), JogError>>),
     Recover,
@@ -195,15 +210,13 @@ impl Session {
     /// Appends commands to the queue: all of them or none.
     ///
     /// # Errors
-    /// [`Full`], and the queue is as before.
-    pub fn submit(&self, commands: Vec<Located>) -> Result<Vec<u32>, Full> {
+    /// [`SubmitError`], and the queue is as before.
+    pub fn submit(&self, commands: Vec<Located>) -> Result<Vec<u32>, SubmitError> {
         let (answer, answered) = mpsc::channel();
-        // A worker that has ended takes nothing more: its queue has no room.
-        let closed = Err(Full { capacity: 0 });
         if self.orders.send(Order::Submit(commands, answer)).is_err() {
-            return closed;
+            return Err(SubmitError::Closed);
         }
-        answered.recv().unwrap_or(closed)
+        answered.recv().unwrap_or(Err(SubmitError::Closed))
     }
 
     /// Asks for a pause, a stop, another speed; it does not wait in the queue.

@@ -14,7 +14,7 @@ use trajectory::ToolLimits;
 use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
-use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared};
+use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared, SubmitError};
 use crate::controller::{Controller, Step};
 use crate::dry_run::FailurePolicy;
 use crate::executor::{
@@ -215,11 +215,14 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    fn submit(&mut self, commands: Vec<crcl::Located>) -> Result<Vec<u32>, Full> {
+    fn submit(&mut self, commands: Vec<crcl::Located>) -> Result<Vec<u32>, SubmitError> {
+        if let Some(fault) = &self.fault {
+            return Err(SubmitError::Fault(fault.clone()));
+        }
         if self.queue.len() + commands.len() > self.config.capacity {
-            return Err(Full {
+            return Err(SubmitError::Full(Full {
                 capacity: self.config.capacity,
-            });
+            }));
         }
         let mut ids = Vec::with_capacity(commands.len());
         for located in commands {

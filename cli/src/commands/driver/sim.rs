@@ -1,10 +1,13 @@
+use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use driver_sim::Options;
 use engine::robot::Robot;
-use ipc::IpcError;
+use ipc::{DriverLink, IpcError};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::client::ArmOption;
@@ -12,6 +15,10 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
 use crate::robot::RobotOption;
+
+/// How long another driver may go on having the arm, and how often to look.
+const TAKEN: Duration = Duration::from_secs(3);
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Run the simulated driver of an arm until Ctrl-C
 ///
@@ -53,6 +60,9 @@ impl Sim {
         }
         if self.until_end_of_input {
             super::end_with_input(Arc::clone(&stop));
+            self.wait_for_arm()?;
+            // The starter waits for this line.
+            writeln!(io::stdout(), "ready")?;
         }
         let report = driver_sim::run(self.options(&robot), &stop).map_err(failure)?;
         if let Some(warning) = &report.warning {
@@ -65,6 +75,18 @@ impl Sim {
             ));
         }
         Ok(Exit::Done)
+    }
+
+    /// Waits until no other driver has the arm: one whose starter was killed takes a moment to end.
+    fn wait_for_arm(&self) -> Result<(), Failure> {
+        let end = Instant::now() + TAKEN;
+        loop {
+            match DriverLink::open(&self.arm.arm) {
+                Ok(_) => return Ok(()),
+                Err(IpcError::Taken { .. }) if Instant::now() < end => sleep(LOOK),
+                Err(error) => return Err(failure(error.into())),
+            }
+        }
     }
 
     fn options(&self, robot: &Robot) -> Options {
