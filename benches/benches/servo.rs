@@ -32,7 +32,8 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["--peer", "driver", arm] => return driver(arm),
-        ["--peer", "probe", arm] => return echo_probe(arm),
+        ["--peer", "probe", arm] => return echo_probe(arm, Probe::receive),
+        ["--peer", "glance", arm] => return echo_probe(arm, Probe::glance),
         ["--peer", "link", arm] => return echo_link(arm),
         _ => {}
     }
@@ -332,10 +333,10 @@ fn cyclictest(rate: f64) -> Option<(u64, u64)> {
     Some((quantile(0.5)?, quantile(0.99)?))
 }
 
-fn echo_probe(arm: &str) {
+fn echo_probe(arm: &str, look: fn(&Probe) -> Option<u64>) {
     let probe = Probe::open(&arm.parse().unwrap(), false).unwrap();
     loop {
-        if let Some(number) = probe.receive() {
+        if let Some(number) = look(&probe) {
             probe.send(number);
         }
         std::hint::spin_loop();
@@ -359,38 +360,46 @@ fn echo_link(arm: &str) {
     }
 }
 
-/// Round trips of a checked setpoint and state, in turns with those of bare messages.
+/// Round trips of a checked setpoint and state, in turns with those of bare messages of that size:
+/// read whole, as a message is that somebody wants, and with a glance at one number of it.
 fn ping(ratios: &mut Vec<(String, f64)>) {
-    let rounds: Vec<(Vec<u64>, Vec<u64>)> = (0..ROUNDS)
+    let rounds: Vec<[Vec<u64>; 3]> = (0..ROUNDS)
         .map(|number| {
             let arm = arm(&format!("ping{number}"));
-            (link_trips(&arm), probe_trips(&arm))
+            [
+                link_trips(&arm),
+                probe_trips(&arm, "probe", Probe::receive),
+                probe_trips(&arm, "glance", Probe::glance),
+            ]
         })
         .collect();
-    let middle =
-        |of: &dyn Fn(&(Vec<u64>, Vec<u64>)) -> f64| median(rounds.iter().map(of).collect());
+    let middle = |of: &dyn Fn(&[Vec<u64>; 3]) -> f64| median(rounds.iter().map(of).collect());
     let at = |sorted: &[u64], share: f64| quantile(sorted, share) as f64;
     for (name, share) in [("p50", 0.5), ("p99", 0.99)] {
         println!(
-            "round trip {name}: setpoint and state, checked {} ns; bare messages of that size {} ns",
-            middle(&|(ours, _)| at(ours, share)),
-            middle(&|(_, bare)| at(bare, share))
+            "round trip {name}: setpoint and state, checked {} ns; bare messages of that size, read \
+             {} ns, glanced at {} ns",
+            middle(&|[ours, _, _]| at(ours, share)),
+            middle(&|[_, read, _]| at(read, share)),
+            middle(&|[_, _, glance]| at(glance, share)),
         );
-        let ratio = middle(&|(ours, bare)| at(ours, share) / at(bare, share));
-        ratios.push((format!("iceoryx2-ping-{name}"), ratio));
+        let read = middle(&|[ours, read, _]| at(ours, share) / at(read, share));
+        let glance = middle(&|[ours, _, glance]| at(ours, share) / at(glance, share));
+        ratios.push((format!("iceoryx2-ping-{name}"), read));
+        ratios.push((format!("iceoryx2-glance-{name}"), glance));
     }
 }
 
 /// Round trips of a round.
 const TRIPS: u64 = 20_000;
 
-fn probe_trips(arm: &Arm) -> Vec<u64> {
-    let _probe = Peer::start("probe", arm);
+fn probe_trips(arm: &Arm, peer: &str, look: fn(&Probe) -> Option<u64>) -> Vec<u64> {
+    let _probe = Peer::start(peer, arm);
     let probe = Probe::open(arm, true).unwrap();
     trips(TRIPS, |number| {
         probe.send(number);
         let end = Instant::now() + Duration::from_secs(1);
-        while probe.receive() != Some(number) && Instant::now() < end {
+        while look(&probe) != Some(number) && Instant::now() < end {
             std::hint::spin_loop();
         }
     })

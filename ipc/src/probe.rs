@@ -1,5 +1,7 @@
 //! A bare exchange over iceoryx2, to see what the transport itself costs.
 
+use core::hint::black_box;
+
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, Node};
@@ -52,19 +54,22 @@ impl Probe {
         })
     }
 
-    /// Sends a message that carries `number`.
+    /// Sends a message full of `number`.
     pub fn send(&self, number: u64) -> bool {
-        let mut bytes: Bytes = [0; _];
-        bytes[0] = number;
-        self.publisher.send_copy(bytes).is_ok()
+        self.publisher.send_copy([number; _]).is_ok()
     }
 
-    /// The number of the oldest message not read yet. Does not wait.
+    /// The number of the oldest message not read yet, which is read whole, as a message is that
+    /// somebody wants. Does not wait.
     pub fn receive(&self) -> Option<u64> {
-        self.subscriber
-            .receive()
-            .ok()
-            .flatten()
-            .map(|sample| sample[0])
+        let sample = self.subscriber.receive().ok().flatten()?;
+        let bytes: Bytes = *sample;
+        black_box(&bytes).first().copied()
+    }
+
+    /// The same, but only the number is read: the rest stays in the sender's cache. Does not wait.
+    pub fn glance(&self) -> Option<u64> {
+        let sample = self.subscriber.receive().ok().flatten()?;
+        sample.first().copied()
     }
 }
