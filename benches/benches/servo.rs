@@ -210,6 +210,9 @@ struct Round {
     share: f64,
 }
 
+/// A round of ours, and p50 and p99 (ns) of the peer's after it, where there is a peer.
+type Turn = (Round, Option<(u64, u64)>);
+
 /// Moves at a rate for a while.
 fn round(rate: f64, number: usize) -> Round {
     let arm = arm(&format!("wake{rate}-{number}"));
@@ -242,12 +245,10 @@ fn round(rate: f64, number: usize) -> Round {
 /// Rounds in turns with cyclictest at the same rate and priority; each figure is the median of
 /// the rounds, each ratio the median of the rounds' ratios.
 fn wake_up(rate: f64, ratios: &mut Vec<(String, f64)>) {
-    let rounds: Vec<(Round, Option<(u64, u64)>)> = (0..ROUNDS)
+    let rounds: Vec<Turn> = (0..ROUNDS)
         .map(|number| (round(rate, number), cyclictest(rate)))
         .collect();
-    let middle = |of: &dyn Fn(&(Round, Option<(u64, u64)>)) -> Option<f64>| {
-        median(rounds.iter().filter_map(of).collect())
-    };
+    let middle = |of: &dyn Fn(&Turn) -> Option<f64>| median(rounds.iter().filter_map(of).collect());
     let ns = |of: &dyn Fn(&Round) -> u64| middle(&|(ours, _)| Some(of(ours) as f64));
     let share = middle(&|(ours, _)| Some(ours.share));
     println!(
