@@ -161,10 +161,10 @@ impl<const N: usize> Loop<'_, N> {
     fn by_the_clock(&mut self) {
         let period = self.config.period_ns();
         self.origin = now_ns() + period;
+        let mut alarm = Alarm::new(period);
         loop {
             let begin = self.origin + self.tick * period;
-            sleep_until_ns(begin);
-            let now_ns = now_ns();
+            let now_ns = alarm.wait(begin);
             let late = now_ns.saturating_sub(begin);
             self.shared.latency.count(late);
             let skipped = late / period;
@@ -300,5 +300,47 @@ impl<const N: usize> Loop<'_, N> {
                 }
             }
         }
+    }
+}
+
+/// Wakes up at a time by going to bed for a little less: about as long as waking up usually takes,
+/// which is then waited awake.
+struct Alarm {
+    /// How much less (ns): the middle of what waking up took.
+    early: u64,
+    /// The most of it (ns).
+    most: u64,
+}
+
+impl Alarm {
+    /// Part of a period that may be waited awake, at most.
+    const AWAKE: u64 = 50;
+
+    /// How fast the middle is followed (ns a period).
+    const STEP: u64 = 50;
+
+    fn new(period: u64) -> Self {
+        Self {
+            early: 0,
+            most: period / Self::AWAKE,
+        }
+    }
+
+    /// Waits until `begin` (ns); says what time it is then.
+    fn wait(&mut self, begin: u64) -> u64 {
+        let bed = begin.saturating_sub(self.early);
+        sleep_until_ns(bed);
+        let mut now = now_ns();
+        // Half of the times later, half earlier: the middle.
+        self.early = if now.saturating_sub(bed) > self.early {
+            (self.early + Self::STEP).min(self.most)
+        } else {
+            self.early.saturating_sub(Self::STEP)
+        };
+        while now < begin {
+            core::hint::spin_loop();
+            now = now_ns();
+        }
+        now
     }
 }
