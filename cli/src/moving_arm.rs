@@ -191,6 +191,8 @@ impl MovingArm {
     /// # Errors
     /// The file cannot be written.
     pub(crate) fn finish(mut self) -> io::Result<f64> {
+        // The sample of a period is complete when the next state came: the last ones are still out.
+        self.host.session.close();
         self.recording.take(&self.host.session.samples())?;
         let worst = self.recording.worst();
         drop(self.host);

@@ -11,6 +11,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -45,6 +46,21 @@ impl Driver {
             What::Test(test) => test.run(),
         }
     }
+}
+
+/// A flag that a signal sets, and with `until_end_of_input` the starter too.
+///
+/// # Errors
+/// Signals cannot be received.
+fn asked_to_end(until_end_of_input: bool) -> io::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    if until_end_of_input {
+        end_with_input(Arc::clone(&stop));
+    }
+    Ok(stop)
 }
 
 /// Sets `stop` when standard input brings a byte, or a while after it ended because the starter

@@ -4,7 +4,6 @@ use std::os::unix::fs::DirBuilderExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
@@ -12,7 +11,6 @@ use std::time::Duration;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::robot::Robot;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -60,13 +58,7 @@ impl Mujoco {
     /// Drives until a signal, or until its starter asks for the end.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
-        let stop = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&stop))?;
-        }
-        if self.until_end_of_input {
-            super::end_with_input(Arc::clone(&stop));
-        }
+        let stop = super::asked_to_end(self.until_end_of_input)?;
         let folder = Folder::new(&robot).map_err(|cause| Failure::new(Exit::Internal, cause))?;
         let child = self.spawn(&robot, &folder.0)?;
         let status = wait(child, &stop)?;

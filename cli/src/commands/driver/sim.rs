@@ -1,6 +1,4 @@
 use std::io::{self, Write};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -8,7 +6,6 @@ use clap::Args;
 use driver_sim::Options;
 use engine::robot::Robot;
 use ipc::{DriverLink, IpcError};
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -54,12 +51,8 @@ impl Sim {
     /// Drives until a signal, or until its starter asks for the end.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
-        let stop = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&stop))?;
-        }
+        let stop = super::asked_to_end(self.until_end_of_input)?;
         if self.until_end_of_input {
-            super::end_with_input(Arc::clone(&stop));
             self.wait_for_arm()?;
             // The starter waits for this line.
             writeln!(io::stdout(), "ready")?;
