@@ -109,7 +109,7 @@ fn passes_in_order(
     tolerance: f64,
 ) -> Result<(), String> {
     let place = |time: f64| plan.at(time).pose.translation.vector;
-    let slack = 1e-11 + 1e-9 * tolerance;
+    let slack = 2e-10 + 1e-9 * tolerance;
     // Where the tool turns (nearly) on the spot, its orientation picks the
     // moment of the pass within a fiftieth of the tolerance.
     let end = plan.at(plan.duration()).pose.rotation;
@@ -137,43 +137,43 @@ fn passes_in_order(
             // Within tolerance already when the pose before was passed.
             continue;
         }
-        // Nothing before has been a closest approach.
-        let (mut high, mut low) = (distance(at), f64::INFINITY);
+        // The first closest approach that samples show, and when it is over.
+        let (mut high, mut low, mut over) = (distance(at), f64::INFINITY, f64::INFINITY);
         if (high - tolerance).abs() <= slack {
             // Whether it is within tolerance here cannot be told.
             at = named;
             continue;
         }
+        let mut approach = at;
         if high < tolerance {
             low = high;
         }
-        for time in times.iter().copied().filter(|t| *t > at && *t < named) {
+        for time in times.iter().copied().filter(|t| *t > at) {
             let d = distance(time);
-            if d > low + choice {
-                return fault("an approach before", time);
-            }
-            high = high.max(d);
-            if d < high - slack || low.is_finite() {
-                low = low.min(d);
-            }
-        }
-        // And this one is: either nothing nearer follows in the same valley, or
-        // the distance rises on both sides.
-        let (here, mut nearest) = (distance(named), distance(named));
-        for time in times.iter().copied().filter(|t| *t > named) {
-            let d = distance(time);
-            if d > nearest + slack {
+            if d > low + slack {
+                over = time;
                 break;
             }
-            nearest = nearest.min(d);
+            if (low.is_finite() || d < high - slack) && d < low {
+                (low, approach) = (d, time);
+            }
+            high = high.max(d);
         }
+        // The pass is there, or as near in the same stretch.
+        let mut stretch = times
+            .iter()
+            .copied()
+            .filter(|t| (*t > named && *t < approach) || (*t < named && *t > approach));
+        let same = distance(named) <= low + choice && stretch.all(|t| distance(t) <= low + choice);
+        // Or it is an approach that falls between the samples.
         let rises = |side: f64| {
             (2..8).any(|k| {
                 let time = (named + side * 10_f64.powi(-k)).clamp(at, plan.duration());
-                distance(time) >= here - 1e-15 * (1.0 + goal.norm())
+                distance(time) >= distance(named) - 1e-15 * (1.0 + goal.norm())
             })
         };
-        if here > nearest + choice && !(rises(-1.0) && rises(1.0)) {
+        let fine = named < over && rises(-1.0) && rises(1.0);
+        if !same && !fine {
             return fault("not the closest approach", named);
         }
         at = named;
