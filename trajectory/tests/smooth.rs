@@ -111,10 +111,10 @@ fn passes_in_order(
     let place = |time: f64| plan.at(time).pose.translation.vector;
     let slack = 2e-10 + 1e-9 * tolerance;
     // Where the tool turns (nearly) on the spot, its orientation picks the
-    // moment of the pass within a fiftieth of the tolerance.
+    // moment of the pass within a fiftieth of the tolerance, on samples of its own.
     let end = plan.at(plan.duration()).pose.rotation;
     let turns = (times.iter()).any(|t| plan.at(*t).pose.rotation.angle_to(&end) > 1e-9);
-    let choice = slack + if turns { 0.021 * tolerance } else { 0.0 };
+    let choice = slack + if turns { 0.03 * tolerance } else { 0.0 };
     let mut at = 0.0;
     for (i, goal) in goals.iter().enumerate() {
         let distance = |time: f64| (place(time) - goal).norm();
@@ -160,19 +160,23 @@ fn passes_in_order(
             high = high.max(d);
         }
         // The pass is there, or as near in the same stretch.
-        let mut stretch = times
-            .iter()
-            .copied()
-            .filter(|t| (*t > named && *t < approach) || (*t < named && *t > approach));
-        let same = distance(named) <= low + choice && stretch.all(|t| distance(t) <= low + choice);
-        // Or it is an approach that falls between the samples.
-        let rises = |side: f64| {
-            (2..8).any(|k| {
-                let time = (named + side * 10_f64.powi(-k)).clamp(at, plan.duration());
-                distance(time) >= distance(named) - 1e-15 * (1.0 + goal.norm())
+        let beside = |approach: f64| {
+            let room = distance(approach) + choice;
+            let between = |t: &&f64| (**t - approach) * (**t - named) < 0.0;
+            distance(named) <= room && times.iter().filter(between).all(|t| distance(*t) <= room)
+        };
+        let rises = |from: f64, side: f64, by: f64| {
+            (6..24).any(|k| {
+                let time = (from + side * 2_f64.powi(-k)).clamp(at, plan.duration());
+                distance(time) >= distance(from) + by
             })
         };
-        let fine = named < over && rises(-1.0) && rises(1.0);
+        // Or beside a start within tolerance from which it rises between the samples.
+        let start = distance(at) < tolerance && rises(at, 1.0, 1e-10);
+        let same = beside(approach) || (start && beside(at));
+        // Or it is an approach that falls between the samples.
+        let least = -1e-15 * (1.0 + goal.norm());
+        let fine = named < over && rises(named, -1.0, least) && rises(named, 1.0, least);
         if !same && !fine {
             return fault("not the closest approach", named);
         }
