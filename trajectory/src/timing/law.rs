@@ -4,6 +4,7 @@ use super::TimingOptions;
 use super::grid::{Bounded, Grid};
 use super::interior::Interior;
 use super::problem::Problem;
+use super::stations::Stations;
 use super::survey::Survey;
 use super::tighten::MOST_STEPS;
 use crate::{JointLimits, Path, TimingError, ToolLimits};
@@ -44,7 +45,7 @@ impl LawProblem {
             tool,
             options,
         }
-        .problem(&grid);
+        .problem(&Stations::new(path, &grid));
         Ok(Self {
             problem,
             gap: options.gap,
@@ -58,10 +59,11 @@ impl LawProblem {
 
     /// The fastest law.
     pub fn solve(&self) -> Law {
-        let mut interior = Interior::new(&self.problem, vec![1.0; self.cells() + 2]);
-        interior.solve(self.gap, 0.3, MOST_STEPS);
+        let mut interior = Interior::new(&self.problem);
+        interior.slow_down(&self.problem);
+        interior.solve(&self.problem, self.gap, 0.3, MOST_STEPS);
         Law {
-            duration: self.problem.time(&interior.x),
+            duration: interior.time(),
             iterations: interior.iterations,
         }
     }

@@ -20,7 +20,12 @@ mod options;
 mod pieces;
 mod problem;
 mod reach;
+mod rows;
 mod samples;
+mod share;
+mod state;
+mod stations;
+mod stride;
 mod survey;
 mod tighten;
 mod warp;
@@ -33,6 +38,7 @@ pub use reach::{ReachGrid, duration as reach_duration};
 pub use samples::RandomPaths;
 
 use grid::{Bounded, Grid};
+use stations::Stations;
 use survey::Survey;
 
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
@@ -113,7 +119,7 @@ fn draft<P: Path<N>, const N: usize>(
     let mut refused = None;
     for _ in 0..FINER {
         let grid = Grid::new(survey, bounded.path.knots(), bounded.path.end(), &options);
-        match tighten::best(bounded, &grid) {
+        match tighten::best(bounded, &Stations::new(bounded.path, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

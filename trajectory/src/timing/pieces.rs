@@ -3,8 +3,9 @@
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 
-use super::grid::{Bounded, Grid, Local};
+use super::grid::Bounded;
 use super::problem::{Problem, Spot};
+use super::stations::{Station, Stations};
 use crate::Path;
 
 /// Jerk of a piece may differ from that of the law by this share of the limit.
@@ -33,46 +34,13 @@ struct State<const N: usize> {
     spot: Spot,
 }
 
-/// Makes pieces out of one law.
-pub(super) struct Maker<'a, P, const N: usize> {
-    bounded: Bounded<'a, P, N>,
-    grid: &'a Grid,
-    out: Pieces<N>,
-}
-
-impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
-    /// For laws over `grid`.
-    pub(super) fn new(bounded: Bounded<'a, P, N>, grid: &'a Grid) -> Self {
-        let out = Pieces {
-            joint: Vec::new(),
-            law: Vec::new(),
-            cell: Vec::new(),
-            fit_error: 0.0,
-        };
-        Self { bounded, grid, out }
-    }
-
-    /// The pieces of the law `x`.
-    pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
-        let nodes = &self.grid.nodes;
-        for k in 0..problem.cells() {
-            let spot = problem.spot(k, x);
-            // The same place seen from both sides gives the same values; only jerks differ.
-            let side = |k: usize| if self.grid.knot[k] { 1.0 } else { 0.0 };
-            let start = self.state(nodes[k], side(k), spot);
-            let end = self.state(nodes[k + 1], -side(k + 1), spot.moved(problem.widths[k]));
-            self.halve(k, (nodes[k], start), (nodes[k + 1], end), DEPTH);
-        }
-        self.out
-    }
-
-    /// The motion at `w`, where the law is `spot`.
-    fn state(&self, w: f64, side: f64, spot: Spot) -> State<N> {
-        let (point, warp) = self.grid.point(self.bounded.path, w, side);
-        let local = Local::new(&point, warp);
+impl<const N: usize> State<N> {
+    /// The motion at a station, where the law is `spot`.
+    fn new(station: &Station<N>, spot: Spot) -> Self {
+        let local = &station.local;
         let root = spot.a.sqrt();
         let joint = Sample {
-            position: point.joint.q[0],
+            position: station.position,
             velocity: local.joint[0] * root,
             acceleration: local.joint[1] * spot.a + local.joint[0] * spot.b,
             jerk: (local.joint[2] * spot.a
@@ -81,14 +49,50 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
                 * root,
         };
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
-        let [u, u1, u2, u3] = warp;
+        let [u, u1, u2, u3] = station.warp;
         let law = Sample {
             position: one(u),
             velocity: one(u1 * root),
             acceleration: one(u2 * spot.a + u1 * spot.b),
             jerk: one((u3 * spot.a + 3.0 * u2 * spot.b + u1 * spot.c) * root),
         };
-        State { joint, law, spot }
+        Self { joint, law, spot }
+    }
+}
+
+/// Makes pieces out of one law.
+pub(super) struct Maker<'a, P, const N: usize> {
+    bounded: Bounded<'a, P, N>,
+    stations: &'a Stations<'a, N>,
+    out: Pieces<N>,
+}
+
+impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
+    /// For laws over the grid of `stations`.
+    pub(super) fn new(bounded: Bounded<'a, P, N>, stations: &'a Stations<'a, N>) -> Self {
+        let out = Pieces {
+            joint: Vec::new(),
+            law: Vec::new(),
+            cell: Vec::new(),
+            fit_error: 0.0,
+        };
+        Self {
+            bounded,
+            stations,
+            out,
+        }
+    }
+
+    /// The pieces of the law `x`.
+    pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
+        let nodes = &self.stations.grid.nodes;
+        for k in 0..problem.cells() {
+            let (spot, stations) = (problem.spot(k, x), self.stations);
+            let start = State::new(stations.left(k), spot);
+            let end = State::new(stations.right(k), spot.moved(problem.widths[k]));
+            self.halve(k, (nodes[k], start), (nodes[k + 1], end), DEPTH);
+        }
+        self.out
     }
 
     /// Adds the pieces between two places in cell `k`: one if it is true to the path, else those
@@ -107,7 +111,13 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         if depth > 0 && (error > self.bounded.options.fit || !self.jerk_fits(&joint, &start, &end))
         {
             let middle = 0.5 * (w0 + w1);
-            let state = self.state(middle, 0.0, start.spot.moved(middle - w0));
+            let spot = start.spot.moved(middle - w0);
+            let state = if depth == DEPTH {
+                State::new(self.stations.middle(k), spot)
+            } else {
+                let grid = self.stations.grid;
+                State::new(&grid.station(self.bounded.path, middle, 0.0), spot)
+            };
             self.halve(k, (w0, start), (middle, state), depth - 1);
             self.halve(k, (middle, state), (w1, end), depth - 1);
             return;

@@ -1,0 +1,279 @@
+//! The Newton system of a law: what each row adds to it.
+
+use super::band::Band;
+use super::lanes::{LANE, Lane, Wave, dot};
+use super::problem::{Basis, Problem};
+use super::state::{Norm, Row, Spots, State, jerk_places, vectors};
+use crate::wide::{Four, Op};
+
+/// Gradient and curvature at a place, over `a`, `b`, `c` there.
+#[derive(Clone, Copy)]
+struct Share<S: Four> {
+    simd: S,
+    aa: Wave<S>,
+    ab: Wave<S>,
+    ac: Wave<S>,
+    bb: Wave<S>,
+    bc: Wave<S>,
+    cc: Wave<S>,
+    ga: Wave<S>,
+    gb: Wave<S>,
+    gc: Wave<S>,
+}
+
+/// Weight of a row's curvature and force of its gradient, for `g² <= 1` with centring `mu`.
+#[inline(always)]
+fn weigh<S: Four>(simd: S, row: &Row, mu: Wave<S>) -> (Wave<S>, Wave<S>, Wave<S>) {
+    let g = Wave::load(simd, &row.g);
+    let twice = g + g;
+    let pull = twice / (Wave::splat(simd, 1.0) - g * g);
+    let curve = Wave::splat(simd, 2.0) + twice * pull;
+    (g, Wave::load(simd, &row.multiplier) * curve, mu * pull)
+}
+
+impl<S: Four> Share<S> {
+    #[inline(always)]
+    fn zero(simd: S) -> Self {
+        let zero = Wave::splat(simd, 0.0);
+        Self {
+            simd,
+            aa: zero,
+            ab: zero,
+            ac: zero,
+            bb: zero,
+            bc: zero,
+            cc: zero,
+            ga: zero,
+            gb: zero,
+            gc: zero,
+        }
+    }
+
+    /// The share as a function of the law `x` further to the left.
+    #[inline(always)]
+    fn moved(&self, x: Wave<S>) -> Self {
+        let (y, twice) = (x * x, x + x);
+        let (aa, ab, ac) = (self.aa, self.ab, self.ac);
+        let ab2 = twice * aa + ab;
+        let ac2 = y * aa + x * ab + ac;
+        let skew = y * ab + x * self.bb + self.bc;
+        Self {
+            ab: ab2,
+            ac: ac2,
+            bb: twice * (ab2 + ab) + self.bb,
+            bc: twice * ac2 + skew,
+            cc: y * ac2 + x * skew + (y * ac + x * self.bc + self.cc),
+            gb: twice * self.ga + self.gb,
+            gc: y * self.ga + x * self.gb + self.gc,
+            ..*self
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.aa += other.aa;
+        self.ab += other.ab;
+        self.ac += other.ac;
+        self.bb += other.bb;
+        self.bc += other.bc;
+        self.cc += other.cc;
+        self.ga += other.ga;
+        self.gb += other.gb;
+        self.gc += other.gc;
+    }
+
+    /// Adds acceleration rows `[p, q]` with centring `mu`.
+    #[inline(always)]
+    fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[Row], mu: Wave<S>) {
+        for (line, row) in lines.iter().zip(rows) {
+            let [p, q] = line.map(|lane| Wave::load(self.simd, &lane));
+            let (_, weight, force) = weigh(self.simd, row, mu);
+            let (wp, wq) = (weight * p, weight * q);
+            self.aa += wq * q;
+            self.ab += wp * q;
+            self.bb += wp * p;
+            self.ga += force * q;
+            self.gb += force * p;
+        }
+    }
+
+    /// Adds jerk rows `[x, y, z]` where the law is `a`.
+    #[inline(always)]
+    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[Row], a: Wave<S>, mu: Wave<S>) {
+        let (root, half) = (a.sqrt(), Wave::splat(self.simd, 0.5) / a);
+        for (line, row) in lines.iter().zip(rows) {
+            let [x, y, z] = line.map(|lane| Wave::load(self.simd, &lane));
+            let (g, weight, force) = weigh(self.simd, row, mu);
+            let (ra, rb, rc) = (root * x + g * half, root * y, root * z);
+            let (wa, wb, wc) = (weight * ra, weight * rb, weight * rc);
+            self.aa += wa * ra;
+            self.ab += wa * rb;
+            self.ac += wa * rc;
+            self.bb += wb * rb;
+            self.bc += wb * rc;
+            self.cc += wc * rc;
+            self.ga += force * ra;
+            self.gb += force * rb;
+            self.gc += force * rc;
+        }
+    }
+
+    /// Adds a row bounded in norm, with the derivatives of its vector to `a`, `b`, `c`.
+    #[inline(always)]
+    fn norm(&mut self, [ra, rb, rc]: [[Wave<S>; 3]; 3], row: &Norm, mu: Wave<S>) {
+        let [g] = vectors(self.simd, &[row.g]);
+        let twice = Wave::splat(self.simd, 2.0) / (Wave::splat(self.simd, 1.0) - dot(g, g));
+        let (ta, tb, tc) = (dot(g, ra), dot(g, rb), dot(g, rc));
+        let flat = Wave::load(self.simd, &row.multiplier) * 2.0;
+        let (steep, force) = (flat * twice, mu * twice);
+        self.add(&Self {
+            simd: self.simd,
+            aa: flat * dot(ra, ra) + steep * ta * ta,
+            ab: flat * dot(ra, rb) + steep * ta * tb,
+            ac: flat * dot(ra, rc) + steep * ta * tc,
+            bb: flat * dot(rb, rb) + steep * tb * tb,
+            bc: flat * dot(rb, rc) + steep * tb * tc,
+            cc: flat * dot(rc, rc) + steep * tc * tc,
+            ga: force * ta,
+            gb: force * tb,
+            gc: force * tc,
+        });
+    }
+
+    /// Adds the cap `cap a <= 1` and the time `weight / sqrt(a)`.
+    #[inline(always)]
+    fn value(&mut self, a: Wave<S>, [weight, cap]: [Wave<S>; 2], row: &Row, mu: Wave<S>) {
+        let g = Wave::load(self.simd, &row.g);
+        let pull = cap / (Wave::splat(self.simd, 1.0) - g);
+        let slope = weight / (a * a.sqrt());
+        self.aa += slope * 0.75 / a + Wave::load(self.simd, &row.multiplier) * pull * cap;
+        self.ga += mu * pull - slope * 0.5;
+    }
+
+    /// What the cells of a block add to the Newton system: six entries of the matrix over the
+    /// unknowns of the cell, three of the right side.
+    #[inline(always)]
+    fn entries(&self, basis: &Basis) -> [Lane; 9] {
+        let lane = |x: &Lane| Wave::load(self.simd, x);
+        let (left, right, inverse) = (
+            lane(&basis.left),
+            lane(&basis.right),
+            lane(&basis.inverse),
+        );
+        let zero = Wave::splat(self.simd, 0.0);
+        let a = [lane(&basis.first), lane(&basis.second), zero];
+        let b = [zero - left, left, zero];
+        let c = [left * inverse, zero - (left + right) * inverse, right * inverse];
+        let row = |i: usize| {
+            let ha = self.aa * a[i] + self.ab * b[i] + self.ac * c[i];
+            let hb = self.ab * a[i] + self.bb * b[i] + self.bc * c[i];
+            let hc = self.ac * a[i] + self.bc * b[i] + self.cc * c[i];
+            (ha, hb, hc)
+        };
+        let entry = |(ha, hb, hc): (Wave<S>, Wave<S>, Wave<S>), j: usize| {
+            (ha * a[j] + hb * b[j] + hc * c[j]).lane()
+        };
+        let (first, second, third) = (row(0), row(1), row(2));
+        let force = |i: usize| (self.ga * a[i] + self.gb * b[i] + self.gc * c[i]).lane();
+        [
+            entry(first, 0),
+            entry(first, 1),
+            entry(first, 2),
+            entry(second, 1),
+            entry(second, 2),
+            entry(third, 2),
+            force(0),
+            force(1),
+            force(2),
+        ]
+    }
+}
+
+/// Fills the Newton system of the law `x` for the centring `mu`.
+pub(super) struct Assemble<'a> {
+    pub problem: &'a Problem,
+    pub x: &'a [f64],
+    pub state: &'a State,
+    pub mu: f64,
+    pub matrix: &'a mut Band,
+    pub step: &'a mut [f64],
+}
+
+impl Op for Assemble<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) {
+        self.matrix.fill([0.0; 3]);
+        self.step.fill(0.0);
+        for (i, basis) in self.problem.basis.iter().enumerate() {
+            let left = Spots::left(simd, basis, &self.x[LANE * i..]);
+            let width = Wave::load(simd, &basis.width);
+            let half = width * 0.5;
+            let mut total = self.values(2 * i, left);
+            total.add(&self.values(2 * i + 1, left.moved(half)).moved(half));
+            for (slot, share) in jerk_places(self.problem, i) {
+                let x = width * share;
+                total.add(&self.jerks(slot, left.moved(x)).moved(x));
+            }
+            let entries = total.entries(basis);
+            for l in 0..LANE {
+                let [m00, m01, m02, m11, m12, m22, f0, f1, f2] = entries.map(|lane| lane[l]);
+                let k = LANE * i + l;
+                let rows = &mut self.matrix[k..k + 3];
+                rows[0] = [rows[0][0] + m00, rows[0][1] + m01, rows[0][2] + m02];
+                rows[1] = [rows[1][0] + m11, rows[1][1] + m12, rows[1][2]];
+                rows[2][0] += m22;
+                let step = &mut self.step[k..k + 3];
+                step[0] -= f0;
+                step[1] -= f1;
+                step[2] -= f2;
+            }
+        }
+    }
+}
+
+impl Assemble<'_> {
+    /// The share of a slot of values.
+    #[inline(always)]
+    fn values<S: Four>(&self, slot: usize, spot: Spots<S>) -> Share<S> {
+        let (problem, simd) = (self.problem, spot.a.simd());
+        let mu = Wave::splat(simd, self.mu);
+        let mut share = Share::zero(simd);
+        let known = [&problem.weight[slot], &problem.cap[slot]].map(|x| Wave::load(simd, x));
+        share.value(spot.a, known, &self.state.cap[slot], mu);
+        let joints = slot * problem.joints..(slot + 1) * problem.joints;
+        let lines = &problem.acceleration[joints.clone()];
+        share.accelerations(lines, &self.state.acceleration[joints], mu);
+        let tools = problem.tool_accelerations;
+        for j in slot * tools..(slot + 1) * tools {
+            let [p, q] = vectors(simd, &problem.norm_acceleration[j]);
+            let still = [Wave::splat(simd, 0.0); 3];
+            share.norm([q, p, still], &self.state.norm_acceleration[j], mu);
+        }
+        share
+    }
+
+    /// The share of a jerk slot.
+    #[inline(always)]
+    fn jerks<S: Four>(&self, slot: usize, spot: Spots<S>) -> Share<S> {
+        let (problem, simd) = (self.problem, spot.a.simd());
+        let mu = Wave::splat(simd, self.mu);
+        let mut share = Share::zero(simd);
+        let joints = slot * problem.joints..(slot + 1) * problem.joints;
+        let lines = &problem.jerk[joints.clone()];
+        share.jerks(lines, &self.state.jerk[joints], spot.a, mu);
+        let tools = slot * problem.tool_jerks..(slot + 1) * problem.tool_jerks;
+        for j in tools {
+            let (root, half) = (spot.a.sqrt(), Wave::splat(simd, 0.5) / spot.a);
+            let row = &self.state.norm_jerk[j];
+            let [g] = vectors(simd, &[row.g]);
+            let [mut x, y, z] = vectors(simd, &problem.norm_jerk[j]).map(|v| v.map(|x| x * root));
+            for (x, g) in x.iter_mut().zip(g) {
+                *x += g * half;
+            }
+            share.norm([x, y, z], row, mu);
+        }
+        share
+    }
+}
