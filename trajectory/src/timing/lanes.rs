@@ -154,7 +154,11 @@ pub(super) fn combine<S: Four, const M: usize>(
     rows: [[Wave<S>; 3]; M],
     factors: [Wave<S>; M],
 ) -> [Wave<S>; 3] {
-    let mut out = [0, 1, 2].map(|i| rows[0][i] * factors[0]);
+    let first = factors[0];
+    let mut out = rows[0];
+    for x in &mut out {
+        *x = *x * first;
+    }
     for k in 1..M {
         for (out, row) in out.iter_mut().zip(rows[k]) {
             *out += row * factors[k];

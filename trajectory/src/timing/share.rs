@@ -164,27 +164,33 @@ impl<S: Four> Share<S> {
         let a = [lane(&basis.first), lane(&basis.second), zero];
         let b = [zero - left, left, zero];
         let c = [left * inverse, zero - (left + right) * inverse, right * inverse];
-        let row = |i: usize| {
-            let ha = self.aa * a[i] + self.ab * b[i] + self.ac * c[i];
-            let hb = self.ab * a[i] + self.bb * b[i] + self.bc * c[i];
-            let hc = self.ac * a[i] + self.bc * b[i] + self.cc * c[i];
-            (ha, hb, hc)
-        };
-        let entry = |(ha, hb, hc): (Wave<S>, Wave<S>, Wave<S>), j: usize| {
-            (ha * a[j] + hb * b[j] + hc * c[j]).lane()
-        };
-        let (first, second, third) = (row(0), row(1), row(2));
-        let force = |i: usize| (self.ga * a[i] + self.gb * b[i] + self.gc * c[i]).lane();
+        let columns = [0, 1, 2].map(|i| [a[i], b[i], c[i]]);
+        let rows = [
+            self.times(columns[0]),
+            self.times(columns[1]),
+            self.times(columns[2]),
+        ];
+        let force = [self.ga, self.gb, self.gc];
         [
-            entry(first, 0),
-            entry(first, 1),
-            entry(first, 2),
-            entry(second, 1),
-            entry(second, 2),
-            entry(third, 2),
-            force(0),
-            force(1),
-            force(2),
+            dot(rows[0], columns[0]).lane(),
+            dot(rows[0], columns[1]).lane(),
+            dot(rows[0], columns[2]).lane(),
+            dot(rows[1], columns[1]).lane(),
+            dot(rows[1], columns[2]).lane(),
+            dot(rows[2], columns[2]).lane(),
+            dot(force, columns[0]).lane(),
+            dot(force, columns[1]).lane(),
+            dot(force, columns[2]).lane(),
+        ]
+    }
+
+    /// The curvature times a column.
+    #[inline(always)]
+    fn times(&self, column: [Wave<S>; 3]) -> [Wave<S>; 3] {
+        [
+            dot([self.aa, self.ab, self.ac], column),
+            dot([self.ab, self.bb, self.bc], column),
+            dot([self.ac, self.bc, self.cc], column),
         ]
     }
 }
@@ -268,11 +274,16 @@ impl Assemble<'_> {
             let (root, half) = (spot.a.sqrt(), Wave::splat(simd, 0.5) / spot.a);
             let row = &self.state.norm_jerk[j];
             let [g] = vectors(simd, &[row.g]);
-            let [mut x, y, z] = vectors(simd, &problem.norm_jerk[j]).map(|v| v.map(|x| x * root));
-            for (x, g) in x.iter_mut().zip(g) {
+            let mut vectors = vectors(simd, &problem.norm_jerk[j]);
+            for vector in &mut vectors {
+                for x in vector {
+                    *x = *x * root;
+                }
+            }
+            for (x, g) in vectors[0].iter_mut().zip(g) {
                 *x += g * half;
             }
-            share.norm([x, y, z], row, mu);
+            share.norm(vectors, row, mu);
         }
         share
     }

@@ -239,29 +239,35 @@ impl Op for Multipliers<'_> {
     fn run<S: Four>(self, simd: S) -> f64 {
         let one = Wave::splat(simd, 1.0);
         let mut total = Wave::splat(simd, 0.0);
-        let mut turn = |slack: Wave<S>, multiplier: &mut Lane, change: &Lane| {
-            let new = match self.turn {
-                Turn::Balance(mu) => Wave::splat(simd, mu) / slack,
-                Turn::Advance(factor) => {
-                    Wave::load(simd, multiplier) + Wave::load(simd, change) * factor
-                }
-            };
-            new.store(multiplier);
-            total += new * slack;
-        };
-        let state = self.state;
+        let (state, turn) = (self.state, self.turn);
         for row in state.acceleration.iter_mut().chain(&mut state.jerk) {
             let g = Wave::load(simd, &row.g);
-            turn(one - g * g, &mut row.multiplier, &row.change);
+            total += turn.take(one - g * g, &mut row.multiplier, &row.change);
         }
         for row in &mut state.cap {
             let g = Wave::load(simd, &row.g);
-            turn(one - g, &mut row.multiplier, &row.change);
+            total += turn.take(one - g, &mut row.multiplier, &row.change);
         }
         for row in state.norm_acceleration.iter_mut().chain(&mut state.norm_jerk) {
             let [g] = vectors(simd, &[row.g]);
-            turn(one - dot(g, g), &mut row.multiplier, &row.change);
+            total += turn.take(one - dot(g, g), &mut row.multiplier, &row.change);
         }
         total.sum()
+    }
+}
+
+impl Turn {
+    /// Turns one multiplier; returns its product with the slack.
+    #[inline(always)]
+    fn take<S: Four>(self, slack: Wave<S>, multiplier: &mut Lane, change: &Lane) -> Wave<S> {
+        let simd = slack.simd();
+        let new = match self {
+            Self::Balance(mu) => Wave::splat(simd, mu) / slack,
+            Self::Advance(factor) => {
+                Wave::load(simd, multiplier) + Wave::load(simd, change) * factor
+            }
+        };
+        new.store(multiplier);
+        new * slack
     }
 }
