@@ -3,9 +3,12 @@
 use nalgebra::Vector3;
 use realtime::Piece;
 
+use super::bound::bound;
 use super::certificate::{ActiveSpan, Limit, LimitPeak};
 use super::grid::{Bounded, Local};
+use super::hull::{Hull, Hulls};
 use super::pieces::Pieces;
+use crate::wide::Wide;
 use crate::{Path, ToolLimits};
 
 /// A limit counts as active from this ratio on.
@@ -51,15 +54,19 @@ impl Audit {
             tool_margin: 0.0,
             durations: pieces.joint.iter().map(|piece| piece.duration).collect(),
         };
+        let wide = Wide::detect();
         for (joint, law) in pieces.joint.iter().zip(&pieces.law) {
+            let hulls = wide.run(Hulls(joint));
             for (limit, value) in &joints {
-                audit.ratios.push(joint_bound(joint, *limit, *value));
+                audit.ratios.push(joint_bound(joint, &hulls, *limit, *value));
             }
             if tool.iter().any(Option::is_some) {
                 audit.push_tool(bounded.path, law, &tool);
             }
             if let Some(cap) = bounded.options.rate_cap {
-                audit.ratios.push(rate_bound(law, cap));
+                let hulls = wide.run(Hulls(law));
+                let ratio = joint_bound(law, &hulls, Limit::JointVelocity(0), cap);
+                audit.ratios.push(ratio);
             }
         }
         audit
@@ -89,34 +96,32 @@ impl Audit {
         }
     }
 
-    /// The largest ratio of column `i`.
-    fn column(&self, i: usize) -> impl Iterator<Item = f64> + '_ {
-        self.ratios
-            .iter()
-            .copied()
-            .skip(i)
-            .step_by(self.limits.len().max(1))
+    /// The ratios piece by piece.
+    fn rows(&self) -> std::slice::Chunks<'_, f64> {
+        self.ratios.chunks(self.limits.len().max(1))
     }
 
     /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
     /// room.
     pub(super) fn stretch(&self) -> f64 {
-        let mut factor = 0.0_f64;
-        for (i, limit) in self.limits.iter().enumerate() {
-            let most = self.column(i).fold(0.0, f64::max);
-            factor = factor.max(root(most, order(*limit)));
-        }
-        factor
+        self.stretch_from(0)
     }
 
     /// As [`Audit::stretch`], without the first piece.
     pub(super) fn stretch_after_first(&self) -> f64 {
-        let mut factor = 0.0_f64;
-        for (i, limit) in self.limits.iter().enumerate() {
-            let most = self.column(i).skip(1).fold(0.0, f64::max);
-            factor = factor.max(root(most, order(*limit)));
+        self.stretch_from(1)
+    }
+
+    fn stretch_from(&self, first: usize) -> f64 {
+        let mut most = vec![0.0_f64; self.limits.len()];
+        for row in self.rows().skip(first) {
+            for (most, ratio) in most.iter_mut().zip(row) {
+                *most = most.max(*ratio);
+            }
         }
-        factor
+        let pairs = self.limits.iter().zip(most);
+        let factors = pairs.map(|(limit, most)| root(most, order(*limit)));
+        factors.fold(0.0, f64::max)
     }
 
     /// The limit that the first piece comes nearest to, and its ratio there.
@@ -128,47 +133,56 @@ impl Audit {
 
     /// Each limit's peak once time is stretched by `factor`.
     pub(super) fn peaks(&self, factor: f64) -> Vec<LimitPeak> {
-        let peak = |(i, limit): (usize, &Limit)| {
-            let (mut ratio, mut time, mut clock) = (0.0, 0.0, 0.0);
-            for (value, duration) in self.column(i).zip(&self.durations) {
-                if value > ratio {
-                    (ratio, time) = (value, clock + 0.5 * duration);
-                }
-                clock += duration;
-            }
-            let ratio = ratio / factor.powi(order(*limit));
-            LimitPeak {
-                limit: *limit,
-                ratio,
-                time: time * factor,
-            }
+        let none = |limit: &Limit| LimitPeak {
+            limit: *limit,
+            ratio: 0.0,
+            time: 0.0,
         };
-        self.limits.iter().enumerate().map(peak).collect()
+        let mut peaks: Vec<LimitPeak> = self.limits.iter().map(none).collect();
+        let mut clock = 0.0;
+        for (row, duration) in self.rows().zip(&self.durations) {
+            for (peak, ratio) in peaks.iter_mut().zip(row) {
+                if *ratio > peak.ratio {
+                    (peak.ratio, peak.time) = (*ratio, clock + 0.5 * duration);
+                }
+            }
+            clock += duration;
+        }
+        for peak in &mut peaks {
+            peak.ratio /= factor.powi(order(peak.limit));
+            peak.time *= factor;
+        }
+        peaks
     }
 
     /// Which limit is active when, once time is stretched by `factor`.
     pub(super) fn active(&self, factor: f64) -> Vec<ActiveSpan> {
+        let from = |limit: &Limit| ACTIVE * factor.powi(order(*limit));
+        let least: Vec<f64> = self.limits.iter().map(from).collect();
+        // Since when a limit is active.
+        let mut open: Vec<Option<f64>> = vec![None; least.len()];
         let mut spans = Vec::new();
-        for (i, limit) in self.limits.iter().enumerate() {
-            let mut open: Option<ActiveSpan> = None;
-            let mut clock = 0.0;
-            for (value, duration) in self.column(i).zip(&self.durations) {
-                let end = clock + duration * factor;
-                if value / factor.powi(order(*limit)) >= ACTIVE {
-                    let start = open.map_or(clock, |span| span.start);
-                    open = Some(ActiveSpan {
-                        limit: *limit,
-                        start,
-                        end,
-                    });
-                } else {
-                    spans.extend(open.take());
+        let mut clock = 0.0;
+        for (row, duration) in self.rows().zip(&self.durations) {
+            for (i, ratio) in row.iter().enumerate() {
+                if *ratio >= least[i] {
+                    open[i] = open[i].or(Some(clock));
+                } else if let Some(start) = open[i].take() {
+                    let (limit, end) = (self.limits[i], clock);
+                    spans.push(ActiveSpan { limit, start, end });
                 }
-                clock = end;
             }
-            spans.extend(open);
+            clock += duration * factor;
         }
-        spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+        for (limit, start) in self.limits.iter().zip(open) {
+            spans.extend(start.map(|start| ActiveSpan {
+                limit: *limit,
+                start,
+                end: clock,
+            }));
+        }
+        let later = |a: &ActiveSpan, b: &ActiveSpan| a.start.total_cmp(&b.start);
+        spans.sort_by(|a, b| later(a, b).then(a.limit.cmp(&b.limit)));
         spans
     }
 }
@@ -220,31 +234,39 @@ fn tool_limits(tool: &ToolLimits) -> [Option<(Limit, f64)>; 6] {
 }
 
 /// Bound of one joint's limit over a piece, as a ratio.
-fn joint_bound<const N: usize>(piece: &Piece<N>, limit: Limit, value: f64) -> f64 {
-    let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
+#[inline]
+fn joint_bound<const N: usize>(
+    piece: &Piece<N>,
+    [velocity, acceleration, jerk]: &[Hull<N>; 3],
+    limit: Limit,
+    value: f64,
+) -> f64 {
+    let (hull, j) = match limit {
+        Limit::JointVelocity(j) => (velocity, j),
+        Limit::JointAcceleration(j) => (acceleration, j),
+        Limit::JointJerk(j) => (jerk, j),
+        _ => return 0.0,
+    };
     // Below the floor the hull is enough: no such piece decides anything.
     let (floor, tolerance) = (0.9 * value, 1e-7 * value);
+    let (most, ends) = (hull.most[j], hull.ends[j]);
+    if most <= floor || most - ends <= tolerance {
+        return most / value;
+    }
+    let [_, c1, c2, c3, c4, c5] = piece.coefficients.map(|c| c[j]);
+    let room = (floor, tolerance);
     let found = match limit {
-        Limit::JointVelocity(j) => {
-            let v = [c1[j], 2.0 * c2[j], 3.0 * c3[j], 4.0 * c4[j], 5.0 * c5[j]];
-            super::bound::bound(&v, piece.duration, floor, tolerance)
+        Limit::JointVelocity(_) => {
+            let v = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
+            bound(&v, piece.duration, room)
         }
-        Limit::JointAcceleration(j) => {
-            let a = [2.0 * c2[j], 6.0 * c3[j], 12.0 * c4[j], 20.0 * c5[j]];
-            super::bound::bound(&a, piece.duration, floor, tolerance)
+        Limit::JointAcceleration(_) => {
+            let a = [2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5];
+            bound(&a, piece.duration, room)
         }
-        Limit::JointJerk(j) => {
-            let jerk = [6.0 * c3[j], 24.0 * c4[j], 60.0 * c5[j]];
-            super::bound::bound(&jerk, piece.duration, floor, tolerance)
-        }
-        _ => 0.0,
+        _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, room),
     };
     found / value
-}
-
-/// Bound of the rate of the path parameter over a piece, as a ratio.
-fn rate_bound(law: &Piece<1>, cap: f64) -> f64 {
-    joint_bound(law, Limit::JointVelocity(0), cap)
 }
 
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.

@@ -59,6 +59,12 @@ impl<S: Four> Wave<S> {
         Self { x, ..self }
     }
 
+    /// The magnitude of each number.
+    #[inline(always)]
+    pub(super) fn abs(self) -> Self {
+        self.max(Self::splat(self.simd, 0.0) - self)
+    }
+
     /// The square root of each number.
     #[inline(always)]
     pub(super) fn sqrt(self) -> Self {

@@ -11,6 +11,7 @@ mod bench;
 mod bound;
 mod certificate;
 mod grid;
+mod hull;
 mod interior;
 mod lanes;
 mod law;

@@ -70,10 +70,11 @@ pub(super) struct Maker<'a, P, const N: usize> {
 impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
     /// For laws over the grid of `stations`.
     pub(super) fn new(bounded: Bounded<'a, P, N>, stations: &'a Stations<'a, N>) -> Self {
+        let count = 2 * stations.grid.nodes.len();
         let out = Pieces {
-            joint: Vec::new(),
-            law: Vec::new(),
-            cell: Vec::new(),
+            joint: Vec::with_capacity(count),
+            law: Vec::with_capacity(count),
+            cell: Vec::with_capacity(count),
             fit_error: 0.0,
         };
         Self {
@@ -107,9 +108,13 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         let duration = passage(start.spot, w1 - w0);
         let joint = Piece::hermite(duration, &start.joint, &end.joint);
         let law = Piece::hermite(duration, &start.law, &end.law);
-        let error = self.fit_error(&joint, &law);
-        if depth > 0 && (error > self.bounded.options.fit || !self.jerk_fits(&joint, &start, &end))
-        {
+        let fits = depth == 0 || self.jerk_fits(&joint, &start, &end);
+        let error = if fits {
+            self.fit_error(&joint, &law)
+        } else {
+            f64::INFINITY
+        };
+        if depth > 0 && error > self.bounded.options.fit {
             let middle = 0.5 * (w0 + w1);
             let spot = start.spot.moved(middle - w0);
             let state = if depth == DEPTH {
@@ -131,23 +136,31 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
     /// Distance of the joints from the path in the middle of a piece.
     fn fit_error(&self, joint: &Piece<N>, law: &Piece<1>) -> f64 {
         let t = 0.5 * joint.duration;
-        let u = law.sample(t).position[0];
+        let u = position(law, t)[0];
         let end = self.bounded.path.end();
         let wanted = self.bounded.path.at(u.clamp(0.0, end)).joint.q[0];
-        (joint.sample(t).position - wanted).amax()
+        (position(joint, t) - wanted).amax()
     }
 
     /// Whether the jerk of a piece at its ends is near that of the law.
     fn jerk_fits(&self, piece: &Piece<N>, start: &State<N>, end: &State<N>) -> bool {
         let limit = &self.bounded.joint.jerk;
-        let off = |t: f64, state: &State<N>| {
-            (piece.sample(t).jerk - state.joint.jerk)
-                .component_div(limit)
-                .amax()
-        };
+        let [_, _, _, c3, c4, c5] = &piece.coefficients;
+        let t = piece.duration;
         // Both ends of the cell have the same third derivative of the law only within it.
-        off(0.0, start).max(off(piece.duration, end)) <= JERK_FIT
+        (0..N).all(|j| {
+            let first = 6.0 * c3[j];
+            let last = first + (24.0 * c4[j] + 60.0 * c5[j] * t) * t;
+            let off = (first - start.joint.jerk[j]).abs().max((last - end.joint.jerk[j]).abs());
+            off <= JERK_FIT * limit[j]
+        })
     }
+}
+
+/// The position of a piece at `t` (s).
+fn position<const N: usize>(piece: &Piece<N>, t: f64) -> SVector<f64, N> {
+    let [c0, c1, c2, c3, c4, c5] = &piece.coefficients;
+    c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t
 }
 
 /// Time (s) in which the law that is `spot` here goes `width` further within the cell.
