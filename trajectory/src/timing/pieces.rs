@@ -91,7 +91,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
             let (spot, stations) = (problem.spot(k, x), self.stations);
             let start = State::new(stations.left(k), spot);
             let end = State::new(stations.right(k), spot.moved(problem.widths[k]));
-            self.halve(k, (nodes[k], start), (nodes[k + 1], end), DEPTH);
+            self.halve(k, (nodes[k], &start), (nodes[k + 1], &end), DEPTH);
         }
         self.out
     }
@@ -101,14 +101,14 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
     fn halve(
         &mut self,
         k: usize,
-        (w0, start): (f64, State<N>),
-        (w1, end): (f64, State<N>),
+        (w0, start): (f64, &State<N>),
+        (w1, end): (f64, &State<N>),
         depth: usize,
     ) {
         let duration = passage(start.spot, w1 - w0);
         let joint = Piece::hermite(duration, &start.joint, &end.joint);
         let law = Piece::hermite(duration, &start.law, &end.law);
-        let fits = depth == 0 || self.jerk_fits(&joint, &start, &end);
+        let fits = depth == 0 || self.jerk_fits(&joint, start, end);
         let error = if fits {
             self.fit_error(&joint, &law)
         } else {
@@ -123,8 +123,8 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
                 let grid = self.stations.grid;
                 State::new(&grid.station(self.bounded.path, middle, 0.0), spot)
             };
-            self.halve(k, (w0, start), (middle, state), depth - 1);
-            self.halve(k, (middle, state), (w1, end), depth - 1);
+            self.halve(k, (w0, start), (middle, &state), depth - 1);
+            self.halve(k, (middle, &state), (w1, end), depth - 1);
             return;
         }
         self.out.fit_error = self.out.fit_error.max(error);

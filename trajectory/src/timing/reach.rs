@@ -49,9 +49,20 @@ fn fill((reach, slope): Slots<'_>, rows: impl Iterator<Item = (f64, f64)>) -> f6
 impl ReachGrid {
     /// An empty grid for `rows` rows at each point.
     pub fn new(rows: usize) -> Self {
+        Self::with_room(rows, 0)
+    }
+
+    /// An empty grid with room for so many points.
+    pub(super) fn with_room(rows: usize, points: usize) -> Self {
+        let width = rows.div_ceil(LANE);
+        let lanes = 2 * width * points;
         Self {
-            width: rows.div_ceil(LANE),
-            ..Self::default()
+            at: Vec::with_capacity(points),
+            cap: Vec::with_capacity(points),
+            width,
+            reach: Vec::with_capacity(lanes),
+            slope: Vec::with_capacity(lanes),
+            newest: Vec::with_capacity(rows),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::band::Band;
 use super::lanes::{LANE, Lane, Wave, dot};
 use super::problem::{Basis, Problem};
-use super::state::{Norm, Row, Spots, State, jerk_places, vectors};
+use super::state::{Norm, Row, Spots, State, jerk_places, vector};
 use crate::wide::{Four, Op};
 
 /// Gradient and curvature at a place, over `a`, `b`, `c` there.
@@ -23,12 +23,12 @@ struct Share<S: Four> {
 
 /// Weight of a row's curvature and force of its gradient, for `g² <= 1` with centring `mu`.
 #[inline(always)]
-fn weigh<S: Four>(simd: S, row: &Row, mu: Wave<S>) -> (Wave<S>, Wave<S>, Wave<S>) {
+fn weigh<S: Four>(simd: S, row: &Row, mu: Wave<S>) -> (Wave<S>, Wave<S>) {
     let g = Wave::load(simd, &row.g);
     let twice = g + g;
     let pull = twice / (Wave::splat(simd, 1.0) - g * g);
     let curve = Wave::splat(simd, 2.0) + twice * pull;
-    (g, Wave::load(simd, &row.multiplier) * curve, mu * pull)
+    (Wave::load(simd, &row.multiplier) * curve, mu * pull)
 }
 
 impl<S: Four> Share<S> {
@@ -87,7 +87,7 @@ impl<S: Four> Share<S> {
     fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[Row], mu: Wave<S>) {
         for (line, row) in lines.iter().zip(rows) {
             let [p, q] = line.map(|lane| Wave::load(self.simd, &lane));
-            let (_, weight, force) = weigh(self.simd, row, mu);
+            let (weight, force) = weigh(self.simd, row, mu);
             let (wp, wq) = (weight * p, weight * q);
             self.aa += wq * q;
             self.ab += wp * q;
@@ -97,47 +97,64 @@ impl<S: Four> Share<S> {
         }
     }
 
-    /// Adds jerk rows `[x, y, z]` where the law is `a`.
+    /// Adds jerk rows `[x, y, z]` as if they were `|x a + y b + z c| <= 1`.
     #[inline(always)]
-    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[Row], a: Wave<S>, mu: Wave<S>) {
-        let (root, half) = (a.sqrt(), Wave::splat(self.simd, 0.5) / a);
+    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[Row], mu: Wave<S>) {
         for (line, row) in lines.iter().zip(rows) {
             let [x, y, z] = line.map(|lane| Wave::load(self.simd, &lane));
-            let (g, weight, force) = weigh(self.simd, row, mu);
-            let (ra, rb, rc) = (root * x + g * half, root * y, root * z);
-            let (wa, wb, wc) = (weight * ra, weight * rb, weight * rc);
-            self.aa += wa * ra;
-            self.ab += wa * rb;
-            self.ac += wa * rc;
-            self.bb += wb * rb;
-            self.bc += wb * rc;
-            self.cc += wc * rc;
-            self.ga += force * ra;
-            self.gb += force * rb;
-            self.gc += force * rc;
+            let (weight, force) = weigh(self.simd, row, mu);
+            let (wx, wy) = (weight * x, weight * y);
+            self.aa += wx * x;
+            self.ab += wx * y;
+            self.ac += wx * z;
+            self.bb += wy * y;
+            self.bc += wy * z;
+            self.cc += weight * z * z;
+            self.ga += force * x;
+            self.gb += force * y;
+            self.gc += force * z;
+        }
+    }
+
+    /// The share of rows `sqrt(a) |x a + y b + z c| <= 1` from that of `|x a + y b + z c| <= 1`:
+    /// the derivative of the former to `a` is `sqrt(a)` times `3/2 x + b/(2a) y + c/(2a) z`.
+    #[inline(always)]
+    fn rooted(&self, spot: Spots<S>) -> Self {
+        let (a, root) = (spot.a, spot.a.sqrt());
+        let half = Wave::splat(self.simd, 0.5) / a;
+        let row = [Wave::splat(self.simd, 1.5), spot.b * half, spot.c * half];
+        let [x, y, z] = self.times(row);
+        Self {
+            simd: self.simd,
+            aa: a * dot(row, [x, y, z]),
+            ab: a * y,
+            ac: a * z,
+            bb: a * self.bb,
+            bc: a * self.bc,
+            cc: a * self.cc,
+            ga: root * dot(row, [self.ga, self.gb, self.gc]),
+            gb: root * self.gb,
+            gc: root * self.gc,
         }
     }
 
     /// Adds a row bounded in norm, with the derivatives of its vector to `a`, `b`, `c`.
     #[inline(always)]
     fn norm(&mut self, [ra, rb, rc]: [[Wave<S>; 3]; 3], row: &Norm, mu: Wave<S>) {
-        let [g] = vectors(self.simd, &[row.g]);
+        let g = vector(self.simd, &row.g);
         let twice = Wave::splat(self.simd, 2.0) / (Wave::splat(self.simd, 1.0) - dot(g, g));
         let (ta, tb, tc) = (dot(g, ra), dot(g, rb), dot(g, rc));
         let flat = Wave::load(self.simd, &row.multiplier) * 2.0;
         let (steep, force) = (flat * twice, mu * twice);
-        self.add(&Self {
-            simd: self.simd,
-            aa: flat * dot(ra, ra) + steep * ta * ta,
-            ab: flat * dot(ra, rb) + steep * ta * tb,
-            ac: flat * dot(ra, rc) + steep * ta * tc,
-            bb: flat * dot(rb, rb) + steep * tb * tb,
-            bc: flat * dot(rb, rc) + steep * tb * tc,
-            cc: flat * dot(rc, rc) + steep * tc * tc,
-            ga: force * ta,
-            gb: force * tb,
-            gc: force * tc,
-        });
+        self.aa += flat * dot(ra, ra) + steep * ta * ta;
+        self.ab += flat * dot(ra, rb) + steep * ta * tb;
+        self.ac += flat * dot(ra, rc) + steep * ta * tc;
+        self.bb += flat * dot(rb, rb) + steep * tb * tb;
+        self.bc += flat * dot(rb, rc) + steep * tb * tc;
+        self.cc += flat * dot(rc, rc) + steep * tc * tc;
+        self.ga += force * ta;
+        self.gb += force * tb;
+        self.gc += force * tc;
     }
 
     /// Adds the cap `cap a <= 1` and the time `weight / sqrt(a)`.
@@ -216,12 +233,20 @@ impl Op for Assemble<'_> {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let width = Wave::load(simd, &basis.width);
             let half = width * 0.5;
+            let middle = left.moved(half);
             let mut total = self.values(2 * i, left);
-            total.add(&self.values(2 * i + 1, left.moved(half)).moved(half));
+            let mut inner = self.values(2 * i + 1, middle);
             for (slot, share) in jerk_places(self.problem, i) {
-                let x = width * share;
-                total.add(&self.jerks(slot, left.moved(x)).moved(x));
+                if *share == 0.0 {
+                    total.add(&self.jerks(slot, left));
+                } else if *share == 0.5 {
+                    inner.add(&self.jerks(slot, middle));
+                } else {
+                    let x = width * *share;
+                    total.add(&self.jerks(slot, left.moved(x)).moved(x));
+                }
             }
+            total.add(&inner.moved(half));
             let entries = total.entries(basis);
             for l in 0..LANE {
                 let [m00, m01, m02, m11, m12, m22, f0, f1, f2] = entries.map(|lane| lane[l]);
@@ -253,9 +278,10 @@ impl Assemble<'_> {
         share.accelerations(lines, &self.state.acceleration[joints], mu);
         let tools = problem.tool_accelerations;
         for j in slot * tools..(slot + 1) * tools {
-            let [p, q] = vectors(simd, &problem.norm_acceleration[j]);
+            let [p, q] = &problem.norm_acceleration[j];
             let still = [Wave::splat(simd, 0.0); 3];
-            share.norm([q, p, still], &self.state.norm_acceleration[j], mu);
+            let line = [vector(simd, q), vector(simd, p), still];
+            share.norm(line, &self.state.norm_acceleration[j], mu);
         }
         share
     }
@@ -267,24 +293,13 @@ impl Assemble<'_> {
         let mu = Wave::splat(simd, self.mu);
         let mut share = Share::zero(simd);
         let joints = slot * problem.joints..(slot + 1) * problem.joints;
-        let lines = &problem.jerk[joints.clone()];
-        share.jerks(lines, &self.state.jerk[joints], spot.a, mu);
+        share.jerks(&problem.jerk[joints.clone()], &self.state.jerk[joints], mu);
         let tools = slot * problem.tool_jerks..(slot + 1) * problem.tool_jerks;
         for j in tools {
-            let (root, half) = (spot.a.sqrt(), Wave::splat(simd, 0.5) / spot.a);
-            let row = &self.state.norm_jerk[j];
-            let [g] = vectors(simd, &[row.g]);
-            let mut vectors = vectors(simd, &problem.norm_jerk[j]);
-            for vector in &mut vectors {
-                for x in vector {
-                    *x = *x * root;
-                }
-            }
-            for (x, g) in vectors[0].iter_mut().zip(g) {
-                *x += g * half;
-            }
-            share.norm(vectors, row, mu);
+            let [x, y, z] = &problem.norm_jerk[j];
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            share.norm(line, &self.state.norm_jerk[j], mu);
         }
-        share
+        share.rooted(spot)
     }
 }

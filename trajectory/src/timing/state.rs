@@ -78,19 +78,29 @@ impl<S: Four> Spots<S> {
 
 /// The jerk slots of block `i`, each with its share of the way from left to right.
 #[inline(always)]
-pub(super) fn jerk_places(problem: &Problem, i: usize) -> impl Iterator<Item = (usize, f64)> {
-    let (first, end) = (problem.jerk_slots[i], problem.jerk_slots[i + 1]);
-    let step = 1.0 / (end - first - 1) as f64;
-    (first..end).map(move |slot| (slot, step * (slot - first) as f64))
+pub(super) fn jerk_places(
+    problem: &Problem,
+    i: usize,
+) -> impl Iterator<Item = (usize, &'static f64)> {
+    const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
+    const DENSE: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+    let slots = problem.jerk_slots[i]..problem.jerk_slots[i + 1];
+    let shares: &[f64] = if slots.len() == SHARES.len() {
+        &SHARES
+    } else {
+        &DENSE
+    };
+    slots.zip(shares)
 }
 
-/// The vectors of a row in registers.
+/// A vector in registers.
 #[inline(always)]
-pub(super) fn vectors<S: Four, const M: usize>(
-    simd: S,
-    row: &[[Lane; 3]; M],
-) -> [[Wave<S>; 3]; M] {
-    row.map(|vector| vector.map(|lane| Wave::load(simd, &lane)))
+pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [Wave<S>; 3] {
+    [
+        Wave::load(simd, &lanes[0]),
+        Wave::load(simd, &lanes[1]),
+        Wave::load(simd, &lanes[2]),
+    ]
 }
 
 impl State {
@@ -155,7 +165,7 @@ impl Op for Evaluate<'_> {
                 flat = self.values(simd, slot, spot).max(flat);
             }
             for (slot, share) in jerk_places(self.problem, i) {
-                let spot = left.moved(width * share);
+                let spot = left.moved(width * *share);
                 steep = self.jerks(simd, slot, spot).max(steep);
             }
         }
@@ -185,7 +195,8 @@ impl Evaluate<'_> {
         }
         let lines = problem.norm_acceleration[slot * problem.tool_accelerations..].iter();
         for (norm, line) in norms.iter_mut().zip(lines) {
-            let g = combine(vectors(simd, line), [spot.b, spot.a]);
+            let [p, q] = line;
+            let g = combine([vector(simd, p), vector(simd, q)], [spot.b, spot.a]);
             norm.g = g.map(Wave::lane);
             most = dot(g, g).max(most);
         }
@@ -209,7 +220,9 @@ impl Evaluate<'_> {
         }
         let lines = problem.norm_jerk[slot * problem.tool_jerks..].iter();
         for (norm, line) in norms.iter_mut().zip(lines) {
-            let g = combine(vectors(simd, line), [a, b, c]);
+            let [x, y, z] = line;
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            let g = combine(line, [a, b, c]);
             norm.g = g.map(Wave::lane);
             most = dot(g, g).max(most);
         }
@@ -249,7 +262,7 @@ impl Op for Multipliers<'_> {
             total += turn.take(one - g, &mut row.multiplier, &row.change);
         }
         for row in state.norm_acceleration.iter_mut().chain(&mut state.norm_jerk) {
-            let [g] = vectors(simd, &[row.g]);
+            let g = vector(simd, &row.g);
             total += turn.take(one - dot(g, g), &mut row.multiplier, &row.change);
         }
         total.sum()

@@ -2,7 +2,7 @@
 
 use super::lanes::{LANE, Wave, combine, dot};
 use super::problem::Problem;
-use super::state::{Norm, Row, Spots, State, jerk_places, vectors};
+use super::state::{Norm, Row, Spots, State, jerk_places, vector};
 use crate::wide::{Four, Op};
 
 /// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
@@ -45,7 +45,7 @@ impl<S: Four> Strides<S> {
     #[inline(always)]
     fn norm(&mut self, row: &mut Norm, d: [Wave<S>; 3]) {
         let one = Wave::splat(self.simd, 1.0);
-        let [g] = vectors(self.simd, &[row.g]);
+        let g = vector(self.simd, &row.g);
         let m = Wave::load(self.simd, &row.multiplier);
         let slack = one - dot(g, g);
         let (half, square) = (dot(g, d), dot(d, d));
@@ -103,8 +103,8 @@ impl Op for Measure<'_> {
             let middle = left.moved(half).a;
             self.values(&mut strides, 2 * i + 1, middle, change.moved(half));
             for (slot, share) in jerk_places(self.problem, i) {
-                let x = width * share;
-                self.jerks(&mut strides, slot, left.moved(x).a, change.moved(x));
+                let x = width * *share;
+                self.jerks(&mut strides, slot, left.moved(x), change.moved(x));
             }
         }
         Stride {
@@ -129,32 +129,32 @@ impl Measure<'_> {
         }
         let lines = problem.norm_acceleration[slot * problem.tool_accelerations..].iter();
         for (norm, line) in norms.iter_mut().zip(lines) {
-            to.norm(norm, combine(vectors(simd, line), [d.b, d.a]));
+            let [p, q] = line;
+            let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
+            to.norm(norm, d);
         }
     }
 
-    /// The rows of a jerk slot.
+    /// The rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
     #[inline(always)]
-    fn jerks<S: Four>(&mut self, to: &mut Strides<S>, slot: usize, a: Wave<S>, d: Spots<S>) {
+    fn jerks<S: Four>(&mut self, to: &mut Strides<S>, slot: usize, at: Spots<S>, d: Spots<S>) {
         let (problem, simd) = (self.problem, to.simd);
-        let root = a.sqrt();
-        let half = d.a * 0.5 / a;
-        let (da, db, dc) = (root * d.a, root * d.b, root * d.c);
+        let root = at.a.sqrt();
+        let half = d.a * 0.5 / at.a;
+        let a = root * (d.a + half * at.a);
+        let b = root * (d.b + half * at.b);
+        let c = root * (d.c + half * at.c);
         let (rows, norms) = self.state.jerks(problem, slot);
         let lines = problem.jerk[slot * problem.joints..].iter();
         for (row, line) in rows.iter_mut().zip(lines) {
             let [x, y, z] = line.map(|lane| Wave::load(simd, &lane));
-            let g = Wave::load(simd, &row.g);
-            to.row(row, x * da + y * db + z * dc + g * half);
+            to.row(row, x * a + y * b + z * c);
         }
         let lines = problem.norm_jerk[slot * problem.tool_jerks..].iter();
         for (norm, line) in norms.iter_mut().zip(lines) {
-            let mut d = combine(vectors(simd, line), [da, db, dc]);
-            let [g] = vectors(simd, &[norm.g]);
-            for (d, g) in d.iter_mut().zip(g) {
-                *d += g * half;
-            }
-            to.norm(norm, d);
+            let [x, y, z] = line;
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            to.norm(norm, combine(line, [a, b, c]));
         }
     }
 }

@@ -223,7 +223,9 @@ struct Rows<'a, const N: usize> {
 impl<const N: usize> Rows<'_, N> {
     /// The grid at every `step`-th of the places `at`, and at the last.
     fn grid(&self, at: &[f64], points: &[PathPoint<N>], step: usize) -> ReachGrid {
-        let mut grid = ReachGrid::new(N + 6);
+        let tool = [self.tool.acceleration, self.tool.angular_acceleration];
+        let tools = tool.iter().filter(|limit| limit.is_finite()).count();
+        let mut grid = ReachGrid::with_room(N + 3 * tools, at.len() / step + 2);
         let caps: Vec<f64> = points.iter().map(|point| self.cap(point)).collect();
         let most = caps
             .iter()
@@ -260,7 +262,8 @@ impl<const N: usize> Rows<'_, N> {
         let [_, first, second, _] = point.joint.q;
         let joints = (0..N).map(move |j| (first[j] / limit[j], second[j] / limit[j]));
         let axes = |[p, q, _]: [Vector3<f64>; 3], limit: f64| {
-            (0..3).map(move |i| (p[i] / limit, q[i] / limit))
+            let count = if limit.is_finite() { 3 } else { 0 };
+            (0..count).map(move |i| (p[i] / limit, q[i] / limit))
         };
         let linear = axes(point.tool.linear, self.tool.acceleration);
         joints
