@@ -5,9 +5,10 @@ use realtime::Piece;
 
 use super::bound::bound;
 use super::certificate::{ActiveSpan, Limit, LimitPeak};
-use super::grid::{Bounded, Local};
+use super::grid::Bounded;
 use super::hull::{Hull, Hulls};
 use super::pieces::Pieces;
+use super::stations::ToolStation;
 use crate::wide::Wide;
 use crate::{Path, ToolLimits};
 
@@ -23,6 +24,9 @@ pub(super) struct Audit {
     pub limits: Vec<Limit>,
     /// One row for each piece, one column for each of `limits`.
     pub ratios: Vec<f64>,
+    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
+    /// room.
+    pub stretch: f64,
     /// What sampled tool ratios were raised by, at most.
     pub tool_margin: f64,
     durations: Vec<f64>,
@@ -51,6 +55,7 @@ impl Audit {
         let mut audit = Self {
             ratios: Vec::with_capacity(limits.len() * pieces.joint.len()),
             limits,
+            stretch: 0.0,
             tool_margin: 0.0,
             durations: pieces.joint.iter().map(|piece| piece.duration).collect(),
         };
@@ -69,6 +74,7 @@ impl Audit {
                 audit.ratios.push(ratio);
             }
         }
+        audit.stretch = audit.stretch_from(0);
         audit
     }
 
@@ -101,13 +107,7 @@ impl Audit {
         self.ratios.chunks(self.limits.len().max(1))
     }
 
-    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
-    /// room.
-    pub(super) fn stretch(&self) -> f64 {
-        self.stretch_from(0)
-    }
-
-    /// As [`Audit::stretch`], without the first piece.
+    /// As [`Audit::stretch`], of all pieces but the first.
     pub(super) fn stretch_after_first(&self) -> f64 {
         self.stretch_from(1)
     }
@@ -116,7 +116,7 @@ impl Audit {
         let mut most = vec![0.0_f64; self.limits.len()];
         for row in self.rows().skip(first) {
             for (most, ratio) in most.iter_mut().zip(row) {
-                *most = most.max(*ratio);
+                *most = if *ratio > *most { *ratio } else { *most };
             }
         }
         let pairs = self.limits.iter().zip(most);
@@ -278,7 +278,8 @@ fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [
         at.acceleration[0],
         at.jerk[0],
     ];
-    let local = Local::new(&path.at(warp[0].clamp(0.0, path.end())), warp);
+    let tool = path.at(warp[0].clamp(0.0, path.end())).tool;
+    let local = ToolStation::new(&tool, warp);
     let norm = |v: Vector3<f64>| v.norm();
     let [l1, l2, l3] = local.linear.map(norm);
     let [a1, a2, a3] = local.angular.map(norm);

@@ -1,11 +1,9 @@
 //! Where the cells of a law lie, and what bounds a path.
 
-use nalgebra::{SVector, Vector3};
-
 use super::survey::Survey;
 use super::warp::Warp;
 use super::{Boundary, TimingOptions};
-use crate::{JointLimits, PathPoint, ToolLimits};
+use crate::{JointLimits, ToolLimits};
 
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
@@ -21,19 +19,6 @@ pub(super) struct Grid {
     pub nodes: Vec<f64>,
     /// Whether a node lies on a knot of the path, where derivatives may jump.
     pub knot: Vec<bool>,
-}
-
-/// Derivatives 1 to 3 of joints and tool to the parameter of the law.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Local<const N: usize> {
-    /// Joints.
-    pub joint: [SVector<f64, N>; 3],
-    /// Position of the controlled point.
-    pub linear: [Vector3<f64>; 3],
-    /// Angular velocity and its derivatives.
-    pub angular: [Vector3<f64>; 3],
-    /// `du/dw`.
-    pub speed: f64,
 }
 
 /// A path with everything that bounds it.
@@ -55,31 +40,6 @@ impl<P, const N: usize> Clone for Bounded<'_, P, N> {
 }
 
 impl<P, const N: usize> Copy for Bounded<'_, P, N> {}
-
-/// Derivatives to a new parameter from those to the old one and those of the old to the new.
-fn chain<const D: usize>(
-    [d1, d2, d3]: [SVector<f64, D>; 3],
-    [_, u1, u2, u3]: [f64; 4],
-) -> [SVector<f64, D>; 3] {
-    [
-        d1 * u1,
-        d2 * (u1 * u1) + d1 * u2,
-        d3 * (u1 * u1 * u1) + d2 * (3.0 * u1 * u2) + d1 * u3,
-    ]
-}
-
-impl<const N: usize> Local<N> {
-    /// The derivatives of `point` to a parameter to which `u` has the derivatives `warp`.
-    pub(super) fn new(point: &PathPoint<N>, warp: [f64; 4]) -> Self {
-        let [_, q1, q2, q3] = point.joint.q;
-        Self {
-            joint: chain([q1, q2, q3], warp),
-            linear: chain(point.tool.linear, warp),
-            angular: chain(point.tool.angular, warp),
-            speed: warp[1],
-        }
-    }
-}
 
 /// What has to be added to a smooth speed so that it begins like a given moving start; it fades
 /// within the time in which accelerations build up.

@@ -39,13 +39,13 @@ impl LawProblem {
     ) -> Result<Self, TimingError> {
         let survey = Survey::new(path, joint, tool, options)?;
         let grid = Grid::new(&survey, path.knots(), path.end(), options);
-        let problem = Bounded {
+        let bounded = Bounded {
             path,
             joint,
             tool,
             options,
-        }
-        .problem(&Stations::new(path, &grid));
+        };
+        let problem = bounded.problem(&Stations::new(bounded, &grid));
         Ok(Self {
             problem,
             gap: options.gap,

@@ -83,10 +83,10 @@ pub fn time_path<const N: usize>(
     let stretch = if moving {
         1.0
     } else {
-        audit.stretch() * (1.0 + 1e-12)
+        audit.stretch * (1.0 + 1e-12)
     };
-    let trajectory = Trajectory::new(pieces.joint).stretched(stretch);
-    let law = Trajectory::new(pieces.law).stretched(stretch);
+    let trajectory = Trajectory::new(pieces.joint).into_stretched(stretch);
+    let law = Trajectory::new(pieces.law).into_stretched(stretch);
     let certificate = TimeCertificate {
         peaks: audit.peaks(stretch),
         active: audit.active(stretch),
@@ -120,7 +120,7 @@ fn draft<P: Path<N>, const N: usize>(
     let mut refused = None;
     for _ in 0..FINER {
         let grid = Grid::new(survey, bounded.path.knots(), bounded.path.end(), &options);
-        match tighten::best(bounded, &Stations::new(bounded.path, &grid)) {
+        match tighten::best(bounded, &Stations::new(bounded, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

@@ -37,16 +37,13 @@ struct State<const N: usize> {
 impl<const N: usize> State<N> {
     /// The motion at a station, where the law is `spot`.
     fn new(station: &Station<N>, spot: Spot) -> Self {
-        let local = &station.local;
+        let [first, second, third] = &station.joint;
         let root = spot.a.sqrt();
         let joint = Sample {
             position: station.position,
-            velocity: local.joint[0] * root,
-            acceleration: local.joint[1] * spot.a + local.joint[0] * spot.b,
-            jerk: (local.joint[2] * spot.a
-                + local.joint[1] * (3.0 * spot.b)
-                + local.joint[0] * spot.c)
-                * root,
+            velocity: first * root,
+            acceleration: second * spot.a + first * spot.b,
+            jerk: (third * spot.a + second * (3.0 * spot.b) + first * spot.c) * root,
         };
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
         let [u, u1, u2, u3] = station.warp;
@@ -121,7 +118,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
                 State::new(self.stations.middle(k), spot)
             } else {
                 let grid = self.stations.grid;
-                State::new(&grid.station(self.bounded.path, middle, 0.0), spot)
+                State::new(&grid.place(self.bounded.path, middle, 0.0).0, spot)
             };
             self.halve(k, (w0, start), (middle, &state), depth - 1);
             self.halve(k, (middle, &state), (w1, end), depth - 1);

@@ -2,10 +2,10 @@
 
 use nalgebra::{SVector, Vector3};
 
-use super::grid::{Bounded, Local};
+use super::grid::Bounded;
 use super::lanes::{LANE, Lane};
 use super::problem::Problem;
-use super::stations::Stations;
+use super::stations::{Station, Stations, ToolStation};
 use super::survey::{joint_ratio, speed_cap};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, ToolLimits};
@@ -44,38 +44,46 @@ impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
         let cells = problem.cells();
         for k in 0..cells {
             let (left, middle, right) = (stations.left(k), stations.middle(k), stations.right(k));
-            rows.values(&mut problem, (k, false), &left.local);
-            rows.values(&mut problem, (k, true), &middle.local);
+            let [left_tool, middle_tool] = stations.tools(k);
+            let (left, middle) = ((left, left_tool), (middle, middle_tool));
+            rows.values(&mut problem, (k, false), left);
+            rows.values(&mut problem, (k, true), middle);
             let slots = problem.jerk_slots(k);
             let (first, last) = (slots.start, slots.end - 1);
-            rows.jerks(&mut problem, (k, first), &left.local);
-            rows.jerks(&mut problem, (k, first + slots.len() / 2), &middle.local);
-            rows.jerks(&mut problem, (k, last), &right.local);
+            rows.jerks(&mut problem, (k, first), left);
+            rows.jerks(&mut problem, (k, first + slots.len() / 2), middle);
+            rows.jerks(&mut problem, (k, last), (right, stations.tool_right(k)));
             if problem.dense(k) {
                 for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
                     let w = nodes[k] + share * problem.widths[k];
-                    let local = stations.grid.station(self.path, w, 0.0).local;
-                    rows.jerks(&mut problem, (k, slot), &local);
+                    let (joint, tool) = stations.grid.place(self.path, w, 0.0);
+                    rows.jerks(&mut problem, (k, slot), (&joint, tool));
                 }
             }
         }
-        rows.values(&mut problem, (cells, false), &stations.right(cells - 1).local);
+        let end = (stations.right(cells - 1), stations.tool_right(cells - 1));
+        rows.values(&mut problem, (cells, false), end);
         problem
     }
 }
 
 impl<const N: usize> Rows<'_, N> {
     /// Sets the rows at an end or the middle of cell `k` that do not know the jerk.
-    fn values(&self, problem: &mut Problem, (k, middle): (usize, bool), local: &Local<N>) {
+    fn values(
+        &self,
+        problem: &mut Problem,
+        (k, middle): (usize, bool),
+        (station, tool): (&Station<N>, ToolStation),
+    ) {
         let (slot, l) = (Problem::value_slot(k, middle), k % LANE);
-        let [first, second, _] = &local.joint;
+        let [first, second, _] = &station.joint;
         for (j, row) in problem.acceleration[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.acceleration[j];
             (row[0][l], row[1][l]) = (first[j] * narrow, second[j] * narrow);
         }
         let tools = [
-            (local.linear, self.tool.acceleration),
-            (local.angular, self.tool.angular_acceleration),
+            (tool.linear, self.tool.acceleration),
+            (tool.angular, self.tool.angular_acceleration),
         ];
         let finite = tools.iter().filter(|(_, limit)| limit.is_finite());
         let count = problem.tool_accelerations;
@@ -86,18 +94,23 @@ impl<const N: usize> Rows<'_, N> {
         }
         let speeds = [
             joint_ratio(first, &self.joint.velocity),
-            local.linear[0].norm(),
-            local.angular[0].norm(),
+            tool.linear[0].norm(),
+            tool.angular[0].norm(),
         ];
-        let rate = self.rate_cap.map_or(0.0, |cap| local.speed / cap);
+        let rate = self.rate_cap.map_or(0.0, |cap| station.warp[1] / cap);
         // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
         problem.cap[slot][l] = (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
     }
 
     /// Sets the jerk rows of cell `k` at a slot.
-    fn jerks(&self, problem: &mut Problem, (k, slot): (usize, usize), local: &Local<N>) {
+    fn jerks(
+        &self,
+        problem: &mut Problem,
+        (k, slot): (usize, usize),
+        (station, tool): (&Station<N>, ToolStation),
+    ) {
         let l = k % LANE;
-        let [first, second, third] = &local.joint;
+        let [first, second, third] = &station.joint;
         for (j, row) in problem.jerk[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.jerk[j];
             row[0][l] = third[j] * narrow;
@@ -105,8 +118,8 @@ impl<const N: usize> Rows<'_, N> {
             row[2][l] = first[j] * narrow;
         }
         let tools = [
-            (local.linear, self.tool.jerk),
-            (local.angular, self.tool.angular_jerk),
+            (tool.linear, self.tool.jerk),
+            (tool.angular, self.tool.angular_jerk),
         ];
         let finite = tools.iter().filter(|(_, limit)| limit.is_finite());
         let rows = problem.norm_jerk[slot * problem.tool_jerks..].iter_mut();

@@ -40,7 +40,7 @@ impl<const N: usize> Draft<N> {
         let pieces = Maker::new(bounded, stations).make(problem, &interior.x);
         let audit = Audit::new(bounded, &pieces);
         let total: f64 = pieces.joint.iter().map(|piece| piece.duration).sum();
-        let duration = total * audit.stretch();
+        let duration = total * audit.stretch;
         Self {
             pieces,
             audit,
@@ -67,15 +67,14 @@ pub(super) fn best<P: Path<N>, const N: usize>(
     let mut last = Draft::new(bounded, (stations, &problem), &interior);
     let mut best = None;
     for _ in 0..ROUNDS {
-        if last.audit.stretch() < ENOUGH {
+        if last.audit.stretch < ENOUGH {
             break;
         }
         tighten(&mut problem, &last, 1.0);
+        best = Some(faster(best, last));
         interior.slow_down(&problem);
         interior.solve(&problem, gap, 0.02, FEW_STEPS);
-        let next = Draft::new(bounded, (stations, &problem), &interior);
-        best = Some(faster(best, last));
-        last = next;
+        last = Draft::new(bounded, (stations, &problem), &interior);
     }
     let mut best = faster(best, last);
     best.iterations = interior.iterations;
@@ -97,7 +96,7 @@ pub(super) fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>, m
     let mut excess = vec![1.0_f64; count];
     for (row, cell) in draft.audit.ratios.chunks(columns).zip(&draft.pieces.cell) {
         for (most, ratio) in excess[cell * columns..].iter_mut().zip(row) {
-            *most = most.max(*ratio);
+            *most = if *ratio > *most { *ratio } else { *most };
         }
     }
     let tools = Tools::new(&draft.audit.limits);
