@@ -27,6 +27,10 @@ pub(super) struct Interior {
     step: Vec<f64>,
     matrix: Band,
     state: State,
+    /// Rows that count beyond those of `state`, and the multiplier that all rows have that bound
+    /// nothing.
+    idle: f64,
+    idle_multiplier: f64,
     worth: Worth,
     wide: Wide,
 }
@@ -35,13 +39,16 @@ impl Interior {
     /// Room for laws of `problem`; the law is 1 everywhere.
     pub(super) fn new(problem: &Problem) -> Self {
         let count = problem.unknowns();
+        let state = State::new(problem);
         Self {
             x: vec![1.0; count],
             iterations: 0,
             before: vec![1.0; count],
             step: vec![0.0; count],
             matrix: vec![[0.0; 3]; count],
-            state: State::new(problem),
+            idle: problem.counted_rows() as f64 - state.rows() as f64,
+            idle_multiplier: 0.0,
+            state,
             worth: Worth {
                 flat: f64::INFINITY,
                 steep: f64::INFINITY,
@@ -88,17 +95,18 @@ impl Interior {
     /// Newton steps. `first` is the relative gap that the start is taken to have.
     pub(super) fn solve(&mut self, problem: &Problem, gap: f64, first: f64, most: usize) {
         let mut time = self.worth.time;
-        let count = self.state.rows() as f64;
+        let count = problem.counted_rows() as f64;
         let mut mu = first * time / count;
-        self.turn(Turn::Balance(mu));
+        self.turn(Turn::Balance(mu), mu);
         let mut sigma = 0.3;
         for _ in 0..most {
-            let reach = self.newton(problem, sigma * mu);
+            let centre = sigma * mu;
+            let reach = self.newton(problem, centre);
             let dual = (0.95 / reach.dual).min(1.0);
             let Some(primal) = self.advance(problem, (0.95 / reach.primal).min(1.0)) else {
                 break;
             };
-            let total = self.turn(Turn::Advance(dual));
+            let total = self.turn(Turn::Advance(dual), centre);
             self.iterations += 1;
             let before = time;
             time = self.worth.time;
@@ -113,15 +121,15 @@ impl Interior {
 
     /// Goes towards the middle of what is feasible, `steps` Newton steps, without regard to time.
     pub(super) fn center(&mut self, problem: &Problem, steps: usize) {
-        let mu = 100.0 * self.worth.time / self.state.rows() as f64;
-        self.turn(Turn::Balance(mu));
+        let mu = 100.0 * self.worth.time / problem.counted_rows() as f64;
+        self.turn(Turn::Balance(mu), mu);
         for _ in 0..steps {
             let reach = self.newton(problem, mu);
             let primal = (0.9 / reach.primal).min(1.0);
             if self.advance(problem, primal).is_none() {
                 break;
             }
-            self.turn(Turn::Advance((0.9 / reach.dual).min(1.0)));
+            self.turn(Turn::Advance((0.9 / reach.dual).min(1.0)), mu);
             self.iterations += 1;
         }
     }
@@ -137,12 +145,18 @@ impl Interior {
         }
     }
 
-    /// Turns the multipliers; returns the sum of multiplier times slack.
-    fn turn(&mut self, turn: Turn) -> f64 {
-        self.wide.run(Multipliers {
-            state: &mut self.state,
-            turn,
-        })
+    /// Turns the multipliers, those of idle rows towards `mu`; returns the sum of multiplier times
+    /// slack.
+    fn turn(&mut self, turn: Turn, mu: f64) -> f64 {
+        self.idle_multiplier = match turn {
+            Turn::Balance(mu) => mu,
+            Turn::Advance(factor) => {
+                self.idle_multiplier + factor * (mu - self.idle_multiplier)
+            }
+        };
+        let state = &mut self.state;
+        let total = self.wide.run(Multipliers { state, turn });
+        total + self.idle * self.idle_multiplier
     }
 
     /// Finds the Newton step and those of the multipliers, and how far they may go.

@@ -145,6 +145,18 @@ impl Problem {
         self.widths.len()
     }
 
+    /// Rows that count in the mean of multiplier times slack: those of the joints as if they were
+    /// a multiple of four. What is more than there are bounds nothing; it keeps the mean from
+    /// falling ahead of the centring.
+    pub(super) fn counted_rows(&self) -> usize {
+        let cells = self.cells();
+        let values = 2 * cells + 1;
+        let dense = (0..cells).filter(|k| self.dense(*k)).count();
+        let jerks = JERK_SLOTS * (cells - dense) + DENSE_SLOTS * dense;
+        let joints = self.joints.next_multiple_of(4) * (values + jerks);
+        joints + values * (1 + self.tool_accelerations) + jerks * self.tool_jerks
+    }
+
     /// Number of unknowns, with those past the end that no row depends on.
     pub(super) fn unknowns(&self) -> usize {
         LANE * self.basis.len() + 2
