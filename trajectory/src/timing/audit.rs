@@ -1,12 +1,12 @@
 //! Bounds on every limit over a motion in pieces.
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
 use super::bound::bound;
 use super::certificate::{ActiveSpan, Limit, LimitPeak};
 use super::grid::Bounded;
-use super::hull::{Hull, Hulls};
+use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use super::stations::ToolStation;
 use crate::wide::Wide;
@@ -47,9 +47,13 @@ impl Audit {
         bounded: Bounded<'_, P, N>,
         pieces: &Pieces<N>,
     ) -> Self {
-        let joints = joint_limits(&bounded);
+        let joint = [
+            bounded.joint.velocity,
+            bounded.joint.acceleration,
+            bounded.joint.jerk,
+        ];
         let tool = tool_limits(bounded.tool);
-        let mut limits: Vec<Limit> = joints.iter().map(|(limit, _)| *limit).collect();
+        let mut limits = joint_limits(&joint);
         limits.extend(tool.iter().flatten().map(|(limit, _)| *limit));
         limits.extend(bounded.options.rate_cap.map(|_| Limit::Rate));
         let mut audit = Self {
@@ -59,19 +63,18 @@ impl Audit {
             tool_margin: 0.0,
             durations: pieces.joint.iter().map(|piece| piece.duration).collect(),
         };
-        let wide = Wide::detect();
-        for (joint, law) in pieces.joint.iter().zip(&pieces.law) {
-            let hulls = wide.run(Hulls(joint));
-            for (limit, value) in &joints {
-                audit.ratios.push(joint_bound(joint, &hulls, *limit, *value));
-            }
-            if tool.iter().any(Option::is_some) {
+        let joint = JointBounds::new(joint);
+        let rate = bounded.options.rate_cap.map(|cap| {
+            let free = SVector::repeat(f64::INFINITY);
+            JointBounds::new([SVector::repeat(cap), free, free])
+        });
+        for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
+            joint.push(piece, &mut audit.ratios);
+            if bounded.tool.limited() {
                 audit.push_tool(bounded.path, law, &tool);
             }
-            if let Some(cap) = bounded.options.rate_cap {
-                let hulls = wide.run(Hulls(law));
-                let ratio = joint_bound(law, &hulls, Limit::JointVelocity(0), cap);
-                audit.ratios.push(ratio);
+            if let Some(rate) = &rate {
+                rate.push(law, &mut audit.ratios);
             }
         }
         audit.stretch = audit.stretch_from(0);
@@ -197,26 +200,17 @@ fn root(x: f64, order: i32) -> f64 {
 }
 
 /// The finite limits of the joints.
-fn joint_limits<P, const N: usize>(bounded: &Bounded<'_, P, N>) -> Vec<(Limit, f64)> {
-    let joint = bounded.joint;
-    let mut limits: Vec<(Limit, f64)> = Vec::with_capacity(3 * N);
-    limits.extend(
-        joint
-            .velocity
-            .iter()
-            .enumerate()
-            .map(|(j, x)| (Limit::JointVelocity(j), *x)),
-    );
-    let accelerations = joint.acceleration.iter().enumerate();
-    limits.extend(accelerations.map(|(j, x)| (Limit::JointAcceleration(j), *x)));
-    limits.extend(
-        joint
-            .jerk
-            .iter()
-            .enumerate()
-            .map(|(j, x)| (Limit::JointJerk(j), *x)),
-    );
-    limits.retain(|(_, value)| value.is_finite());
+fn joint_limits<const N: usize>(values: &[SVector<f64, N>; 3]) -> Vec<Limit> {
+    let names = [
+        Limit::JointVelocity,
+        Limit::JointAcceleration,
+        Limit::JointJerk,
+    ];
+    let mut limits = Vec::with_capacity(3 * N + 7);
+    for (name, values) in names.into_iter().zip(values) {
+        let finite = (0..N).filter(|j| values[*j].is_finite());
+        limits.extend(finite.map(name));
+    }
     limits
 }
 
@@ -233,40 +227,59 @@ fn tool_limits(tool: &ToolLimits) -> [Option<(Limit, f64)>; 6] {
     .map(|entry| entry.1.is_finite().then_some(entry))
 }
 
-/// Bound of one joint's limit over a piece, as a ratio.
-#[inline]
-fn joint_bound<const N: usize>(
-    piece: &Piece<N>,
-    [velocity, acceleration, jerk]: &[Hull<N>; 3],
-    limit: Limit,
-    value: f64,
-) -> f64 {
-    let (hull, j) = match limit {
-        Limit::JointVelocity(j) => (velocity, j),
-        Limit::JointAcceleration(j) => (acceleration, j),
-        Limit::JointJerk(j) => (jerk, j),
-        _ => return 0.0,
-    };
-    // Below the floor the hull is enough: no such piece decides anything.
-    let (floor, tolerance) = (0.9 * value, 1e-7 * value);
-    let (most, ends) = (hull.most[j], hull.ends[j]);
-    if most <= floor || most - ends <= tolerance {
-        return most / value;
+/// Bounds velocity, acceleration and jerk of joints over pieces.
+struct JointBounds<const N: usize> {
+    limits: [SVector<f64, N>; 3],
+    /// One over each limit.
+    narrow: [SVector<f64, N>; 3],
+    wide: Wide,
+}
+
+impl<const N: usize> JointBounds<N> {
+    fn new(limits: [SVector<f64, N>; 3]) -> Self {
+        Self {
+            narrow: limits.map(|limit| limit.map(|x| 1.0 / x)),
+            limits,
+            wide: Wide::detect(),
+        }
     }
-    let [_, c1, c2, c3, c4, c5] = piece.coefficients.map(|c| c[j]);
-    let room = (floor, tolerance);
-    let found = match limit {
-        Limit::JointVelocity(_) => {
-            let v = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
-            bound(&v, piece.duration, room)
+
+    /// Adds the ratio of each finite limit over a piece.
+    fn push(&self, piece: &Piece<N>, ratios: &mut Vec<f64>) {
+        let narrow = &self.narrow;
+        let mut hulls = self.wide.run(Hulls { piece, narrow });
+        for (order, hull) in hulls.iter_mut().enumerate() {
+            if hull.loose {
+                for j in 0..N {
+                    if hull.most[j] > FLOOR && hull.over[j] > TOLERANCE {
+                        hull.most[j] = self.tight(piece, order, j);
+                    }
+                }
+            }
+            let limits = self.limits[order].iter();
+            ratios.extend(limits.zip(&hull.most).filter(|(x, _)| x.is_finite()).map(|x| x.1));
         }
-        Limit::JointAcceleration(_) => {
-            let a = [2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5];
-            bound(&a, piece.duration, room)
-        }
-        _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, room),
-    };
-    found / value
+    }
+
+    /// The ratio of one derivative of one joint over a piece.
+    fn tight(&self, piece: &Piece<N>, order: usize, j: usize) -> f64 {
+        let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
+        let (c1, c2, c3, c4, c5) = (c1[j], c2[j], c3[j], c4[j], c5[j]);
+        let limit = self.limits[order][j];
+        let room = (FLOOR * limit, TOLERANCE * limit);
+        let found = match order {
+            0 => {
+                let v = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
+                bound(&v, piece.duration, room)
+            }
+            1 => {
+                let a = [2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5];
+                bound(&a, piece.duration, room)
+            }
+            _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, room),
+        };
+        found / limit
+    }
 }
 
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.

@@ -32,6 +32,28 @@ impl<S: Four> Wave<S> {
         Self { simd, x }
     }
 
+    /// Four numbers from `at` on, or all and zeros where there are fewer than four.
+    #[inline(always)]
+    pub(super) fn some(simd: S, all: &[f64], at: usize) -> Self {
+        if all.len() >= LANE {
+            return Self::load(simd, &all[at..at + LANE]);
+        }
+        let mut lane = [0.0; LANE];
+        lane[..all.len()].copy_from_slice(all);
+        Self::load(simd, &lane)
+    }
+
+    /// Writes what [`Wave::some`] reads.
+    #[inline(always)]
+    pub(super) fn put(self, all: &mut [f64], at: usize) {
+        if all.len() >= LANE {
+            self.simd.store(self.x, &mut all[at..at + LANE]);
+            return;
+        }
+        let (lane, count) = (self.lane(), all.len());
+        all.copy_from_slice(&lane[..count]);
+    }
+
     /// The build that computes on it.
     #[inline(always)]
     pub(super) fn simd(self) -> S {
@@ -90,6 +112,13 @@ impl<S: Four> Wave<S> {
         let [a, b, c, d] = self.lane();
         a.max(b).max(c.max(d))
     }
+
+    /// The least of the four.
+    #[inline(always)]
+    pub(super) fn least(self) -> f64 {
+        let [a, b, c, d] = self.lane();
+        a.min(b).min(c.min(d))
+    }
 }
 
 impl<S: Four> Add for Wave<S> {
@@ -146,6 +175,14 @@ impl<S: Four> AddAssign for Wave<S> {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
+}
+
+/// Where groups of four of `count` numbers begin; the last group takes some once more where the
+/// numbers do not fill it.
+#[inline(always)]
+pub(super) fn groups(count: usize) -> impl Iterator<Item = usize> {
+    let last = count.saturating_sub(LANE);
+    (0..count.div_ceil(LANE)).map(move |group| (LANE * group).min(last))
 }
 
 /// The scalar product of two vectors in each cell.

@@ -13,6 +13,7 @@ mod certificate;
 mod grid;
 mod hull;
 mod interior;
+mod joint;
 mod lanes;
 mod law;
 mod least;

@@ -4,9 +4,11 @@ use nalgebra::SVector;
 use realtime::{Piece, Sample};
 
 use super::grid::Bounded;
+use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
 use super::stations::{Station, Stations};
 use crate::Path;
+use crate::wide::Wide;
 
 /// Jerk of a piece may differ from that of the law by this share of the limit.
 const JERK_FIT: f64 = 2e-3;
@@ -36,15 +38,9 @@ struct State<const N: usize> {
 
 impl<const N: usize> State<N> {
     /// The motion at a station, where the law is `spot`.
-    fn new(station: &Station<N>, spot: Spot) -> Self {
-        let [first, second, third] = &station.joint;
+    fn new(wide: Wide, station: &Station<N>, spot: Spot) -> Self {
         let root = spot.a.sqrt();
-        let joint = Sample {
-            position: station.position,
-            velocity: first * root,
-            acceleration: second * spot.a + first * spot.b,
-            jerk: (third * spot.a + second * (3.0 * spot.b) + first * spot.c) * root,
-        };
+        let joint = wide.run(Motion { station, spot });
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
         let [u, u1, u2, u3] = station.warp;
         let law = Sample {
@@ -61,6 +57,9 @@ impl<const N: usize> State<N> {
 pub(super) struct Maker<'a, P, const N: usize> {
     bounded: Bounded<'a, P, N>,
     stations: &'a Stations<'a, N>,
+    /// One over the jerk limits.
+    narrow: SVector<f64, N>,
+    wide: Wide,
     out: Pieces<N>,
 }
 
@@ -77,6 +76,8 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         Self {
             bounded,
             stations,
+            narrow: bounded.joint.jerk.map(|x| 1.0 / x),
+            wide: Wide::detect(),
             out,
         }
     }
@@ -86,8 +87,8 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         let nodes = &self.stations.grid.nodes;
         for k in 0..problem.cells() {
             let (spot, stations) = (problem.spot(k, x), self.stations);
-            let start = State::new(stations.left(k), spot);
-            let end = State::new(stations.right(k), spot.moved(problem.widths[k]));
+            let start = State::new(self.wide, stations.left(k), spot);
+            let end = State::new(self.wide, stations.right(k), spot.moved(problem.widths[k]));
             self.halve(k, (nodes[k], &start), (nodes[k + 1], &end), DEPTH);
         }
         self.out
@@ -103,9 +104,15 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         depth: usize,
     ) {
         let duration = passage(start.spot, w1 - w0);
-        let joint = Piece::hermite(duration, &start.joint, &end.joint);
+        let (joint, jerk_off) = self.wide.run(Join {
+            duration,
+            start: &start.joint,
+            end: &end.joint,
+            narrow: &self.narrow,
+        });
+        // Both ends of the cell have the same third derivative of the law only within it.
+        let fits = depth == 0 || jerk_off <= JERK_FIT;
         let law = Piece::hermite(duration, &start.law, &end.law);
-        let fits = depth == 0 || self.jerk_fits(&joint, start, end);
         let error = if fits {
             self.fit_error(&joint, &law)
         } else {
@@ -115,10 +122,10 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
             let middle = 0.5 * (w0 + w1);
             let spot = start.spot.moved(middle - w0);
             let state = if depth == DEPTH {
-                State::new(self.stations.middle(k), spot)
+                State::new(self.wide, self.stations.middle(k), spot)
             } else {
                 let grid = self.stations.grid;
-                State::new(&grid.place(self.bounded.path, middle, 0.0).0, spot)
+                State::new(self.wide, &grid.place(self.bounded.path, middle, 0.0).0, spot)
             };
             self.halve(k, (w0, start), (middle, &state), depth - 1);
             self.halve(k, (middle, &state), (w1, end), depth - 1);
@@ -137,20 +144,6 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         let end = self.bounded.path.end();
         let wanted = self.bounded.path.at(u.clamp(0.0, end)).joint.q[0];
         (position(joint, t) - wanted).amax()
-    }
-
-    /// Whether the jerk of a piece at its ends is near that of the law.
-    fn jerk_fits(&self, piece: &Piece<N>, start: &State<N>, end: &State<N>) -> bool {
-        let limit = &self.bounded.joint.jerk;
-        let [_, _, _, c3, c4, c5] = &piece.coefficients;
-        let t = piece.duration;
-        // Both ends of the cell have the same third derivative of the law only within it.
-        (0..N).all(|j| {
-            let first = 6.0 * c3[j];
-            let last = first + (24.0 * c4[j] + 60.0 * c5[j] * t) * t;
-            let off = (first - start.joint.jerk[j]).abs().max((last - end.joint.jerk[j]).abs());
-            off <= JERK_FIT * limit[j]
-        })
     }
 }
 
