@@ -164,7 +164,7 @@ impl Interior {
         self.wide.run(Assemble {
             problem,
             x: &self.x,
-            state: &self.state,
+            state: &mut self.state,
             mu,
             matrix: &mut self.matrix,
             step: &mut self.step,

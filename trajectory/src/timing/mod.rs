@@ -17,6 +17,7 @@ mod joint;
 mod lanes;
 mod law;
 mod least;
+mod lines;
 mod moving;
 mod options;
 mod pieces;

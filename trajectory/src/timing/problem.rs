@@ -36,10 +36,9 @@ pub(super) struct Problem {
     pub acceleration: Vec<[Lane; 2]>,
     /// Jerk rows `sqrt(a) |x a + y b + z c| <= 1` of each jerk slot, as `[x, y, z]`.
     pub jerk: Vec<[Lane; 3]>,
-    /// Reciprocal of the cap of `a` at each slot.
-    pub cap: Vec<Lane>,
-    /// Share of each slot in the time, over `1 / sqrt(a)` (Simpson's rule in each cell).
-    pub weight: Vec<Lane>,
+    /// Of both slots of values in each block: the share in the time, over `1 / sqrt(a)` (Simpson's
+    /// rule in each cell), and the reciprocal of the cap of `a`.
+    pub value: Vec<[[Lane; 2]; 2]>,
     /// Acceleration rows of the tool, bounded in norm.
     pub norm_acceleration: Vec<[[Lane; 3]; 2]>,
     /// Jerk rows of the tool, bounded in norm.
@@ -95,8 +94,7 @@ impl Problem {
             tool_accelerations: tools[0],
             tool_jerks: tools[1],
             acceleration: vec![[[0.0; LANE]; 2]; 2 * blocks * joints],
-            cap: vec![[0.0; LANE]; 2 * blocks],
-            weight: vec![[0.0; LANE]; 2 * blocks],
+            value: vec![[[[0.0; LANE]; 2]; 2]; blocks],
             norm_acceleration: vec![[[[0.0; LANE]; 3]; 2]; 2 * blocks * tools[0]],
             basis: vec![Basis::default(); blocks],
             moving,
@@ -131,8 +129,8 @@ impl Problem {
         if k <= cells {
             let left = 1.0 / (before + h);
             (basis.first[l], basis.second[l], basis.left[l]) = (h * left, before * left, left);
-            self.weight[2 * i][l] = weight;
-            self.weight[2 * i + 1][l] = middle;
+            self.value[i][0][0][l] = weight;
+            self.value[i][1][0][l] = middle;
         }
         if k < cells {
             (basis.width[l], basis.inverse[l]) = (h, 1.0 / h);
@@ -177,6 +175,17 @@ impl Problem {
         self.jerk_slots[k / LANE]..self.jerk_slots[k / LANE + 1]
     }
 
+    /// The jerk slots of block `i`, each by its share of the way from left to right.
+    #[inline(always)]
+    pub(super) fn jerk_shares(&self, i: usize) -> &'static [f64] {
+        const SHARES: [f64; JERK_SLOTS] = [0.0, 0.5, 1.0];
+        const DENSE: [f64; DENSE_SLOTS] = [0.0, 0.25, 0.5, 0.75, 1.0];
+        match self.jerk_slots[i..] {
+            [first, end, ..] if end - first == JERK_SLOTS => &SHARES,
+            _ => &DENSE,
+        }
+    }
+
     /// The problem with all limits of speed, acceleration and jerk `factor` times as wide.
     pub(super) fn relaxed(&self, factor: f64) -> Self {
         let mut wide = self.clone();
@@ -187,8 +196,9 @@ impl Problem {
         let vectors = wide.norm_acceleration.iter_mut().flatten().flatten();
         let vectors = vectors.chain(wide.norm_jerk.iter_mut().flatten().flatten());
         vectors.flatten().for_each(|x| *x *= narrow);
-        let caps = wide.cap.iter_mut().flatten();
-        caps.for_each(|cap| *cap *= narrow * narrow);
+        for [_, cap] in wide.value.iter_mut().flatten() {
+            cap.iter_mut().for_each(|cap| *cap *= narrow * narrow);
+        }
         wide
     }
 
@@ -201,7 +211,7 @@ impl Problem {
         for lane in norms.flatten().flatten() {
             lane[0] = 0.0;
         }
-        self.cap[0][0] = 1e-6;
+        self.value[0][0][1][0] = 1e-6;
     }
 
     /// The law at the left end of cell `k`.

@@ -2,8 +2,9 @@
 
 use super::band::Band;
 use super::lanes::{LANE, Lane, Wave, dot};
+use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
-use super::state::{Norm, Row, Spots, State, jerk_places, vector};
+use super::state::{Norm, Row, Spots, State, vector};
 use crate::wide::{Four, Op};
 
 /// Gradient and curvature at a place, over `a`, `b`, `c` there.
@@ -86,7 +87,7 @@ impl<S: Four> Share<S> {
     #[inline(always)]
     fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[Row], mu: Wave<S>) {
         for (line, row) in lines.iter().zip(rows) {
-            let [p, q] = line.map(|lane| Wave::load(self.simd, &lane));
+            let (p, q) = (Wave::load(self.simd, &line[0]), Wave::load(self.simd, &line[1]));
             let (weight, force) = weigh(self.simd, row, mu);
             let (wp, wq) = (weight * p, weight * q);
             self.aa += wq * q;
@@ -101,7 +102,7 @@ impl<S: Four> Share<S> {
     #[inline(always)]
     fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[Row], mu: Wave<S>) {
         for (line, row) in lines.iter().zip(rows) {
-            let [x, y, z] = line.map(|lane| Wave::load(self.simd, &lane));
+            let [x, y, z] = vector(self.simd, line);
             let (weight, force) = weigh(self.simd, row, mu);
             let (wx, wy) = (weight * x, weight * y);
             self.aa += wx * x;
@@ -159,12 +160,40 @@ impl<S: Four> Share<S> {
 
     /// Adds the cap `cap a <= 1` and the time `weight / sqrt(a)`.
     #[inline(always)]
-    fn value(&mut self, a: Wave<S>, [weight, cap]: [Wave<S>; 2], row: &Row, mu: Wave<S>) {
+    fn value(&mut self, value: &[Lane; 2], row: &Row, a: Wave<S>, mu: Wave<S>) {
+        let (weight, cap) = (
+            Wave::load(self.simd, &value[0]),
+            Wave::load(self.simd, &value[1]),
+        );
         let g = Wave::load(self.simd, &row.g);
         let pull = cap / (Wave::splat(self.simd, 1.0) - g);
         let slope = weight / (a * a.sqrt());
         self.aa += slope * 0.75 / a + Wave::load(self.simd, &row.multiplier) * pull * cap;
         self.ga += mu * pull - slope * 0.5;
+    }
+
+    /// Adds a slot of values.
+    #[inline(always)]
+    fn values(&mut self, slot: Values<'_>, mu: Wave<S>) {
+        let simd = self.simd;
+        self.accelerations(slot.joints.0, slot.joints.1, mu);
+        for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let still = [Wave::splat(simd, 0.0); 3];
+            self.norm([vector(simd, q), vector(simd, p), still], norm, mu);
+        }
+    }
+
+    /// The share of a jerk slot.
+    #[inline(always)]
+    fn of_jerks(slot: Jerks<'_>, spot: Spots<S>, mu: Wave<S>) -> Self {
+        let simd = spot.a.simd();
+        let mut share = Self::zero(simd);
+        share.jerks(slot.joints.0, slot.joints.1, mu);
+        for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            share.norm(line, norm, mu);
+        }
+        share.rooted(spot)
     }
 
     /// What the cells of a block add to the Newton system: six entries of the matrix over the
@@ -216,7 +245,7 @@ impl<S: Four> Share<S> {
 pub(super) struct Assemble<'a> {
     pub problem: &'a Problem,
     pub x: &'a [f64],
-    pub state: &'a State,
+    pub state: &'a mut State,
     pub mu: f64,
     pub matrix: &'a mut Band,
     pub step: &'a mut [f64],
@@ -229,77 +258,54 @@ impl Op for Assemble<'_> {
     fn run<S: Four>(self, simd: S) {
         self.matrix.fill([0.0; 3]);
         self.step.fill(0.0);
-        for (i, basis) in self.problem.basis.iter().enumerate() {
+        let mu = Wave::splat(simd, self.mu);
+        let (mut lines, blocks) = Lines::all(self.problem, self.state);
+        for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let width = Wave::load(simd, &basis.width);
             let half = width * 0.5;
             let middle = left.moved(half);
-            let mut total = self.values(2 * i, left);
-            let mut inner = self.values(2 * i + 1, middle);
-            for (slot, share) in jerk_places(self.problem, i) {
+            let (mut total, mut inner) = (Share::zero(simd), Share::zero(simd));
+            total.value(&value[0], &cap[0], left.a, mu);
+            inner.value(&value[1], &cap[1], middle.a, mu);
+            total.values(lines.values(), mu);
+            inner.values(lines.values(), mu);
+            for share in self.problem.jerk_shares(i) {
+                let slot = lines.jerks();
                 if *share == 0.0 {
-                    total.add(&self.jerks(slot, left));
+                    total.add(&Share::of_jerks(slot, left, mu));
                 } else if *share == 0.5 {
-                    inner.add(&self.jerks(slot, middle));
+                    inner.add(&Share::of_jerks(slot, middle, mu));
                 } else {
                     let x = width * *share;
-                    total.add(&self.jerks(slot, left.moved(x)).moved(x));
+                    total.add(&Share::of_jerks(slot, left.moved(x), mu).moved(x));
                 }
             }
             total.add(&inner.moved(half));
-            let entries = total.entries(basis);
-            for l in 0..LANE {
-                let [m00, m01, m02, m11, m12, m22, f0, f1, f2] = entries.map(|lane| lane[l]);
-                let k = LANE * i + l;
-                let rows = &mut self.matrix[k..k + 3];
-                rows[0] = [rows[0][0] + m00, rows[0][1] + m01, rows[0][2] + m02];
-                rows[1] = [rows[1][0] + m11, rows[1][1] + m12, rows[1][2]];
-                rows[2][0] += m22;
-                let step = &mut self.step[k..k + 3];
-                step[0] -= f0;
-                step[1] -= f1;
-                step[2] -= f2;
-            }
+            scatter(&total.entries(basis), LANE * i, self.matrix, self.step);
         }
     }
 }
 
-impl Assemble<'_> {
-    /// The share of a slot of values.
-    #[inline(always)]
-    fn values<S: Four>(&self, slot: usize, spot: Spots<S>) -> Share<S> {
-        let (problem, simd) = (self.problem, spot.a.simd());
-        let mu = Wave::splat(simd, self.mu);
-        let mut share = Share::zero(simd);
-        let known = [&problem.weight[slot], &problem.cap[slot]].map(|x| Wave::load(simd, x));
-        share.value(spot.a, known, &self.state.cap[slot], mu);
-        let joints = slot * problem.joints..(slot + 1) * problem.joints;
-        let lines = &problem.acceleration[joints.clone()];
-        share.accelerations(lines, &self.state.acceleration[joints], mu);
-        let tools = problem.tool_accelerations;
-        for j in slot * tools..(slot + 1) * tools {
-            let [p, q] = &problem.norm_acceleration[j];
-            let still = [Wave::splat(simd, 0.0); 3];
-            let line = [vector(simd, q), vector(simd, p), still];
-            share.norm(line, &self.state.norm_acceleration[j], mu);
-        }
-        share
-    }
-
-    /// The share of a jerk slot.
-    #[inline(always)]
-    fn jerks<S: Four>(&self, slot: usize, spot: Spots<S>) -> Share<S> {
-        let (problem, simd) = (self.problem, spot.a.simd());
-        let mu = Wave::splat(simd, self.mu);
-        let mut share = Share::zero(simd);
-        let joints = slot * problem.joints..(slot + 1) * problem.joints;
-        share.jerks(&problem.jerk[joints.clone()], &self.state.jerk[joints], mu);
-        let tools = slot * problem.tool_jerks..(slot + 1) * problem.tool_jerks;
-        for j in tools {
-            let [x, y, z] = &problem.norm_jerk[j];
-            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-            share.norm(line, &self.state.norm_jerk[j], mu);
-        }
-        share.rooted(spot)
+/// Adds the entries of a block that begins with unknown `first` to the Newton system.
+#[inline(always)]
+fn scatter(entries: &[Lane; 9], first: usize, matrix: &mut [[f64; 3]], step: &mut [f64]) {
+    let (Some(matrix), Some(step)) = (
+        matrix[first..].first_chunk_mut::<{ LANE + 2 }>(),
+        step[first..].first_chunk_mut::<{ LANE + 2 }>(),
+    ) else {
+        return;
+    };
+    let [m00, m01, m02, m11, m12, m22, f0, f1, f2] = entries;
+    for l in 0..LANE {
+        matrix[l][0] += m00[l];
+        matrix[l][1] += m01[l];
+        matrix[l][2] += m02[l];
+        matrix[l + 1][0] += m11[l];
+        matrix[l + 1][1] += m12[l];
+        matrix[l + 2][0] += m22[l];
+        step[l] -= f0[l];
+        step[l + 1] -= f1[l];
+        step[l + 2] -= f2[l];
     }
 }

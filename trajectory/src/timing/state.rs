@@ -1,6 +1,7 @@
 //! Values and multipliers of the rows of a problem under a law.
 
 use super::lanes::{LANE, Lane, Wave, combine, dot};
+use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
 use crate::wide::{Four, Op};
 
@@ -25,7 +26,8 @@ pub(super) struct Norm {
 pub(super) struct State {
     pub acceleration: Vec<Row>,
     pub jerk: Vec<Row>,
-    pub cap: Vec<Row>,
+    /// Those of the caps, at both slots of values of each block.
+    pub cap: Vec<[Row; 2]>,
     pub norm_acceleration: Vec<Norm>,
     pub norm_jerk: Vec<Norm>,
 }
@@ -53,14 +55,20 @@ impl<S: Four> Spots<S> {
     /// At the left ends, from the unknowns beginning with those of the block.
     #[inline(always)]
     pub(super) fn left(simd: S, basis: &Basis, x: &[f64]) -> Self {
-        let lane = |x: &Lane| Wave::load(simd, x);
-        let [x0, x1, x2] = [0, 1, 2].map(|i| Wave::load(simd, &x[i..i + LANE]));
-        let b = (x1 - x0) * lane(&basis.left);
-        let next = (x2 - x1) * lane(&basis.right);
+        let x: &[f64; LANE + 2] = x.first_chunk().unwrap_or(&[1.0; LANE + 2]);
+        let x0 = Wave::load(simd, &x[..LANE]);
+        let x1 = Wave::load(simd, &x[1..LANE + 1]);
+        let x2 = Wave::load(simd, &x[2..]);
+        let b = (x1 - x0) * Wave::load(simd, &basis.left);
+        let next = (x2 - x1) * Wave::load(simd, &basis.right);
+        let (first, second) = (
+            Wave::load(simd, &basis.first),
+            Wave::load(simd, &basis.second),
+        );
         Self {
-            a: x0 * lane(&basis.first) + x1 * lane(&basis.second),
+            a: x0 * first + x1 * second,
             b,
-            c: (next - b) * lane(&basis.inverse),
+            c: (next - b) * Wave::load(simd, &basis.inverse),
         }
     }
 
@@ -74,23 +82,6 @@ impl<S: Four> Spots<S> {
             c: self.c,
         }
     }
-}
-
-/// The jerk slots of block `i`, each with its share of the way from left to right.
-#[inline(always)]
-pub(super) fn jerk_places(
-    problem: &Problem,
-    i: usize,
-) -> impl Iterator<Item = (usize, &'static f64)> {
-    const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
-    const DENSE: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-    let slots = problem.jerk_slots[i]..problem.jerk_slots[i + 1];
-    let shares: &[f64] = if slots.len() == SHARES.len() {
-        &SHARES
-    } else {
-        &DENSE
-    };
-    slots.zip(shares)
 }
 
 /// A vector in registers.
@@ -109,7 +100,7 @@ impl State {
         Self {
             acceleration: vec![Row::default(); problem.acceleration.len()],
             jerk: vec![Row::default(); problem.jerk.len()],
-            cap: vec![Row::default(); problem.cap.len()],
+            cap: vec![[Row::default(); 2]; problem.value.len()],
             norm_acceleration: vec![Norm::default(); problem.norm_acceleration.len()],
             norm_jerk: vec![Norm::default(); problem.norm_jerk.len()],
         }
@@ -117,28 +108,8 @@ impl State {
 
     /// Rows in all.
     pub(super) fn rows(&self) -> usize {
-        let joints = self.acceleration.len() + self.jerk.len() + self.cap.len();
+        let joints = self.acceleration.len() + self.jerk.len() + 2 * self.cap.len();
         LANE * (joints + self.norm_acceleration.len() + self.norm_jerk.len())
-    }
-
-    /// The rows of values at a slot.
-    #[inline(always)]
-    pub(super) fn values(&mut self, problem: &Problem, slot: usize) -> (&mut [Row], &mut [Norm]) {
-        let (joints, tools) = (problem.joints, problem.tool_accelerations);
-        (
-            &mut self.acceleration[slot * joints..][..joints],
-            &mut self.norm_acceleration[slot * tools..][..tools],
-        )
-    }
-
-    /// The rows at a jerk slot.
-    #[inline(always)]
-    pub(super) fn jerks(&mut self, problem: &Problem, slot: usize) -> (&mut [Row], &mut [Norm]) {
-        let (joints, tools) = (problem.joints, problem.tool_jerks);
-        (
-            &mut self.jerk[slot * joints..][..joints],
-            &mut self.norm_jerk[slot * tools..][..tools],
-        )
     }
 }
 
@@ -154,19 +125,24 @@ impl Op for Evaluate<'_> {
     type Output = Worth;
 
     #[inline(always)]
-    fn run<S: Four>(mut self, simd: S) -> Worth {
+    fn run<S: Four>(self, simd: S) -> Worth {
         let zero = Wave::splat(simd, 0.0);
         let (mut flat, mut steep, mut time) = (zero, zero, zero);
-        for (i, basis) in self.problem.basis.iter().enumerate() {
+        let (mut lines, blocks) = Lines::all(self.problem, self.state);
+        for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let width = Wave::load(simd, &basis.width);
-            for (slot, spot) in [(2 * i, left), (2 * i + 1, left.moved(width * 0.5))] {
-                time += Wave::load(simd, &self.problem.weight[slot]) / spot.a.sqrt();
-                flat = self.values(simd, slot, spot).max(flat);
-            }
-            for (slot, share) in jerk_places(self.problem, i) {
+            let middle = left.moved(width * 0.5);
+            time += Wave::load(simd, &value[0][0]) / left.a.sqrt();
+            time += Wave::load(simd, &value[1][0]) / middle.a.sqrt();
+            let [first, second] = cap;
+            flat = self::cap(&value[0][1], first, left).max(flat);
+            flat = self::cap(&value[1][1], second, middle).max(flat);
+            flat = values(lines.values(), left).max(flat);
+            flat = values(lines.values(), middle).max(flat);
+            for share in self.problem.jerk_shares(i) {
                 let spot = left.moved(width * *share);
-                steep = self.jerks(simd, slot, spot).max(steep);
+                steep = jerks(lines.jerks(), spot).max(steep);
             }
         }
         Worth {
@@ -177,56 +153,63 @@ impl Op for Evaluate<'_> {
     }
 }
 
-impl Evaluate<'_> {
-    /// The largest squared value at a slot of values.
-    #[inline(always)]
-    fn values<S: Four>(&mut self, simd: S, slot: usize, spot: Spots<S>) -> Wave<S> {
-        let problem = self.problem;
-        let cap = Wave::load(simd, &problem.cap[slot]) * spot.a;
-        cap.store(&mut self.state.cap[slot].g);
-        let mut most = cap * cap;
-        let (rows, norms) = self.state.values(problem, slot);
-        let lines = problem.acceleration[slot * problem.joints..].iter();
-        for (row, line) in rows.iter_mut().zip(lines) {
-            let [p, q] = line.map(|lane| Wave::load(simd, &lane));
-            let g = p * spot.b + q * spot.a;
-            g.store(&mut row.g);
-            most = (g * g).max(most);
-        }
-        let lines = problem.norm_acceleration[slot * problem.tool_accelerations..].iter();
-        for (norm, line) in norms.iter_mut().zip(lines) {
-            let [p, q] = line;
-            let g = combine([vector(simd, p), vector(simd, q)], [spot.b, spot.a]);
-            norm.g = g.map(Wave::lane);
-            most = dot(g, g).max(most);
-        }
-        most
-    }
+/// Sets the ratios to caps; returns their squares.
+#[inline(always)]
+fn cap<S: Four>(cap: &Lane, row: &mut Row, spot: Spots<S>) -> Wave<S> {
+    let g = Wave::load(spot.a.simd(), cap) * spot.a;
+    g.store(&mut row.g);
+    g * g
+}
 
-    /// The largest squared value at a jerk slot.
-    #[inline(always)]
-    fn jerks<S: Four>(&mut self, simd: S, slot: usize, spot: Spots<S>) -> Wave<S> {
-        let problem = self.problem;
-        let root = spot.a.sqrt();
-        let (a, b, c) = (root * spot.a, root * spot.b, root * spot.c);
-        let mut most = Wave::splat(simd, 0.0);
-        let (rows, norms) = self.state.jerks(problem, slot);
-        let lines = problem.jerk[slot * problem.joints..].iter();
-        for (row, line) in rows.iter_mut().zip(lines) {
-            let [x, y, z] = line.map(|lane| Wave::load(simd, &lane));
-            let g = x * a + y * b + z * c;
-            g.store(&mut row.g);
-            most = (g * g).max(most);
-        }
-        let lines = problem.norm_jerk[slot * problem.tool_jerks..].iter();
-        for (norm, line) in norms.iter_mut().zip(lines) {
-            let [x, y, z] = line;
-            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-            let g = combine(line, [a, b, c]);
-            norm.g = g.map(Wave::lane);
-            most = dot(g, g).max(most);
-        }
-        most
+/// Sets the values at a slot; returns the largest square.
+#[inline(always)]
+fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Wave<S> {
+    let simd = spot.a.simd();
+    let mut most = Wave::splat(simd, 0.0);
+    for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
+        let g = Wave::load(simd, p) * spot.b + Wave::load(simd, q) * spot.a;
+        g.store(&mut row.g);
+        most = (g * g).max(most);
+    }
+    for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+        let g = combine([vector(simd, p), vector(simd, q)], [spot.b, spot.a]);
+        store(g, &mut norm.g);
+        most = dot(g, g).max(most);
+    }
+    most
+}
+
+/// Sets the values at a jerk slot; returns the largest square.
+#[inline(always)]
+fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Wave<S> {
+    let simd = spot.a.simd();
+    let root = spot.a.sqrt();
+    let (a, b, c) = (root * spot.a, root * spot.b, root * spot.c);
+    let mut most = Wave::splat(simd, 0.0);
+    for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
+        let (x, y, z) = (
+            Wave::load(simd, x),
+            Wave::load(simd, y),
+            Wave::load(simd, z),
+        );
+        let g = x * a + y * b + z * c;
+        g.store(&mut row.g);
+        most = (g * g).max(most);
+    }
+    for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+        let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+        let g = combine(line, [a, b, c]);
+        store(g, &mut norm.g);
+        most = dot(g, g).max(most);
+    }
+    most
+}
+
+/// Writes a vector to memory.
+#[inline(always)]
+fn store<S: Four>(vector: [Wave<S>; 3], to: &mut [Lane; 3]) {
+    for (lane, x) in to.iter_mut().zip(vector) {
+        x.store(lane);
     }
 }
 
@@ -257,7 +240,7 @@ impl Op for Multipliers<'_> {
             let g = Wave::load(simd, &row.g);
             total += turn.take(one - g * g, &mut row.multiplier, &row.change);
         }
-        for row in &mut state.cap {
+        for row in state.cap.iter_mut().flatten() {
             let g = Wave::load(simd, &row.g);
             total += turn.take(one - g, &mut row.multiplier, &row.change);
         }

@@ -1,8 +1,9 @@
 //! How far a Newton step may go.
 
-use super::lanes::{LANE, Wave, combine, dot};
+use super::lanes::{LANE, Lane, Wave, combine, dot};
+use super::lines::{Jerks, Lines, Values};
 use super::problem::Problem;
-use super::state::{Norm, Row, Spots, State, jerk_places, vector};
+use super::state::{Norm, Row, Spots, State, vector};
 use crate::wide::{Four, Op};
 
 /// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
@@ -58,10 +59,11 @@ impl<S: Four> Strides<S> {
         self.dual = (one - new / m).max(self.dual);
     }
 
-    /// Takes in a cap whose row changes by `d`, and `a` that changes by `da`.
+    /// Takes in a cap of `a`, which changes by `da`.
     #[inline(always)]
-    fn value(&mut self, row: &mut Row, d: Wave<S>, (a, da): (Wave<S>, Wave<S>)) {
+    fn value(&mut self, cap: &Lane, row: &mut Row, (a, da): (Wave<S>, Wave<S>)) {
         let one = Wave::splat(self.simd, 1.0);
+        let d = Wave::load(self.simd, cap) * da;
         let m = Wave::load(self.simd, &row.multiplier);
         let inverse = (one - Wave::load(self.simd, &row.g)).inverse();
         let fall = Wave::splat(self.simd, 0.0) - da / a;
@@ -69,6 +71,42 @@ impl<S: Four> Strides<S> {
         let new = (self.mu + m * d) * inverse;
         (new - m).store(&mut row.change);
         self.dual = (one - new / m).max(self.dual);
+    }
+
+    /// Takes in the rows of a slot of values.
+    #[inline(always)]
+    fn values(&mut self, slot: Values<'_>, d: Spots<S>) {
+        let simd = self.simd;
+        for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
+            self.row(row, Wave::load(simd, p) * d.b + Wave::load(simd, q) * d.a);
+        }
+        for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
+            self.norm(norm, d);
+        }
+    }
+
+    /// Takes in the rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
+    #[inline(always)]
+    fn jerks(&mut self, slot: Jerks<'_>, at: Spots<S>, d: Spots<S>) {
+        let simd = self.simd;
+        let root = at.a.sqrt();
+        let half = d.a * 0.5 / at.a;
+        let a = root * (d.a + half * at.a);
+        let b = root * (d.b + half * at.b);
+        let c = root * (d.c + half * at.c);
+        for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
+            let (x, y, z) = (
+                Wave::load(simd, x),
+                Wave::load(simd, y),
+                Wave::load(simd, z),
+            );
+            self.row(row, x * a + y * b + z * c);
+        }
+        for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            self.norm(norm, combine(line, [a, b, c]));
+        }
     }
 }
 
@@ -86,7 +124,7 @@ impl Op for Measure<'_> {
     type Output = Stride;
 
     #[inline(always)]
-    fn run<S: Four>(mut self, simd: S) -> Stride {
+    fn run<S: Four>(self, simd: S) -> Stride {
         let least = Wave::splat(simd, 1e-9);
         let mut strides = Strides {
             simd,
@@ -94,67 +132,25 @@ impl Op for Measure<'_> {
             primal: least,
             dual: least,
         };
-        for (i, basis) in self.problem.basis.iter().enumerate() {
+        let (mut lines, blocks) = Lines::all(self.problem, self.state);
+        for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let change = Spots::left(simd, basis, &self.step[LANE * i..]);
             let width = Wave::load(simd, &basis.width);
             let half = width * 0.5;
-            self.values(&mut strides, 2 * i, left.a, change);
-            let middle = left.moved(half).a;
-            self.values(&mut strides, 2 * i + 1, middle, change.moved(half));
-            for (slot, share) in jerk_places(self.problem, i) {
+            let (middle, further) = (left.moved(half), change.moved(half));
+            strides.value(&value[0][1], &mut cap[0], (left.a, change.a));
+            strides.value(&value[1][1], &mut cap[1], (middle.a, further.a));
+            strides.values(lines.values(), change);
+            strides.values(lines.values(), further);
+            for share in self.problem.jerk_shares(i) {
                 let x = width * *share;
-                self.jerks(&mut strides, slot, left.moved(x), change.moved(x));
+                strides.jerks(lines.jerks(), left.moved(x), change.moved(x));
             }
         }
         Stride {
             primal: strides.primal.largest(),
             dual: strides.dual.largest(),
-        }
-    }
-}
-
-impl Measure<'_> {
-    /// The rows of a slot of values.
-    #[inline(always)]
-    fn values<S: Four>(&mut self, to: &mut Strides<S>, slot: usize, a: Wave<S>, d: Spots<S>) {
-        let (problem, simd) = (self.problem, to.simd);
-        let cap = Wave::load(simd, &problem.cap[slot]) * d.a;
-        to.value(&mut self.state.cap[slot], cap, (a, d.a));
-        let (rows, norms) = self.state.values(problem, slot);
-        let lines = problem.acceleration[slot * problem.joints..].iter();
-        for (row, line) in rows.iter_mut().zip(lines) {
-            let [p, q] = line.map(|lane| Wave::load(simd, &lane));
-            to.row(row, p * d.b + q * d.a);
-        }
-        let lines = problem.norm_acceleration[slot * problem.tool_accelerations..].iter();
-        for (norm, line) in norms.iter_mut().zip(lines) {
-            let [p, q] = line;
-            let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
-            to.norm(norm, d);
-        }
-    }
-
-    /// The rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
-    #[inline(always)]
-    fn jerks<S: Four>(&mut self, to: &mut Strides<S>, slot: usize, at: Spots<S>, d: Spots<S>) {
-        let (problem, simd) = (self.problem, to.simd);
-        let root = at.a.sqrt();
-        let half = d.a * 0.5 / at.a;
-        let a = root * (d.a + half * at.a);
-        let b = root * (d.b + half * at.b);
-        let c = root * (d.c + half * at.c);
-        let (rows, norms) = self.state.jerks(problem, slot);
-        let lines = problem.jerk[slot * problem.joints..].iter();
-        for (row, line) in rows.iter_mut().zip(lines) {
-            let [x, y, z] = line.map(|lane| Wave::load(simd, &lane));
-            to.row(row, x * a + y * b + z * c);
-        }
-        let lines = problem.norm_jerk[slot * problem.tool_jerks..].iter();
-        for (norm, line) in norms.iter_mut().zip(lines) {
-            let [x, y, z] = line;
-            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-            to.norm(norm, combine(line, [a, b, c]));
         }
     }
 }

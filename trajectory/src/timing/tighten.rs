@@ -163,7 +163,7 @@ fn scale(problem: &mut Problem, (k, tools): (usize, &Tools), limit: Limit, facto
         _ => {
             debug_assert_eq!(audit::order(limit), 1);
             for (slot, l) in values {
-                problem.cap[slot][l] *= factor * factor;
+                problem.value[slot / 2][slot % 2][1][l] *= factor * factor;
             }
         }
     }
