@@ -32,10 +32,11 @@ type Block<'a> = (&'a Basis, &'a [[Lane; 2]; 2], &'a mut [Row; 2]);
 /// Takes the next rows of a list.
 #[inline(always)]
 fn next<'a, T, U>(list: &mut (&'a [T], &'a mut [U]), count: usize) -> (&'a [T], &'a mut [U]) {
-    (
-        list.0.split_off(..count).unwrap_or_default(),
-        list.1.split_off_mut(..count).unwrap_or_default(),
-    )
+    let (lines, states) = std::mem::take(list);
+    let (line, lines) = lines.split_at(count.min(lines.len()));
+    let (state, states) = states.split_at_mut(count.min(states.len()));
+    *list = (lines, states);
+    (line, state)
 }
 
 impl<'a> Lines<'a> {
