@@ -232,6 +232,8 @@ struct JointBounds<const N: usize> {
     limits: [SVector<f64, N>; 3],
     /// One over each limit.
     narrow: [SVector<f64, N>; 3],
+    /// Whether all limits of an order are finite.
+    all: [bool; 3],
     wide: Wide,
 }
 
@@ -239,6 +241,7 @@ impl<const N: usize> JointBounds<N> {
     fn new(limits: [SVector<f64, N>; 3]) -> Self {
         Self {
             narrow: limits.map(|limit| limit.map(|x| 1.0 / x)),
+            all: limits.map(|limit| limit.iter().all(|x| x.is_finite())),
             limits,
             wide: Wide::detect(),
         }
@@ -256,8 +259,12 @@ impl<const N: usize> JointBounds<N> {
                     }
                 }
             }
-            let limits = self.limits[order].iter();
-            ratios.extend(limits.zip(&hull.most).filter(|(x, _)| x.is_finite()).map(|x| x.1));
+            if self.all[order] {
+                ratios.extend_from_slice(&hull.most);
+            } else {
+                let finite = (0..N).filter(|j| self.limits[order][*j].is_finite());
+                ratios.extend(finite.map(|j| hull.most[j]));
+            }
         }
     }
 

@@ -210,7 +210,11 @@ impl<S: Four> Share<S> {
         let a = [lane(&basis.first), lane(&basis.second), zero];
         let b = [zero - left, left, zero];
         let c = [left * inverse, zero - (left + right) * inverse, right * inverse];
-        let columns = [0, 1, 2].map(|i| [a[i], b[i], c[i]]);
+        let columns = [
+            [a[0], b[0], c[0]],
+            [a[1], b[1], c[1]],
+            [a[2], b[2], c[2]],
+        ];
         let rows = [
             self.times(columns[0]),
             self.times(columns[1]),
