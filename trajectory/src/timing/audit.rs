@@ -298,7 +298,7 @@ fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [
         at.acceleration[0],
         at.jerk[0],
     ];
-    let tool = path.at(warp[0].clamp(0.0, path.end())).tool;
+    let tool = path.tool_at(warp[0].clamp(0.0, path.end()));
     let local = ToolStation::new(&tool, warp);
     let norm = |v: Vector3<f64>| v.norm();
     let [l1, l2, l3] = local.linear.map(norm);

@@ -142,7 +142,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         let t = 0.5 * joint.duration;
         let u = position(law, t)[0];
         let end = self.bounded.path.end();
-        let wanted = self.bounded.path.at(u.clamp(0.0, end)).joint.q[0];
+        let wanted = self.bounded.path.joint_at(u.clamp(0.0, end)).q[0];
         (position(joint, t) - wanted).amax()
     }
 }

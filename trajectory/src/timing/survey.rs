@@ -217,8 +217,8 @@ fn corners<const N: usize>(path: &impl Path<N>, sizes: [f64; 4]) -> Result<(), T
     let [_, first, second, third] = sizes;
     let second = second + 4.0 * first / end;
     for &u in path.knots().iter().filter(|u| **u > 0.0 && **u < end) {
-        let before = path.at(u - ASIDE * end).joint;
-        let after = path.at(u + ASIDE * end).joint;
+        let before = path.joint_at(u - ASIDE * end);
+        let after = path.joint_at(u + ASIDE * end);
         let allowed = [
             1e-6 * first + 1e-8 * end * second,
             1e-4 * second + 1e-8 * end * third,
