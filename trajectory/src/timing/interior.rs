@@ -38,6 +38,11 @@ pub(super) struct Interior {
 impl Interior {
     /// Room for laws of `problem`; the law is 1 everywhere.
     pub(super) fn new(problem: &Problem) -> Self {
+        Self::with(problem, Wide::detect())
+    }
+
+    /// The same in the given build.
+    pub(super) fn with(problem: &Problem, wide: Wide) -> Self {
         let count = problem.unknowns();
         let state = State::new(problem);
         Self {
@@ -54,7 +59,7 @@ impl Interior {
                 steep: f64::INFINITY,
                 time: f64::INFINITY,
             },
-            wide: Wide::detect(),
+            wide,
         }
     }
 
@@ -150,9 +155,7 @@ impl Interior {
     fn turn(&mut self, turn: Turn, mu: f64) -> f64 {
         self.idle_multiplier = match turn {
             Turn::Balance(mu) => mu,
-            Turn::Advance(factor) => {
-                self.idle_multiplier + factor * (mu - self.idle_multiplier)
-            }
+            Turn::Advance(factor) => self.idle_multiplier + factor * (mu - self.idle_multiplier),
         };
         let state = &mut self.state;
         let total = self.wide.run(Multipliers { state, turn });

@@ -55,7 +55,10 @@ impl<'a> Lines<'a> {
         };
         let blocks = problem.basis.iter().zip(&problem.value);
         let blocks = blocks.zip(&mut state.cap);
-        (lines, blocks.map(|((basis, value), cap)| (basis, value, cap)))
+        (
+            lines,
+            blocks.map(|((basis, value), cap)| (basis, value, cap)),
+        )
     }
 
     /// The next slot of values.

@@ -125,7 +125,11 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
                 State::new(self.wide, self.stations.middle(k), spot)
             } else {
                 let grid = self.stations.grid;
-                State::new(self.wide, &grid.place(self.bounded.path, middle, 0.0).0, spot)
+                State::new(
+                    self.wide,
+                    &grid.place(self.bounded.path, middle, 0.0).0,
+                    spot,
+                )
             };
             self.halve(k, (w0, start), (middle, &state), depth - 1);
             self.halve(k, (middle, &state), (w1, end), depth - 1);

@@ -99,7 +99,8 @@ impl<const N: usize> Rows<'_, N> {
         ];
         let rate = self.rate_cap.map_or(0.0, |cap| station.warp[1] / cap);
         // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
-        problem.value[slot / 2][slot % 2][1][l] = (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
+        problem.value[slot / 2][slot % 2][1][l] =
+            (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
     }
 
     /// Sets the jerk rows of cell `k` at a slot.

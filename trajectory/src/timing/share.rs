@@ -87,7 +87,10 @@ impl<S: Four> Share<S> {
     #[inline(always)]
     fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[Row], mu: Wave<S>) {
         for (line, row) in lines.iter().zip(rows) {
-            let (p, q) = (Wave::load(self.simd, &line[0]), Wave::load(self.simd, &line[1]));
+            let (p, q) = (
+                Wave::load(self.simd, &line[0]),
+                Wave::load(self.simd, &line[1]),
+            );
             let (weight, force) = weigh(self.simd, row, mu);
             let (wp, wq) = (weight * p, weight * q);
             self.aa += wq * q;
@@ -201,20 +204,16 @@ impl<S: Four> Share<S> {
     #[inline(always)]
     fn entries(&self, basis: &Basis) -> [Lane; 9] {
         let lane = |x: &Lane| Wave::load(self.simd, x);
-        let (left, right, inverse) = (
-            lane(&basis.left),
-            lane(&basis.right),
-            lane(&basis.inverse),
-        );
+        let (left, right, inverse) = (lane(&basis.left), lane(&basis.right), lane(&basis.inverse));
         let zero = Wave::splat(self.simd, 0.0);
         let a = [lane(&basis.first), lane(&basis.second), zero];
         let b = [zero - left, left, zero];
-        let c = [left * inverse, zero - (left + right) * inverse, right * inverse];
-        let columns = [
-            [a[0], b[0], c[0]],
-            [a[1], b[1], c[1]],
-            [a[2], b[2], c[2]],
+        let c = [
+            left * inverse,
+            zero - (left + right) * inverse,
+            right * inverse,
         ];
+        let columns = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
         let rows = [
             self.times(columns[0]),
             self.times(columns[1]),
@@ -311,5 +310,74 @@ fn scatter(entries: &[Lane; 9], first: usize, matrix: &mut [[f64; 3]], step: &mu
         step[l] -= f0[l];
         step[l + 1] -= f1[l];
         step[l + 2] -= f2[l];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::law::swaying;
+    use super::super::state::{Evaluate, Multipliers, Turn};
+    use super::*;
+    use crate::wide::Wide;
+
+    /// Time and barrier of the law `x`: what the right side is the descent of.
+    fn barrier(problem: &Problem, x: &[f64], state: &mut State, mu: f64) -> f64 {
+        let worth = Wide::plain().run(Evaluate { problem, x, state });
+        let mut logs = 0.0;
+        for row in state.acceleration.iter().chain(&state.jerk) {
+            logs += row.g.iter().map(|g| (1.0 - g * g).ln()).sum::<f64>();
+        }
+        for row in state.cap.iter().flatten() {
+            logs += row.g.iter().map(|g| (1.0 - g).ln()).sum::<f64>();
+        }
+        for norm in state.norm_acceleration.iter().chain(&state.norm_jerk) {
+            for l in 0..LANE {
+                let square: f64 = norm.g.iter().map(|lane| lane[l] * lane[l]).sum();
+                logs += (1.0 - square).ln();
+            }
+        }
+        worth.time - mu * logs
+    }
+
+    #[test]
+    fn the_right_side_is_the_descent_of_time_and_barrier() {
+        let problem = swaying(11);
+        let (mut state, mu) = (State::new(&problem), 0.01);
+        let mut x: Vec<f64> = (0..problem.unknowns())
+            .map(|i| 0.04 + 0.004 * (i as f64).sin())
+            .collect();
+        barrier(&problem, &x, &mut state, mu);
+        let turn = Turn::Balance(mu);
+        let multipliers = &mut state;
+        Wide::plain().run(Multipliers {
+            state: multipliers,
+            turn,
+        });
+        let mut matrix = vec![[0.0; 3]; x.len()];
+        let mut step = vec![0.0; x.len()];
+        Wide::detect().run(Assemble {
+            problem: &problem,
+            x: &x,
+            state: &mut state,
+            mu,
+            matrix: &mut matrix,
+            step: &mut step,
+        });
+        let most = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        for i in 0..problem.cells() + 2 {
+            let (middle, h) = (x[i], 1e-6);
+            let [more, less] = [h, -h].map(|h| {
+                x[i] = middle + h;
+                barrier(&problem, &x, &mut state, mu)
+            });
+            x[i] = middle;
+            let slope = (more - less) / (2.0 * h);
+            assert!(
+                (slope + step[i]).abs() < 1e-6 * most,
+                "{i}: {slope} {}",
+                step[i]
+            );
+            assert!(matrix[i][0] > 0.0);
+        }
     }
 }

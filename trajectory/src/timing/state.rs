@@ -244,7 +244,11 @@ impl Op for Multipliers<'_> {
             let g = Wave::load(simd, &row.g);
             total += turn.take(one - g, &mut row.multiplier, &row.change);
         }
-        for row in state.norm_acceleration.iter_mut().chain(&mut state.norm_jerk) {
+        for row in state
+            .norm_acceleration
+            .iter_mut()
+            .chain(&mut state.norm_jerk)
+        {
             let g = vector(simd, &row.g);
             total += turn.take(one - dot(g, g), &mut row.multiplier, &row.change);
         }

@@ -142,12 +142,7 @@ impl<'a, const N: usize> Stations<'a, N> {
 
 impl Grid {
     /// The path at `w`; its third derivatives seen from the side: -1 before, 0 at, 1 after.
-    pub(super) fn place<const N: usize>(
-        &self,
-        path: &impl Path<N>,
-        w: f64,
-        side: f64,
-    ) -> Place<N> {
+    pub(super) fn place<const N: usize>(&self, path: &impl Path<N>, w: f64, side: f64) -> Place<N> {
         let warp = self.warp.at(w);
         let end = path.end();
         let mut point: PathPoint<N> = path.at(warp[0].clamp(0.0, end));
