@@ -65,6 +65,8 @@ pub(crate) fn passes(
         let near = (deviation + rest).min(deviation.max(options.tolerance));
         let wanted = [near, options.angular_tolerance()];
         (at, time) = turned(spans, since, approach, pose, wanted);
+        // Not before the pass before by the last digit.
+        time = time.max(since.1);
         let (deviation, angle) = apart(spans, &poses[0], (at, time), pose);
         result.push(Pass {
             index: i + 1,
