@@ -99,7 +99,7 @@ fn apart(
 }
 
 /// Samples of one span in the search of [`turned`].
-const STEPS: u32 = 8;
+const STEPS: u32 = 32;
 
 /// Where the controlled point (nearly) rests at its closest approach while the
 /// tool turns, the moment of the pass is the first one in that rest at which the
