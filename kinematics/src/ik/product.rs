@@ -1,7 +1,7 @@
 //! The product of the turns of an arm's joints, as closed forms take it.
 
-use super::six::Line;
 use crate::arith::{self, Arith};
+use crate::links::Line;
 use crate::wide::F4;
 use nalgebra::Isometry3;
 

@@ -11,20 +11,14 @@
 //! A. J. Elias and J. T. Wen, "IK-Geo: unified robot inverse kinematics using
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025, sections 4.1 and 4.3.
 
-use super::frames::{Frames, foot};
+use super::frames::Frames;
 use super::lanes::Held;
 use super::product::{Columns, Product, inverse};
 use super::solving::Solving;
 use crate::arith::Arith;
+use crate::links::{Line, foot};
 use crate::wide::{B4, F4};
 use nalgebra::Vector3;
-
-/// An axis at q = 0: its direction and a point on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line {
-    pub(crate) h: [f64; 3],
-    pub(crate) p: [f64; 3],
-}
 
 /// How the first three joints place the wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,18 +76,6 @@ pub(crate) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 #[inline(always)]
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// A unit vector at right angles to `h`.
-#[inline(always)]
-pub(crate) fn across(h: [f64; 3]) -> [f64; 3] {
-    let v = if h[0].abs() < 0.7 {
-        [0.0, h[2], -h[1]]
-    } else {
-        [-h[2], 0.0, h[0]]
-    };
-    let length = dot(v, v).sqrt();
-    [v[0] / length, v[1] / length, v[2] / length]
 }
 
 impl Six {
