@@ -5,6 +5,9 @@
 //! least of all passes for that input, without the cost of reading the clock. Ruckig's crate copies
 //! the input into C++ vectors on each call; what that costs is measured with an input that is
 //! refused at once and taken off Ruckig's times.
+//!
+//! `cargo bench -p benches --no-default-features --bench otg [-- --compare COUNT]`; the latter
+//! compares durations alone, over as many inputs of each of the five cases.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -16,7 +19,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use rsruckig::prelude as rust;
-use trajectory::otg::{Ends, Otg, Problem, Problems};
+use trajectory::otg::{Audit, Ends, Otg, Problem, Problems};
 
 const COUNT: usize = 20_000;
 const BLOCK: usize = 200;
@@ -24,6 +27,9 @@ const PASSES: usize = 9;
 
 fn main() {
     let quick = std::env::args().any(|argument| argument == "--test");
+    if let Some(count) = compared() {
+        return compare_all(count);
+    }
     let count = if quick { BLOCK } else { COUNT };
     let clock = clock_cost();
     println!("{count} inputs, least of {PASSES} passes, us; clock {clock:.3} us taken off");
@@ -39,6 +45,83 @@ fn main() {
     case::<7>("rest-7dof", Ends::Resting, (count, clock), &mut ratios);
     for (name, ratio) in ratios {
         println!("ratio {name} {ratio:.4}");
+    }
+}
+
+/// Inputs of each case whose durations alone are to be compared: `--compare COUNT`.
+fn compared() -> Option<usize> {
+    let mut arguments = std::env::args().skip_while(|argument| argument != "--compare");
+    arguments.nth(1)?.parse().ok()
+}
+
+/// Compares durations with Ruckig's over `count` inputs of each case, timing nothing.
+fn compare_all(count: usize) {
+    println!("durations beside Ruckig's, {count} inputs a case");
+    let show = |name: &str, durations: Durations| println!("{name:<16}{durations}");
+    show("3dof", Durations::of::<3>((1, Ends::Moving), count));
+    show("6dof", Durations::of::<6>((2, Ends::Moving), count));
+    show("7dof", Durations::of::<7>((3, Ends::Moving), count));
+    show("stop-7dof", Durations::of::<7>((4, Ends::Stopping), count));
+    show("rest-7dof", Durations::of::<7>((5, Ends::Resting), count));
+}
+
+/// How our durations compare with Ruckig's.
+#[derive(Default)]
+struct Durations {
+    equal: usize,
+    shorter: usize,
+    /// Shorter ones that break a limit or miss the target by more than 1e-12.
+    unsound: usize,
+    longer: usize,
+    refused: usize,
+    /// The greatest relative difference of a shorter one.
+    gain: f64,
+}
+
+impl Durations {
+    /// Compares the first `count` inputs of a random source.
+    fn of<const N: usize>((seed, ends): (u64, Ends), count: usize) -> Self {
+        let mut source = Problems::new(seed, ends);
+        let mut otg = ruckig::Ruckig::new_direct(N, 0.005);
+        let mut trajectory = ruckig::Trajectory::new_direct(N);
+        let mut result = Self::default();
+        for _ in 0..count {
+            let problem: Problem<N> = source.draw();
+            let Problem {
+                start,
+                target,
+                limits,
+                options,
+            } = &problem;
+            let motion = Otg::plan(start, target, limits, options).unwrap();
+            let ours = motion.duration();
+            let answer = otg.calculate(&mut cpp_input(&problem), &mut trajectory);
+            let theirs = trajectory.get_duration();
+            if answer != ruckig::Result::Working {
+                result.refused += 1;
+            } else if ours > theirs * (1.0 + 1e-9) {
+                result.longer += 1;
+            } else if ours < theirs * (1.0 - 1e-9) {
+                result.shorter += 1;
+                result.gain = result.gain.max(1.0 - ours / theirs);
+                let worst = Audit::of(&motion, start, target, limits).worst();
+                result.unsound += usize::from(worst.is_nan() || worst > 1e-12);
+            } else {
+                result.equal += 1;
+            }
+        }
+        result
+    }
+}
+
+impl std::fmt::Display for Durations {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} as long as Ruckig's, {} shorter (by {:.2e} at most, {} of them unsound), \
+             {} longer, {} refused by it",
+            self.equal, self.shorter, self.gain, self.unsound, self.longer, self.refused
+        )
     }
 }
 
@@ -115,21 +198,8 @@ fn case<const N: usize>(
             }
         }
     }
-    let longer = (0..count)
-        .filter(|&i| {
-            let Problem {
-                start,
-                target,
-                limits,
-                options,
-            } = &problems[i];
-            let motion = Otg::plan(start, target, limits, options).unwrap();
-            let refused = cpp_otg.calculate(&mut cpp_inputs[i], &mut cpp_trajectory);
-            let peer = cpp_trajectory.get_duration();
-            refused == ruckig::Result::Working && motion.duration() > peer * (1.0 + 1e-9)
-        })
-        .count();
-    println!("{name:<16}{longer} of {count} moves last longer than Ruckig's");
+    let durations = Durations::of::<N>((42, ends), count);
+    println!("{name:<16}{durations}");
     let copy = copy_cost(&problems[0]);
     let ours = ours.summary(clock);
     let cpp = cpp.summary(copy);

@@ -6,12 +6,19 @@ use anyhow::{Context, anyhow};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
+/// A row of numbers and the line of the file that it is from.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) line: u64,
+    pub(crate) numbers: Vec<f64>,
+}
+
 /// Rows of numbers from a CSV file, `-` for standard input; a first row that is not numbers is a
-/// header and left out. Every row has `columns` finite numbers.
+/// header and left out. Every row has one finite number for each of the `columns`.
 ///
 /// # Errors
-/// [`Exit::Unreadable`], with the line and what was expected.
-pub(crate) fn read(path: &str, columns: usize) -> Result<Vec<Vec<f64>>, Failure> {
+/// [`Exit::Unreadable`], with the line, the column, what was expected and what came.
+pub(crate) fn read(path: &str, columns: &[&str]) -> Result<Vec<Row>, Failure> {
     let source: Box<dyn Read> = if path == "-" {
         Box::new(io::stdin())
     } else {
@@ -23,7 +30,7 @@ pub(crate) fn read(path: &str, columns: usize) -> Result<Vec<Vec<f64>>, Failure>
         .map_err(|cause| Failure::new(Exit::Unreadable, cause))
 }
 
-fn parse(source: impl Read, columns: usize) -> anyhow::Result<Vec<Vec<f64>>> {
+fn parse(source: impl Read, columns: &[&str]) -> anyhow::Result<Vec<Row>> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -33,24 +40,30 @@ fn parse(source: impl Read, columns: usize) -> anyhow::Result<Vec<Vec<f64>>> {
     let mut rows = Vec::new();
     for (index, record) in reader.records().enumerate() {
         let record = record?;
+        if index == 0 && record.iter().all(|cell| cell.parse::<f64>().is_err()) {
+            continue;
+        }
         let line = record
             .position()
             .map_or(index as u64 + 1, csv::Position::line);
-        let numbers: Result<Vec<f64>, _> = record.iter().map(str::parse::<f64>).collect();
-        match numbers {
-            Err(_) if index == 0 && record.iter().all(|cell| cell.parse::<f64>().is_err()) => {}
-            Err(error) => return Err(anyhow!("line {line}: {error}")),
-            Ok(row) if row.len() != columns => {
-                return Err(anyhow!(
-                    "line {line}: expected {columns} numbers, got {}",
-                    row.len()
-                ));
-            }
-            Ok(row) => match row.iter().find(|value| !value.is_finite()) {
-                Some(value) => return Err(anyhow!("line {line}: {value} is not a finite number")),
-                None => rows.push(row),
-            },
+        if record.len() != columns.len() {
+            return Err(anyhow!(
+                "line {line}: expected {} numbers, {}, got {} cells",
+                columns.len(),
+                columns.join(","),
+                record.len()
+            ));
         }
+        let cells = record.iter().zip(columns).enumerate();
+        let numbers = cells.map(|(index, (cell, name))| match cell.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(anyhow!(
+                "line {line}, column {} ({name}): expected a finite number, got {cell:?}",
+                index + 1
+            )),
+        });
+        let numbers = numbers.collect::<anyhow::Result<Vec<_>>>()?;
+        rows.push(Row { line, numbers });
     }
     Ok(rows)
 }
@@ -60,15 +73,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_header_is_left_out_and_faults_have_a_line() {
+    fn a_header_is_left_out_and_faults_have_a_place() {
+        let rows = parse(&b"q1,q2\n1, 2\n3,4\n"[..], &["q1", "q2"]).unwrap();
+        let row = |line, numbers: [f64; 2]| Row {
+            line,
+            numbers: numbers.to_vec(),
+        };
+        assert_eq!(rows, [row(2, [1.0, 2.0]), row(3, [3.0, 4.0])]);
+        let fault = |text: &[u8]| parse(text, &["q1", "q2"]).unwrap_err().to_string();
         assert_eq!(
-            parse(&b"q1,q2\n1, 2\n3,4\n"[..], 2).unwrap(),
-            [[1.0, 2.0], [3.0, 4.0]]
+            fault(b"1,2\n3\n"),
+            "line 2: expected 2 numbers, q1,q2, got 1 cells"
         );
-        let fault = |text: &[u8]| parse(text, 2).unwrap_err().to_string();
-        assert_eq!(fault(b"1,2\n3\n"), "line 2: expected 2 numbers, got 1");
-        assert_eq!(fault(b"1,2\n3,NaN\n"), "line 2: NaN is not a finite number");
-        assert!(fault(b"1,2\nx,4\n").starts_with("line 2: "));
-        assert!(fault(b"1,x\n3,4\n").starts_with("line 1: "));
+        assert_eq!(
+            fault(b"1,2\n3,NaN\n"),
+            "line 2, column 2 (q2): expected a finite number, got \"NaN\""
+        );
+        assert_eq!(
+            fault(b"1,2\nx,4\n"),
+            "line 2, column 1 (q1): expected a finite number, got \"x\""
+        );
+        assert!(fault(b"1,x\n3,4\n").starts_with("line 1, column 2"));
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use crate::{JointPoint, Path, PathPoint, ToolCurve};
+use crate::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 
 /// A joint path through given points with their three derivatives, for example those that inverse
 /// kinematics found along a [`ToolCurve`]: between two points the polynomial of degree seven that
@@ -67,6 +67,14 @@ impl<const N: usize, C: ToolCurve> Path<N> for HermitePath<N, C> {
             joint: self.joints(u),
             tool: self.tool.at(u),
         }
+    }
+
+    fn joint_at(&self, u: f64) -> JointPoint<N> {
+        self.joints(u)
+    }
+
+    fn tool_at(&self, u: f64) -> ToolPoint {
+        self.tool.at(u)
     }
 }
 

@@ -41,16 +41,20 @@ impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> Path<N> for JointLine<N
     }
 
     fn at(&self, u: f64) -> PathPoint<N> {
+        let joint = self.joint_at(u);
+        PathPoint {
+            joint,
+            tool: (self.tool)(&joint),
+        }
+    }
+
+    fn joint_at(&self, u: f64) -> JointPoint<N> {
         let u = u.clamp(0.0, 1.0);
         let step = self.end - self.start;
         let zero = SVector::zeros();
         // The weighted mean meets both ends exactly.
-        let joint = JointPoint {
+        JointPoint {
             q: [self.start * (1.0 - u) + self.end * u, step, zero, zero],
-        };
-        PathPoint {
-            joint,
-            tool: (self.tool)(&joint),
         }
     }
 }

@@ -87,6 +87,11 @@ impl ToolLimits {
         angular_jerk: f64::INFINITY,
     };
 
+    /// Whether there is any limit.
+    pub(crate) fn limited(&self) -> bool {
+        *self != Self::UNLIMITED
+    }
+
     /// Checks that every limit is positive.
     ///
     /// # Errors

@@ -73,4 +73,14 @@ pub trait Path<const N: usize> {
     fn knots(&self) -> &[f64];
     /// The path at `u`; outside of its range as at the nearer end.
     fn at(&self, u: f64) -> PathPoint<N>;
+
+    /// The joints of [`Path::at`]; for paths that have them without the tool.
+    fn joint_at(&self, u: f64) -> JointPoint<N> {
+        self.at(u).joint
+    }
+
+    /// The tool of [`Path::at`]; for paths that have it without the joints.
+    fn tool_at(&self, u: f64) -> ToolPoint {
+        self.at(u).tool
+    }
 }

@@ -65,18 +65,19 @@ impl<const N: usize> Trajectory<N> {
     /// The same motion, `factor` times as long: velocities shrink by `factor`, accelerations by
     /// its square, jerks by its cube. The geometry stays.
     pub fn stretched(&self, factor: f64) -> Self {
-        let slow = |piece: &Piece<N>| {
+        self.clone().into_stretched(factor)
+    }
+
+    /// As [`Trajectory::stretched`], in the memory of this motion.
+    pub(crate) fn into_stretched(mut self, factor: f64) -> Self {
+        for piece in &mut self.pieces {
             let mut power = 1.0;
-            let coefficients = piece.coefficients.map(|coefficient| {
-                let scaled = coefficient * power;
+            for coefficient in &mut piece.coefficients {
+                *coefficient *= power;
                 power /= factor;
-                scaled
-            });
-            Piece {
-                duration: piece.duration * factor,
-                coefficients,
             }
-        };
-        Self::new(self.pieces.iter().map(slow).collect())
+            piece.duration *= factor;
+        }
+        Self::new(self.pieces)
     }
 }

@@ -21,6 +21,12 @@ pub(crate) trait Four: Copy {
     fn sub(self, x: Self::F, y: Self::F) -> Self::F;
     /// `x y`, number by number.
     fn mul(self, x: Self::F, y: Self::F) -> Self::F;
+    /// `x / y`, number by number.
+    fn div(self, x: Self::F, y: Self::F) -> Self::F;
+    /// The square root of each number.
+    fn sqrt(self, x: Self::F) -> Self::F;
+    /// The larger of each pair; `y` where one of them is no number.
+    fn max(self, x: Self::F, y: Self::F) -> Self::F;
     /// The sum of the four.
     fn sum(self, x: Self::F) -> f64;
 }
@@ -101,6 +107,19 @@ impl Four for Plain {
         [x[0] * y[0], x[1] * y[1], x[2] * y[2], x[3] * y[3]]
     }
     #[inline(always)]
+    fn div(self, x: [f64; 4], y: [f64; 4]) -> [f64; 4] {
+        [x[0] / y[0], x[1] / y[1], x[2] / y[2], x[3] / y[3]]
+    }
+    #[inline(always)]
+    fn sqrt(self, x: [f64; 4]) -> [f64; 4] {
+        x.map(f64::sqrt)
+    }
+    #[inline(always)]
+    fn max(self, x: [f64; 4], y: [f64; 4]) -> [f64; 4] {
+        let larger = |i: usize| if x[i] > y[i] { x[i] } else { y[i] };
+        [larger(0), larger(1), larger(2), larger(3)]
+    }
+    #[inline(always)]
     fn sum(self, x: [f64; 4]) -> f64 {
         (x[0] + x[1]) + (x[2] + x[3])
     }
@@ -133,6 +152,18 @@ impl Four for pulp::x86::V3 {
     #[inline(always)]
     fn mul(self, x: pulp::f64x4, y: pulp::f64x4) -> pulp::f64x4 {
         self.mul_f64x4(x, y)
+    }
+    #[inline(always)]
+    fn div(self, x: pulp::f64x4, y: pulp::f64x4) -> pulp::f64x4 {
+        self.div_f64x4(x, y)
+    }
+    #[inline(always)]
+    fn sqrt(self, x: pulp::f64x4) -> pulp::f64x4 {
+        self.sqrt_f64x4(x)
+    }
+    #[inline(always)]
+    fn max(self, x: pulp::f64x4, y: pulp::f64x4) -> pulp::f64x4 {
+        self.max_f64x4(x, y)
     }
     #[inline(always)]
     fn sum(self, x: pulp::f64x4) -> f64 {

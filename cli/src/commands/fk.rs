@@ -7,7 +7,7 @@ use nalgebra::SVector;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::robot::{RobotOption, with_joints};
-use crate::table;
+use crate::table::{self, Row};
 
 /// Forward kinematics: joint positions to poses of the flange in the robot's base
 ///
@@ -25,12 +25,14 @@ impl Fk {
     /// Reads rows, prints poses.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
-        let rows = table::read(&self.joints, robot.dof())?;
+        let names: Vec<_> = (1..=robot.dof()).map(|joint| format!("q{joint}")).collect();
+        let names: Vec<_> = names.iter().map(String::as_str).collect();
+        let rows = table::read(&self.joints, &names)?;
         with_joints!(robot.dof(), poses(&robot, &rows))
     }
 }
 
-fn poses<const N: usize>(robot: &Robot, rows: &[Vec<f64>]) -> Result<Exit, Failure> {
+fn poses<const N: usize>(robot: &Robot, rows: &[Row]) -> Result<Exit, Failure> {
     let chain = robot
         .model
         .chain::<N>()
@@ -38,7 +40,7 @@ fn poses<const N: usize>(robot: &Robot, rows: &[Vec<f64>]) -> Result<Exit, Failu
     let mut out = BufWriter::new(io::stdout().lock());
     writeln!(out, "x_m,y_m,z_m,qw,qx,qy,qz")?;
     for row in rows {
-        let pose = chain.forward(&SVector::from_column_slice(row));
+        let pose = chain.forward(&SVector::from_column_slice(&row.numbers));
         let (p, r) = (pose.translation, pose.rotation);
         writeln!(
             out,

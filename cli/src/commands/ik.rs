@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
 use std::time::Instant;
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::robot::Robot;
 use kinematics::{Obstacle, Report, Solution, Solver};
@@ -12,7 +12,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
 use crate::robot::{RobotOption, with_joints};
-use crate::table;
+use crate::table::{self, Row};
 
 /// Inverse kinematics: poses of the flange in the robot's base to joint positions
 ///
@@ -37,11 +37,10 @@ impl Ik {
     /// Reads poses, prints solutions, sums up on standard error.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
-        let rows = table::read(&self.poses, 7)?;
+        let rows = table::read(&self.poses, &["x", "y", "z", "qw", "qx", "qy", "qz"])?;
         let poses = rows
             .iter()
-            .enumerate()
-            .map(|(row, cells)| pose(row, cells))
+            .map(|row| pose(row).with_context(|| format!("cannot read {}", self.poses)))
             .collect::<Result<Vec<_>, _>>()
             .map_err(|cause| Failure::new(Exit::Unreadable, cause))?;
         with_joints!(robot.dof(), solve(self, &robot, &poses))
@@ -49,14 +48,16 @@ impl Ik {
 }
 
 /// A row as a pose; the quaternion may be a little off unit length, as printed numbers are.
-fn pose(row: usize, cells: &[f64]) -> anyhow::Result<Isometry3<f64>> {
-    let [x, y, z, w, i, j, k] = cells else {
-        return Err(anyhow!("row {row}: 7 numbers needed"));
+fn pose(row: &Row) -> anyhow::Result<Isometry3<f64>> {
+    let line = row.line;
+    let [x, y, z, w, i, j, k] = row.numbers.as_slice() else {
+        return Err(anyhow!("line {line}: expected 7 numbers"));
     };
     let turn = Quaternion::new(*w, *i, *j, *k);
     if (turn.norm() - 1.0).abs() > 1e-3 {
         return Err(anyhow!(
-            "row {row}: quaternion has length {}, not 1",
+            "line {line}, columns 4 to 7: expected a quaternion qw,qx,qy,qz of length 1, got \
+             length {}",
             turn.norm()
         ));
     }

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::certificate::{Certificate, certify};
 use super::exact_stop;
 use super::options::SmoothOptions;
-use super::pass::{Pass, RESOLUTION};
+use super::pass::{Pass, RESOLUTION, settled};
 use super::plan::Method;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
@@ -25,6 +25,10 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// Spread of a start in motion that was too fast.
 const SPREAD: f64 = 1.2;
+
+/// Share of the speed limit used by splines that others follow: the hull of a start
+/// in motion on a bend is a little faster than the motion.
+const JOIN_SPEED: f64 = 0.998;
 
 /// A certified motion through a window.
 #[derive(Clone, Debug)]
@@ -60,26 +64,46 @@ impl Motion {
     }
 }
 
+/// What comes after a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Then {
+    /// Nothing: the last pose is the goal.
+    Stop,
+    /// More motion, which must not change how the poses before were passed.
+    More,
+}
+
 /// Fastest certified motion from rest in the first pose to rest in the last.
-pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
-    let stop = Motion::new(exact_stop::plan(poses, &options.limits), Method::ExactStop);
+pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
+    let stop = corners(poses, options);
     if poses.len() < 3 {
         return stop;
     }
-    if let Some(spans) = spline(poses, options, None, stop.duration())
+    if let Some(spans) = spline(poses, options, (None, then), stop.duration())
         && spans.last().map_or(0.0, Span::end) <= stop.duration()
     {
         return Motion::new(spans, Method::Spline);
     }
     // A stop in the middle splits the window into two easier ones.
     let middle = poses.len() / 2;
-    let mut halves = from_rest(&poses[..=middle], options);
-    halves.append(from_rest(&poses[middle..], options));
+    let mut halves = from_rest(&poses[..=middle], options, Then::More);
+    halves.append(from_rest(&poses[middle..], options, then));
     if halves.duration() < stop.duration() {
         halves
     } else {
         stop
     }
+}
+
+/// Straight legs with a stop at each corner. Poses in line have none, unless the
+/// tolerance asks for a stop at every pose.
+pub(crate) fn corners(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
+    let spans = if options.tolerance > RESOLUTION {
+        exact_stop::plan(&exact_stop::corners(poses), &options.limits)
+    } else {
+        exact_stop::plan(poses, &options.limits)
+    };
+    Motion::new(spans, Method::ExactStop)
 }
 
 /// Certified spline from a state in motion to rest in the last pose, if one is
@@ -88,10 +112,10 @@ pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Mo
 pub(crate) fn from_motion(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
-    moving: &Moving,
+    (moving, then): (&Moving, Then),
     most: f64,
 ) -> Option<Motion> {
-    let spans = spline(poses, options, Some(moving), most)?;
+    let spans = spline(poses, options, (Some(moving), then), most)?;
     (spans.last()?.end() <= most).then(|| Motion::new(spans, Method::Spline))
 }
 
@@ -100,13 +124,17 @@ pub(crate) fn from_motion(
 fn spline(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
-    moving: Option<&Moving>,
+    (moving, then): (Option<&Moving>, Then),
     most: f64,
 ) -> Option<Vec<Span>> {
     if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
         return None;
     }
     let mut inner = options.clone();
+    if then == Then::More {
+        inner.limits.speed *= JOIN_SPEED;
+        inner.limits.angular_speed *= JOIN_SPEED;
+    }
     let full = Effort { most, ..EFFORT };
     let (mut coupled, mut effort) = (None, full);
     for attempt in 0..5_usize {
@@ -135,7 +163,8 @@ fn spline(
             stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
             (certificate, passes) = certify(&spans, poses, options);
         }
-        if certificate.holds() {
+        let settled = then == Then::Stop || settled(&spans, poses, &passes, options);
+        if certificate.holds() && settled {
             return Some(spans);
         }
         // Narrower bounds make it slower still.
@@ -145,6 +174,9 @@ fn spline(
             return None;
         }
         narrow(&mut inner, &certificate, &passes, request.coupled);
+        if certificate.in_order && !settled {
+            inner.tolerance *= 0.5;
+        }
         coupled = Some(request.coupled || ((attempt == 1 || over > 1.3) && request.moves()[1]));
     }
     None

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::pass::RESOLUTION;
 use super::ramp::{self, Caps, Gate};
 use super::span::{Span, Turn};
 use crate::ToolLimits;
@@ -36,6 +37,20 @@ impl Leg {
             acceleration: cap(limits.acceleration, limits.angular_acceleration),
             jerk: cap(limits.jerk, limits.angular_jerk),
         }
+    }
+
+    /// The progress at which a pose is passed, if the leg passes it.
+    fn share(&self, pose: &Isometry3<f64>) -> Option<f64> {
+        let other = Self::new(&self.from, pose);
+        let length = self.way.norm();
+        let share = if length > RESOLUTION {
+            other.way.dot(&self.way) / (length * length)
+        } else {
+            other.turn.dot(&self.turn) / self.turn.norm_squared()
+        };
+        let missed = (self.way * share - other.way).norm();
+        let askew = (self.turn * share - other.turn).norm();
+        (missed <= RESOLUTION && askew <= 1e3 * RESOLUTION).then_some(share)
     }
 
     /// Spans of a motion along the leg with pieces (duration s, jerk of the
@@ -96,4 +111,32 @@ pub(crate) fn plan(poses: &[Isometry3<f64>], limits: &ToolLimits) -> Vec<Span> {
         from = to;
     }
     spans
+}
+
+/// The poses without those that the straight leg between their neighbours passes anyway,
+/// in place and in orientation.
+pub(crate) fn corners(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+    let mut kept: Vec<Isometry3<f64>> = Vec::with_capacity(poses.len());
+    // Where the leg that is growing begins among the poses.
+    let mut begin = 0;
+    for (i, pose) in poses.iter().enumerate() {
+        let inner = &poses[(begin + 1).min(i)..i];
+        let grows = kept.len() > 1 && {
+            let leg = Leg::new(&poses[begin], pose);
+            let mut last = 0.0;
+            inner.iter().all(|pose| {
+                let share = leg.share(pose);
+                let ahead = share.is_some_and(|share| share > last && share < 1.0);
+                last = share.unwrap_or(last);
+                ahead
+            })
+        };
+        if grows {
+            kept.pop();
+        } else {
+            begin = i.saturating_sub(1);
+        }
+        kept.push(*pose);
+    }
+    kept
 }

@@ -13,6 +13,7 @@
 //! changes no geometry.
 
 mod active;
+mod approach;
 mod certificate;
 mod choose;
 mod exact_stop;

@@ -1,9 +1,9 @@
 //! When and how close a motion passes each intermediate pose.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
+use super::approach::{approach, closest};
 use super::options::SmoothOptions;
-use super::poly::{self, halve};
 use super::span::Span;
 
 /// Lengths (m) and angles (rad) below this are not told apart from zero.
@@ -54,21 +54,20 @@ pub(crate) fn passes(
     let (mut at, mut time) = (0, 0.0);
     for (i, pose) in inner.iter().enumerate() {
         let since = (at, time);
-        (at, time) = closest(spans, at, time, pose, options);
-        let (mut deviation, mut angle) = apart(spans, &poses[0], (at, time), pose);
-        if angle > options.angular_tolerance() {
-            let near = deviation + (0.02 * options.tolerance).max(1e3 * RESOLUTION);
-            if let Some(better) = turned(
-                spans,
-                since,
-                (at, time),
-                pose,
-                [near, options.angular_tolerance()],
-            ) {
-                (at, time) = better;
-                (deviation, angle) = apart(spans, &poses[0], better, pose);
-            }
-        }
+        let approach = closest(spans, since, pose, options.tolerance);
+        let (deviation, angle) = apart(spans, &poses[0], approach, pose);
+        // Where the tool turns out of its tolerance meanwhile, more counts as a rest.
+        let rest = if angle > options.angular_tolerance() {
+            (0.02 * options.tolerance).max(1e3 * RESOLUTION)
+        } else {
+            1e3 * RESOLUTION
+        };
+        let near = (deviation + rest).min(deviation.max(options.tolerance));
+        let wanted = [near, options.angular_tolerance()];
+        (at, time) = turned(spans, since, approach, pose, wanted);
+        // Not before the pass before by the last digit.
+        time = time.max(since.1);
+        let (deviation, angle) = apart(spans, &poses[0], (at, time), pose);
         result.push(Pass {
             index: i + 1,
             deviation,
@@ -103,113 +102,81 @@ fn apart(
 const STEPS: u32 = 8;
 
 /// Where the controlled point (nearly) rests at its closest approach while the
-/// tool turns, the moment of the pass is the first one in that stretch at which
-/// the angle is smallest: first (span, time) in the stretch from `since` to
-/// `until` whose distance is below `near[0]` and whose angle is a local minimum
-/// below `near[1]`.
+/// tool turns, the moment of the pass is the first one in that rest at which the
+/// angle is smallest: the first (span, time) whose angle is a local minimum below
+/// `near[1]`, in the stretch around `approach` that begins not before `since` and
+/// keeps the distance below `near[0]`.
 fn turned(
     spans: &[Span],
     since: (usize, f64),
-    until: (usize, f64),
+    approach: (usize, f64),
     pose: &Isometry3<f64>,
     near: [f64; 2],
-) -> Option<(usize, f64)> {
-    let mut best: Option<((usize, f64), f64)> = None;
-    for (at, span) in spans.iter().enumerate().take(until.0 + 1).skip(since.0) {
-        let from = (since.1 - span.start).clamp(0.0, span.duration);
-        let to = (until.1 - span.start).clamp(0.0, span.duration);
-        for step in 0..=STEPS {
-            let local = from + (to - from) * f64::from(step) / f64::from(STEPS);
-            let moment = (at, span.start + local);
-            let (distance, angle) = apart(spans, pose, moment, pose);
-            if distance > near[0] {
-                continue;
-            }
-            match best {
-                Some((found, least)) if angle > least + 1e-9 && least <= near[1] => {
-                    return Some(found);
-                }
-                Some((_, least)) if angle >= least => {}
-                _ => best = Some((moment, angle)),
-            }
-        }
-    }
-    best.map(|(found, _)| found)
-}
-
-/// First local closest approach to `pose` from `time` on, in span `at` or
-/// later: (span, time).
-fn closest(
-    spans: &[Span],
-    at: usize,
-    time: f64,
-    pose: &Isometry3<f64>,
-    options: &SmoothOptions,
 ) -> (usize, f64) {
-    let goal = pose.translation.vector;
-    let rounding = 1e-14 * (1.0 + goal.norm());
-    let mut search = Search {
-        falling: false,
-        near: options.tolerance + RESOLUTION,
-        noise: 0.0,
+    if spans.is_empty() {
+        return approach;
+    }
+    let seen = |moment: (usize, f64)| {
+        let (distance, angle) = apart(spans, pose, moment, pose);
+        (distance <= near[0]).then_some((moment, angle))
     };
-    for (index, span) in spans.iter().enumerate().skip(at) {
-        let from = (time - span.start).clamp(0.0, span.duration);
-        if from >= span.duration && index + 1 < spans.len() {
-            continue;
+    // Moments of a span, from the first to the last one wanted.
+    let moments = |at: usize| {
+        let (span, share) = (&spans[at], 1.0 / f64::from(STEPS));
+        let from = if at == since.0 { since.1 } else { span.start };
+        (0..=STEPS).map(move |step| (at, from + (span.end() - from) * f64::from(step) * share))
+    };
+    let back = (since.0..=approach.0)
+        .rev()
+        .flat_map(|at| moments(at).rev());
+    let mut rest: Vec<_> = back
+        .filter(|moment| moment.1 < approach.1)
+        .map_while(seen)
+        .collect();
+    rest.reverse();
+    let ahead = (approach.0..spans.len()).flat_map(moments);
+    rest.extend(ahead.filter(|moment| moment.1 > approach.1).map_while(seen));
+    let here = seen(approach).map_or(0.0, |(_, angle)| angle);
+    let mut best = (approach, here - 1e-9);
+    for (moment, angle) in rest {
+        if angle > best.1 + 1e-9 && best.0 != approach && best.1 <= near[1] {
+            break;
         }
-        let mut position = span.position_control(from, span.duration);
-        for c in &mut position {
-            *c -= goal;
-        }
-        let velocity = span.velocity_control(from, span.duration);
-        // Where the motion is slow, so is the change of the distance.
-        let speed = velocity.iter().map(Vector3::norm).fold(0.0, f64::max);
-        search.noise = rounding * speed;
-        let product = poly::dot(&position, &velocity);
-        let found = search.first_rise(&product, &position, [from, span.duration]);
-        if let Some(local) = found {
-            return (index, span.start + local);
+        if angle < best.1 {
+            best = (moment, angle);
         }
     }
-    // Nothing rises any more: the end is the closest approach.
-    match spans.last() {
-        Some(last) => (spans.len() - 1, last.end()),
-        None => (0, 0.0),
-    }
+    best.0
 }
 
-/// State of the walk along the distance to one pose.
-struct Search {
-    /// The distance has fallen since the walk began.
-    falling: bool,
-    /// Within this distance a rise from the start of the walk is a pass.
-    near: f64,
-    /// Products below this are rounding.
-    noise: f64,
-}
-
-impl Search {
-    /// First time in `interval` at which the distance starts to rise, given
-    /// half the derivative of its square and the offset in Bernstein form.
-    fn first_rise(
-        &mut self,
-        product: &[f64; 8],
-        offset: &[Vector3<f64>; 5],
-        interval: [f64; 2],
-    ) -> Option<f64> {
-        if product.iter().all(|c| *c <= self.noise) {
-            self.falling |= product.iter().any(|c| *c < -self.noise);
-            return None;
+/// True when the passes stay what they are if the motion goes on behind its end, where it
+/// passes the last pose: none of them is at the end only because nothing follows.
+pub(crate) fn settled(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    passes: &[Pass],
+    options: &SmoothOptions,
+) -> bool {
+    let Some(goal) = poses.last() else {
+        return true;
+    };
+    let moment = |time: f64| {
+        let next = spans.partition_point(|span| span.start <= time);
+        (next.saturating_sub(1), time)
+    };
+    let distance = |pose: &Isometry3<f64>, place: &Isometry3<f64>| {
+        (pose.translation.vector - place.translation.vector).norm()
+    };
+    let mut since = moment(0.0);
+    for (pass, pose) in passes.iter().zip(&poses[1..]) {
+        let at_end = distance(pose, goal);
+        if at_end > RESOLUTION
+            && at_end <= pass.deviation + 1e3 * RESOLUTION
+            && approach(spans, since, pose, options.tolerance).is_none()
+        {
+            return false;
         }
-        let rising = product.iter().all(|c| *c >= -self.noise);
-        if rising || interval[1] - interval[0] < 1e-10 {
-            let passed = self.falling || offset[0].norm() <= self.near;
-            return passed.then_some(interval[0]);
-        }
-        let middle = 0.5 * (interval[0] + interval[1]);
-        let (low, high) = (halve(product), halve(offset));
-        self.first_rise(&low.0, &high.0, [interval[0], middle])
-            .or_else(|| self.first_rise(&low.1, &high.1, [middle, interval[1]]))
+        since = moment(pass.time);
     }
+    approach(spans, since, goal, options.tolerance).is_none()
 }

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::certificate::certify;
-use super::choose::{Motion, from_motion, from_rest};
+use super::choose::{Motion, Then, corners, from_motion, from_rest};
 use super::exact_stop;
 use super::lower_bound::lower_bound;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::passes;
+use super::pass::{RESOLUTION, passes};
 use super::plan::{Method, SmoothPlan};
 use super::span::Span;
 use super::spline::Moving;
@@ -26,10 +26,6 @@ const LONG_BRAKES: f64 = 64.0;
 
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
-
-/// Share of the speed limit used by windows that others follow: the hull of a
-/// start in motion on a bend is a little faster than the motion.
-const JOIN_SPEED: f64 = 0.998;
 
 /// Most poses of one window.
 const MOST_POSES: usize = 400;
@@ -166,23 +162,12 @@ impl Windows {
         let exact_stop = stop.last().map_or(0.0, Span::end);
         let bound = lower_bound(&self.given, &self.options);
         let mut whole = certify(&self.done.spans, &self.given, &self.options);
-        whole.0.lower_bound = bound;
-        if whole.0.holds() && self.done.duration() <= exact_stop * (1.0 + 1e-12) {
-            return SmoothPlan::new(&self.given, self.done, whole, exact_stop);
+        if !whole.0.holds() || self.done.duration() > exact_stop * (1.0 + 1e-12) {
+            self.done = corners(&self.given, &self.options);
+            whole = certify(&self.done.spans, &self.given, &self.options);
         }
-        let parts = if stop.is_empty() {
-            Vec::new()
-        } else {
-            vec![(Method::ExactStop, stop.len())]
-        };
-        let mut whole = certify(&stop, &self.given, &self.options);
         whole.0.lower_bound = bound;
-        SmoothPlan::new(
-            &self.given,
-            Motion { spans: stop, parts },
-            whole,
-            exact_stop,
-        )
+        SmoothPlan::new(&self.given, self.done, whole, exact_stop)
     }
 
     /// Braking time from full speed, s.
@@ -213,6 +198,9 @@ impl Windows {
             time += full_speed(&self.poses[end], &self.poses[end + 1], &self.options);
             end += 1;
         }
+        // A window that has to end at rest had better do so at a corner.
+        let near = (end..self.poses.len()).take(self.options.window / 2);
+        let end = near.into_iter().find(|i| self.turns(*i)).unwrap_or(end);
         // A short rest of the list joins this window.
         if self.poses.len() - 1 - end <= self.options.window / 4 {
             self.poses.len() - 1
@@ -221,29 +209,40 @@ impl Windows {
         }
     }
 
+    /// Whether the straight way has a corner at a pose.
+    fn turns(&self, pose: usize) -> bool {
+        let around = pose.saturating_sub(1)..(pose + 2).min(self.poses.len());
+        exact_stop::corners(&self.poses[around.clone()]).len() == around.len()
+    }
+
     /// Motion from the end of `done` to rest in pose `end`.
     fn plan(&self, end: usize) -> Motion {
-        let mut options = self.options.clone();
-        if end + 1 < self.poses.len() {
-            options.limits.speed *= JOIN_SPEED;
-            options.limits.angular_speed *= JOIN_SPEED;
-        }
-        if self.tail.spans.is_empty() {
-            return from_rest(&self.poses[self.end..=end], &options);
-        }
+        let options = &self.options;
+        let then = if end + 1 < self.poses.len() {
+            Then::More
+        } else {
+            Then::Stop
+        };
         let more = &self.poses[self.end..=end];
-        let stop = exact_stop::plan(more, &self.options.limits);
-        let most = self.tail.duration() + stop.last().map_or(0.0, Span::end);
+        if self.tail.spans.is_empty() {
+            return from_rest(more, options, then);
+        }
+        let most = self.tail.duration() + corners(more, options).duration();
         let moving = self.tail.spans.first().map(|span| Moving {
             state: span.at(0.0),
             spacing: span.duration,
         });
         let ahead = moving.and_then(|moving| {
-            from_motion(&self.poses[self.passed..=end], &options, &moving, most)
+            from_motion(
+                &self.poses[self.passed..=end],
+                options,
+                (&moving, then),
+                most,
+            )
         });
         ahead.unwrap_or_else(|| {
             let mut motion = self.tail.clone();
-            motion.append(from_rest(more, &options));
+            motion.append(from_rest(more, options, then));
             motion
         })
     }
@@ -309,7 +308,12 @@ fn full_speed(from: &Isometry3<f64>, to: &Isometry3<f64>, options: &SmoothOption
 fn divided(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f64>> {
     let mut result = vec![poses[0]];
     let limits = &options.limits;
-    let longest = LONGEST.max(20.0 * limits.acceleration / limits.jerk);
+    // Where every pose asks for a stop, only the poses given may be poses.
+    let longest = if options.tolerance > RESOLUTION {
+        LONGEST.max(20.0 * limits.acceleration / limits.jerk)
+    } else {
+        f64::INFINITY
+    };
     for pose in &poses[1..] {
         let from = result[result.len() - 1];
         if crate::line::Line::new(from, *pose).is_still() {

@@ -1,11 +1,15 @@
 //! Bounds on every limit over a motion in pieces.
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
+use super::bound::bound;
 use super::certificate::{ActiveSpan, Limit, LimitPeak};
-use super::grid::{Bounded, Local};
+use super::grid::Bounded;
+use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
+use super::stations::ToolStation;
+use crate::wide::Wide;
 use crate::{Path, ToolLimits};
 
 /// A limit counts as active from this ratio on.
@@ -20,6 +24,9 @@ pub(super) struct Audit {
     pub limits: Vec<Limit>,
     /// One row for each piece, one column for each of `limits`.
     pub ratios: Vec<f64>,
+    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
+    /// room.
+    pub stretch: f64,
     /// What sampled tool ratios were raised by, at most.
     pub tool_margin: f64,
     durations: Vec<f64>,
@@ -40,28 +47,37 @@ impl Audit {
         bounded: Bounded<'_, P, N>,
         pieces: &Pieces<N>,
     ) -> Self {
-        let joints = joint_limits(&bounded);
+        let joint = [
+            bounded.joint.velocity,
+            bounded.joint.acceleration,
+            bounded.joint.jerk,
+        ];
         let tool = tool_limits(bounded.tool);
-        let mut limits: Vec<Limit> = joints.iter().map(|(limit, _)| *limit).collect();
+        let mut limits = joint_limits(&joint);
         limits.extend(tool.iter().flatten().map(|(limit, _)| *limit));
         limits.extend(bounded.options.rate_cap.map(|_| Limit::Rate));
         let mut audit = Self {
             ratios: Vec::with_capacity(limits.len() * pieces.joint.len()),
             limits,
+            stretch: 0.0,
             tool_margin: 0.0,
             durations: pieces.joint.iter().map(|piece| piece.duration).collect(),
         };
-        for (joint, law) in pieces.joint.iter().zip(&pieces.law) {
-            for (limit, value) in &joints {
-                audit.ratios.push(joint_bound(joint, *limit, *value));
-            }
-            if tool.iter().any(Option::is_some) {
+        let joint = JointBounds::new(joint);
+        let rate = bounded.options.rate_cap.map(|cap| {
+            let free = SVector::repeat(f64::INFINITY);
+            JointBounds::new([SVector::repeat(cap), free, free])
+        });
+        for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
+            joint.push(piece, &mut audit.ratios);
+            if bounded.tool.limited() {
                 audit.push_tool(bounded.path, law, &tool);
             }
-            if let Some(cap) = bounded.options.rate_cap {
-                audit.ratios.push(rate_bound(law, cap));
+            if let Some(rate) = &rate {
+                rate.push(law, &mut audit.ratios);
             }
         }
+        audit.stretch = audit.stretch_from(0);
         audit
     }
 
@@ -89,34 +105,26 @@ impl Audit {
         }
     }
 
-    /// The largest ratio of column `i`.
-    fn column(&self, i: usize) -> impl Iterator<Item = f64> + '_ {
-        self.ratios
-            .iter()
-            .copied()
-            .skip(i)
-            .step_by(self.limits.len().max(1))
+    /// The ratios piece by piece.
+    fn rows(&self) -> std::slice::Chunks<'_, f64> {
+        self.ratios.chunks(self.limits.len().max(1))
     }
 
-    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
-    /// room.
-    pub(super) fn stretch(&self) -> f64 {
-        let mut factor = 0.0_f64;
-        for (i, limit) in self.limits.iter().enumerate() {
-            let most = self.column(i).fold(0.0, f64::max);
-            factor = factor.max(root(most, order(*limit)));
-        }
-        factor
-    }
-
-    /// As [`Audit::stretch`], without the first piece.
+    /// As [`Audit::stretch`], of all pieces but the first.
     pub(super) fn stretch_after_first(&self) -> f64 {
-        let mut factor = 0.0_f64;
-        for (i, limit) in self.limits.iter().enumerate() {
-            let most = self.column(i).skip(1).fold(0.0, f64::max);
-            factor = factor.max(root(most, order(*limit)));
+        self.stretch_from(1)
+    }
+
+    fn stretch_from(&self, first: usize) -> f64 {
+        let mut most = vec![0.0_f64; self.limits.len()];
+        for row in self.rows().skip(first) {
+            for (most, ratio) in most.iter_mut().zip(row) {
+                *most = if *ratio > *most { *ratio } else { *most };
+            }
         }
-        factor
+        let pairs = self.limits.iter().zip(most);
+        let factors = pairs.map(|(limit, most)| root(most, order(*limit)));
+        factors.fold(0.0, f64::max)
     }
 
     /// The limit that the first piece comes nearest to, and its ratio there.
@@ -128,47 +136,56 @@ impl Audit {
 
     /// Each limit's peak once time is stretched by `factor`.
     pub(super) fn peaks(&self, factor: f64) -> Vec<LimitPeak> {
-        let peak = |(i, limit): (usize, &Limit)| {
-            let (mut ratio, mut time, mut clock) = (0.0, 0.0, 0.0);
-            for (value, duration) in self.column(i).zip(&self.durations) {
-                if value > ratio {
-                    (ratio, time) = (value, clock + 0.5 * duration);
-                }
-                clock += duration;
-            }
-            let ratio = ratio / factor.powi(order(*limit));
-            LimitPeak {
-                limit: *limit,
-                ratio,
-                time: time * factor,
-            }
+        let none = |limit: &Limit| LimitPeak {
+            limit: *limit,
+            ratio: 0.0,
+            time: 0.0,
         };
-        self.limits.iter().enumerate().map(peak).collect()
+        let mut peaks: Vec<LimitPeak> = self.limits.iter().map(none).collect();
+        let mut clock = 0.0;
+        for (row, duration) in self.rows().zip(&self.durations) {
+            for (peak, ratio) in peaks.iter_mut().zip(row) {
+                if *ratio > peak.ratio {
+                    (peak.ratio, peak.time) = (*ratio, clock + 0.5 * duration);
+                }
+            }
+            clock += duration;
+        }
+        for peak in &mut peaks {
+            peak.ratio /= factor.powi(order(peak.limit));
+            peak.time *= factor;
+        }
+        peaks
     }
 
     /// Which limit is active when, once time is stretched by `factor`.
     pub(super) fn active(&self, factor: f64) -> Vec<ActiveSpan> {
+        let from = |limit: &Limit| ACTIVE * factor.powi(order(*limit));
+        let least: Vec<f64> = self.limits.iter().map(from).collect();
+        // Since when a limit is active.
+        let mut open: Vec<Option<f64>> = vec![None; least.len()];
         let mut spans = Vec::new();
-        for (i, limit) in self.limits.iter().enumerate() {
-            let mut open: Option<ActiveSpan> = None;
-            let mut clock = 0.0;
-            for (value, duration) in self.column(i).zip(&self.durations) {
-                let end = clock + duration * factor;
-                if value / factor.powi(order(*limit)) >= ACTIVE {
-                    let start = open.map_or(clock, |span| span.start);
-                    open = Some(ActiveSpan {
-                        limit: *limit,
-                        start,
-                        end,
-                    });
-                } else {
-                    spans.extend(open.take());
+        let mut clock = 0.0;
+        for (row, duration) in self.rows().zip(&self.durations) {
+            for (i, ratio) in row.iter().enumerate() {
+                if *ratio >= least[i] {
+                    open[i] = open[i].or(Some(clock));
+                } else if let Some(start) = open[i].take() {
+                    let (limit, end) = (self.limits[i], clock);
+                    spans.push(ActiveSpan { limit, start, end });
                 }
-                clock = end;
             }
-            spans.extend(open);
+            clock += duration * factor;
         }
-        spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+        for (limit, start) in self.limits.iter().zip(open) {
+            spans.extend(start.map(|start| ActiveSpan {
+                limit: *limit,
+                start,
+                end: clock,
+            }));
+        }
+        let later = |a: &ActiveSpan, b: &ActiveSpan| a.start.total_cmp(&b.start);
+        spans.sort_by(|a, b| later(a, b).then(a.limit.cmp(&b.limit)));
         spans
     }
 }
@@ -183,26 +200,17 @@ fn root(x: f64, order: i32) -> f64 {
 }
 
 /// The finite limits of the joints.
-fn joint_limits<P, const N: usize>(bounded: &Bounded<'_, P, N>) -> Vec<(Limit, f64)> {
-    let joint = bounded.joint;
-    let mut limits: Vec<(Limit, f64)> = Vec::with_capacity(3 * N);
-    limits.extend(
-        joint
-            .velocity
-            .iter()
-            .enumerate()
-            .map(|(j, x)| (Limit::JointVelocity(j), *x)),
-    );
-    let accelerations = joint.acceleration.iter().enumerate();
-    limits.extend(accelerations.map(|(j, x)| (Limit::JointAcceleration(j), *x)));
-    limits.extend(
-        joint
-            .jerk
-            .iter()
-            .enumerate()
-            .map(|(j, x)| (Limit::JointJerk(j), *x)),
-    );
-    limits.retain(|(_, value)| value.is_finite());
+fn joint_limits<const N: usize>(values: &[SVector<f64, N>; 3]) -> Vec<Limit> {
+    let names = [
+        Limit::JointVelocity,
+        Limit::JointAcceleration,
+        Limit::JointJerk,
+    ];
+    let mut limits = Vec::with_capacity(3 * N + 7);
+    for (name, values) in names.into_iter().zip(values) {
+        let finite = (0..N).filter(|j| values[*j].is_finite());
+        limits.extend(finite.map(name));
+    }
     limits
 }
 
@@ -219,32 +227,66 @@ fn tool_limits(tool: &ToolLimits) -> [Option<(Limit, f64)>; 6] {
     .map(|entry| entry.1.is_finite().then_some(entry))
 }
 
-/// Bound of one joint's limit over a piece, as a ratio.
-fn joint_bound<const N: usize>(piece: &Piece<N>, limit: Limit, value: f64) -> f64 {
-    let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
-    // Below the floor the hull is enough: no such piece decides anything.
-    let (floor, tolerance) = (0.9 * value, 1e-7 * value);
-    let found = match limit {
-        Limit::JointVelocity(j) => {
-            let v = [c1[j], 2.0 * c2[j], 3.0 * c3[j], 4.0 * c4[j], 5.0 * c5[j]];
-            super::bound::bound(&v, piece.duration, floor, tolerance)
-        }
-        Limit::JointAcceleration(j) => {
-            let a = [2.0 * c2[j], 6.0 * c3[j], 12.0 * c4[j], 20.0 * c5[j]];
-            super::bound::bound(&a, piece.duration, floor, tolerance)
-        }
-        Limit::JointJerk(j) => {
-            let jerk = [6.0 * c3[j], 24.0 * c4[j], 60.0 * c5[j]];
-            super::bound::bound(&jerk, piece.duration, floor, tolerance)
-        }
-        _ => 0.0,
-    };
-    found / value
+/// Bounds velocity, acceleration and jerk of joints over pieces.
+struct JointBounds<const N: usize> {
+    limits: [SVector<f64, N>; 3],
+    /// One over each limit.
+    narrow: [SVector<f64, N>; 3],
+    /// Whether all limits of an order are finite.
+    all: [bool; 3],
+    wide: Wide,
 }
 
-/// Bound of the rate of the path parameter over a piece, as a ratio.
-fn rate_bound(law: &Piece<1>, cap: f64) -> f64 {
-    joint_bound(law, Limit::JointVelocity(0), cap)
+impl<const N: usize> JointBounds<N> {
+    fn new(limits: [SVector<f64, N>; 3]) -> Self {
+        Self {
+            narrow: limits.map(|limit| limit.map(|x| 1.0 / x)),
+            all: limits.map(|limit| limit.iter().all(|x| x.is_finite())),
+            limits,
+            wide: Wide::detect(),
+        }
+    }
+
+    /// Adds the ratio of each finite limit over a piece.
+    fn push(&self, piece: &Piece<N>, ratios: &mut Vec<f64>) {
+        let narrow = &self.narrow;
+        let mut hulls = self.wide.run(Hulls { piece, narrow });
+        for (order, hull) in hulls.iter_mut().enumerate() {
+            if hull.loose {
+                for j in 0..N {
+                    if hull.most[j] > FLOOR && hull.over[j] > TOLERANCE {
+                        hull.most[j] = self.tight(piece, order, j);
+                    }
+                }
+            }
+            if self.all[order] {
+                ratios.extend_from_slice(&hull.most);
+            } else {
+                let finite = (0..N).filter(|j| self.limits[order][*j].is_finite());
+                ratios.extend(finite.map(|j| hull.most[j]));
+            }
+        }
+    }
+
+    /// The ratio of one derivative of one joint over a piece.
+    fn tight(&self, piece: &Piece<N>, order: usize, j: usize) -> f64 {
+        let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
+        let (c1, c2, c3, c4, c5) = (c1[j], c2[j], c3[j], c4[j], c5[j]);
+        let limit = self.limits[order][j];
+        let room = (FLOOR * limit, TOLERANCE * limit);
+        let found = match order {
+            0 => {
+                let v = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
+                bound(&v, piece.duration, room)
+            }
+            1 => {
+                let a = [2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5];
+                bound(&a, piece.duration, room)
+            }
+            _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, room),
+        };
+        found / limit
+    }
 }
 
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
@@ -256,7 +298,8 @@ fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [
         at.acceleration[0],
         at.jerk[0],
     ];
-    let local = Local::new(&path.at(warp[0].clamp(0.0, path.end())), warp);
+    let tool = path.tool_at(warp[0].clamp(0.0, path.end()));
+    let local = ToolStation::new(&tool, warp);
     let norm = |v: Vector3<f64>| v.norm();
     let [l1, l2, l3] = local.linear.map(norm);
     let [a1, a2, a3] = local.angular.map(norm);

@@ -8,7 +8,7 @@ pub(super) type Band = Vec<[f64; 3]>;
 ///
 /// # Source
 /// Golub and Van Loan, Matrix Computations, 4th edition, section 4.3 (banded systems).
-pub(super) fn solve(matrix: &mut Band, rhs: &mut [f64]) {
+pub(super) fn solve(matrix: &mut [[f64; 3]], rhs: &mut [f64]) {
     let n = rhs.len();
     let largest = matrix.iter().map(|row| row[0].abs()).fold(0.0, f64::max);
     let floor = largest.max(f64::MIN_POSITIVE) * 1e-18;

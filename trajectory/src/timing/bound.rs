@@ -6,7 +6,7 @@
 /// # Source
 /// Convex hull property of the Bernstein form, tightened by subdivision (Farin, Curves and
 /// Surfaces for CAGD, 2002, chapter 5).
-pub(super) fn bound(coefficients: &[f64], duration: f64, floor: f64, tolerance: f64) -> f64 {
+pub(super) fn bound(coefficients: &[f64], duration: f64, (floor, tolerance): (f64, f64)) -> f64 {
     let (points, count) = bernstein(coefficients, duration);
     refine(points, count, (floor, tolerance), 12)
 }
@@ -53,22 +53,26 @@ const fn shares() -> [[[f64; 5]; 5]; 5] {
     table
 }
 
-/// Splits until the hull is tight.
+/// Splits at the turning point until the hull is tight: the parts on both sides of it rise or fall
+/// all along, so that their ends bound them.
 fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth: usize) -> f64 {
-    let hull = points
-        .iter()
-        .take(count)
-        .fold(0.0_f64, |most, x| most.max(x.abs()));
+    let (mut hull, mut peak) = (0.0_f64, 0);
+    for (i, x) in points.iter().take(count).enumerate() {
+        if x.abs() > hull {
+            (hull, peak) = (x.abs(), i);
+        }
+    }
     let ends = points[0].abs().max(points[count - 1].abs());
     if hull <= floor || hull - ends <= tolerance || depth == 0 {
         return hull;
     }
+    let x = turn(&points, count, peak);
     let (mut left, mut right, mut row) = (points, points, points);
     for level in (0..count).rev() {
         left[count - 1 - level] = row[0];
         right[level] = row[level];
         for i in 0..level {
-            row[i] = 0.5 * (row[i] + row[i + 1]);
+            row[i] = (1.0 - x) * row[i] + x * row[i + 1];
         }
     }
     let first = refine(left, count, (floor, tolerance), depth - 1);
@@ -78,6 +82,27 @@ fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth:
         (floor.max(first), tolerance),
         depth - 1,
     ))
+}
+
+/// About where the polynomial turns near point `peak`, by Newton steps; the middle where they lead
+/// nowhere. Wherever it is split, the hulls of the parts bound it.
+fn turn(points: &[f64; 5], count: usize, peak: usize) -> f64 {
+    let degree = count - 1;
+    let mut x = peak as f64 / degree as f64;
+    for _ in 0..3 {
+        let mut slopes = [0.0; 4];
+        for (slope, pair) in slopes.iter_mut().zip(points[..count].windows(2)) {
+            *slope = pair[1] - pair[0];
+        }
+        for level in (2..degree).rev() {
+            for i in 0..level {
+                slopes[i] = (1.0 - x) * slopes[i] + x * slopes[i + 1];
+            }
+        }
+        let bend = slopes[1] - slopes[0];
+        x -= (slopes[0] + x * bend) / ((degree - 1) as f64 * bend);
+    }
+    if x > 0.01 && x < 0.99 { x } else { 0.5 }
 }
 
 #[cfg(test)]
@@ -90,7 +115,7 @@ mod tests {
         let value = |t: f64| polynomial.iter().rev().fold(0.0, |sum, c| sum * t + c);
         let dense = (0..=100_000).map(|i| value(1.4 * f64::from(i) / 1e5).abs());
         let dense = dense.fold(0.0, f64::max);
-        let bound = bound(&polynomial, 1.4, 0.0, 1e-9);
+        let bound = bound(&polynomial, 1.4, (0.0, 1e-9));
         assert!(
             bound >= dense - 1e-12 && bound < dense + 1e-7,
             "{bound} {dense}"

@@ -1,23 +1,15 @@
-//! A path, its warp and its limits as a [`Problem`].
+//! Where the cells of a law lie, and what bounds a path.
 
-use nalgebra::{SVector, Vector3};
-
-use super::lanes::{LANE, Lane};
-use super::problem::Problem;
-use super::survey::{ASIDE, Survey, joint_ratio, speed_cap};
+use super::survey::Survey;
 use super::warp::Warp;
 use super::{Boundary, TimingOptions};
-use crate::{JointLimits, Path, PathPoint, ToolLimits};
+use crate::{JointLimits, ToolLimits};
 
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
 
 /// Finer cells gain nothing, and the search for the law slows down.
 const MOST_CELLS_PER_RAMP: f64 = 40.0;
-/// Cells from either end whose jerk rows stand closer: the path starts there like the cube of the
-/// parameter, which two places cannot hold.
-const DENSE: usize = 2;
-
 /// The grid of a law: where its nodes lie.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
@@ -27,19 +19,6 @@ pub(super) struct Grid {
     pub nodes: Vec<f64>,
     /// Whether a node lies on a knot of the path, where derivatives may jump.
     pub knot: Vec<bool>,
-}
-
-/// Derivatives 1 to 3 of joints and tool to the parameter of the law.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Local<const N: usize> {
-    /// Joints.
-    pub joint: [SVector<f64, N>; 3],
-    /// Position of the controlled point.
-    pub linear: [Vector3<f64>; 3],
-    /// Angular velocity and its derivatives.
-    pub angular: [Vector3<f64>; 3],
-    /// `du/dw`.
-    pub speed: f64,
 }
 
 /// A path with everything that bounds it.
@@ -61,31 +40,6 @@ impl<P, const N: usize> Clone for Bounded<'_, P, N> {
 }
 
 impl<P, const N: usize> Copy for Bounded<'_, P, N> {}
-
-/// Derivatives to a new parameter from those to the old one and those of the old to the new.
-fn chain<const D: usize>(
-    [d1, d2, d3]: [SVector<f64, D>; 3],
-    [_, u1, u2, u3]: [f64; 4],
-) -> [SVector<f64, D>; 3] {
-    [
-        d1 * u1,
-        d2 * (u1 * u1) + d1 * u2,
-        d3 * (u1 * u1 * u1) + d2 * (3.0 * u1 * u2) + d1 * u3,
-    ]
-}
-
-impl<const N: usize> Local<N> {
-    /// The derivatives of `point` to a parameter to which `u` has the derivatives `warp`.
-    pub(super) fn new(point: &PathPoint<N>, warp: [f64; 4]) -> Self {
-        let [_, q1, q2, q3] = point.joint.q;
-        Self {
-            joint: chain([q1, q2, q3], warp),
-            linear: chain(point.tool.linear, warp),
-            angular: chain(point.tool.angular, warp),
-            speed: warp[1],
-        }
-    }
-}
 
 /// What has to be added to a smooth speed so that it begins like a given moving start; it fades
 /// within the time in which accelerations build up.
@@ -192,25 +146,6 @@ impl Grid {
         knot.push(true);
         Self { warp, nodes, knot }
     }
-
-    /// The path at `w`; its third derivatives seen from the side: -1 before, 0 at, 1 after.
-    pub(super) fn point<const N: usize>(
-        &self,
-        path: &impl Path<N>,
-        w: f64,
-        side: f64,
-    ) -> (PathPoint<N>, [f64; 4]) {
-        let warp = self.warp.at(w);
-        let end = path.end();
-        let mut point = path.at(warp[0].clamp(0.0, end));
-        if side != 0.0 {
-            let aside = path.at((warp[0] + side * ASIDE * end).clamp(0.0, end));
-            point.joint.q[3] = aside.joint.q[3];
-            point.tool.linear[2] = aside.tool.linear[2];
-            point.tool.angular[2] = aside.tool.angular[2];
-        }
-        (point, warp)
-    }
 }
 
 /// How many cells each part between marks gets: in proportion, at least one, `cells` in all where
@@ -229,115 +164,4 @@ fn shares(marks: &[f64], step: f64, cells: usize) -> Vec<usize> {
         parts[i] += 1;
     }
     parts
-}
-
-impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
-    /// The problem over `grid`.
-    pub(super) fn problem(&self, grid: &Grid) -> Problem {
-        let nodes = &grid.nodes;
-        let cells = nodes.len() - 1;
-        let mut problem = Problem {
-            widths: nodes.windows(2).map(|pair| pair[1] - pair[0]).collect(),
-            lanes: N.div_ceil(LANE),
-            moving: matches!(self.options.start, Boundary::Moving { .. }),
-            ..Problem::default()
-        };
-        let mut before = self.local(grid, nodes[0], 1.0);
-        for k in 0..cells {
-            let (h, first) = (problem.widths[k], problem.jerk.len() / problem.lanes);
-            problem.jerk_places.push(first);
-            self.push_values(&mut problem, &before);
-            self.push_jerks(&mut problem, &before);
-            let middle = self.local(grid, nodes[k] + 0.5 * h, 0.0);
-            self.push_values(&mut problem, &middle);
-            if k.min(cells - 1 - k) < DENSE {
-                self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.25 * h, 0.0));
-                self.push_jerks(&mut problem, &middle);
-                self.push_jerks(&mut problem, &self.local(grid, nodes[k] + 0.75 * h, 0.0));
-            } else {
-                self.push_jerks(&mut problem, &middle);
-            }
-            let after = self.local(
-                grid,
-                nodes[k + 1],
-                if grid.knot[k + 1] { -1.0 } else { 0.0 },
-            );
-            self.push_jerks(&mut problem, &after);
-            before = if grid.knot[k + 1] && k + 1 < cells {
-                self.local(grid, nodes[k + 1], 1.0)
-            } else {
-                after
-            };
-        }
-        problem.jerk_places.push(problem.jerk.len() / problem.lanes);
-        self.push_values(&mut problem, &before);
-        problem
-    }
-
-    /// The derivatives at `w`, seen from a side.
-    fn local(&self, grid: &Grid, w: f64, side: f64) -> Local<N> {
-        let (point, warp) = grid.point(self.path, w, side);
-        Local::new(&point, warp)
-    }
-
-    /// Adds the rows of a location that do not know the jerk.
-    fn push_values(&self, problem: &mut Problem, local: &Local<N>) {
-        let [first, second, _] = &local.joint;
-        let limit = &self.joint.acceleration;
-        for i in 0..problem.lanes {
-            let mut rows: [Lane; 2] = [[0.0; LANE]; 2];
-            for l in 0..LANE.min(N - i * LANE) {
-                let j = i * LANE + l;
-                rows[0][l] = first[j] / limit[j];
-                rows[1][l] = second[j] / limit[j];
-            }
-            problem.acceleration.push(rows);
-        }
-        let tool = self.tool;
-        for ([p, q, _], limit) in [
-            (local.linear, tool.acceleration),
-            (local.angular, tool.angular_acceleration),
-        ] {
-            if limit.is_finite() {
-                problem.norm_acceleration.push([p / limit, q / limit]);
-            }
-        }
-        let speeds = [
-            joint_ratio(first, &self.joint.velocity),
-            local.linear[0].norm(),
-            local.angular[0].norm(),
-        ];
-        let rate = self.options.rate_cap.map_or(0.0, |cap| local.speed / cap);
-        // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
-        problem
-            .cap
-            .push((1.0 / speed_cap::<N>(speeds, tool, rate)).max(1e-6));
-    }
-
-    /// Adds the jerk rows of a cell end.
-    fn push_jerks(&self, problem: &mut Problem, local: &Local<N>) {
-        let [first, second, third] = &local.joint;
-        let limit = &self.joint.jerk;
-        for i in 0..problem.lanes {
-            let mut rows: [Lane; 3] = [[0.0; LANE]; 3];
-            for l in 0..LANE.min(N - i * LANE) {
-                let j = i * LANE + l;
-                rows[0][l] = third[j] / limit[j];
-                rows[1][l] = 3.0 * second[j] / limit[j];
-                rows[2][l] = first[j] / limit[j];
-            }
-            problem.jerk.push(rows);
-        }
-        let tool = self.tool;
-        for ([p, q, r], limit) in [
-            (local.linear, tool.jerk),
-            (local.angular, tool.angular_jerk),
-        ] {
-            if limit.is_finite() {
-                problem
-                    .norm_jerk
-                    .push([r / limit, q * (3.0 / limit), p / limit]);
-            }
-        }
-    }
 }

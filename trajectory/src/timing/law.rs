@@ -4,6 +4,7 @@ use super::TimingOptions;
 use super::grid::{Bounded, Grid};
 use super::interior::Interior;
 use super::problem::Problem;
+use super::stations::Stations;
 use super::survey::Survey;
 use super::tighten::MOST_STEPS;
 use crate::{JointLimits, Path, TimingError, ToolLimits};
@@ -38,13 +39,13 @@ impl LawProblem {
     ) -> Result<Self, TimingError> {
         let survey = Survey::new(path, joint, tool, options)?;
         let grid = Grid::new(&survey, path.knots(), path.end(), options);
-        let problem = Bounded {
+        let bounded = Bounded {
             path,
             joint,
             tool,
             options,
-        }
-        .problem(&grid);
+        };
+        let problem = bounded.problem(&Stations::new(bounded, &grid));
         Ok(Self {
             problem,
             gap: options.gap,
@@ -58,11 +59,88 @@ impl LawProblem {
 
     /// The fastest law.
     pub fn solve(&self) -> Law {
-        let mut interior = Interior::new(&self.problem, vec![1.0; self.cells() + 2]);
-        interior.solve(self.gap, 0.3, MOST_STEPS);
+        let mut interior = Interior::new(&self.problem);
+        interior.slow_down(&self.problem);
+        interior.solve(&self.problem, self.gap, 0.3, MOST_STEPS);
         Law {
-            duration: self.problem.time(&interior.x),
+            duration: interior.time(),
             iterations: interior.iterations,
+        }
+    }
+}
+
+/// The problem of a path whose tool goes and turns with its joints, under limits of both.
+#[cfg(test)]
+pub(super) fn swaying(cells: usize) -> Problem {
+    use super::Boundary;
+    use crate::{JointPoint, PathPoint, SplinePath, ToolPoint};
+    use nalgebra::{Isometry3, SVector, Vector3};
+
+    struct Swaying(SplinePath<5>);
+
+    impl Path<5> for Swaying {
+        fn end(&self) -> f64 {
+            self.0.end()
+        }
+        fn knots(&self) -> &[f64] {
+            self.0.knots()
+        }
+        fn at(&self, u: f64) -> PathPoint<5> {
+            let JointPoint { q } = self.0.at(u).joint;
+            let part = |k: usize, i: usize| Vector3::new(q[k][i], q[k][i + 1], q[k][i + 2]);
+            let tool = ToolPoint {
+                pose: Isometry3::identity(),
+                linear: [part(1, 0), part(2, 0), part(3, 0)],
+                angular: [part(1, 2), part(2, 2), part(3, 2)],
+            };
+            PathPoint {
+                joint: JointPoint { q },
+                tool,
+            }
+        }
+    }
+
+    let points = (0..4).map(|i| SVector::from_fn(|j, _| (1.3 * f64::from(i) + j as f64).sin()));
+    let points: Vec<SVector<f64, 5>> = points.collect();
+    let path = Swaying(SplinePath::new(&points).unwrap_or_else(|| unreachable!("four points")));
+    let tool = ToolLimits {
+        speed: 1.0,
+        acceleration: 6.0,
+        jerk: 80.0,
+        angular_speed: 2.0,
+        angular_acceleration: 9.0,
+        angular_jerk: 90.0,
+    };
+    let options = TimingOptions {
+        end: Boundary::Rest,
+        cells: Some(cells),
+        ..TimingOptions::default()
+    };
+    let limits = JointLimits::uniform(2.0, 10.0, 100.0);
+    let problem = LawProblem::new(&path, &limits, &tool, &options);
+    problem.map_or_else(|error| unreachable!("{error}"), |law| law.problem)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wide::Wide;
+
+    /// The wide build and that for every processor give the same bits, whatever is left over in
+    /// the last block.
+    #[test]
+    fn both_builds_find_the_same_law() {
+        for cells in [8, 9, 10, 11, 60] {
+            let problem = swaying(cells);
+            let [wide, plain] = [Wide::detect(), Wide::plain()].map(|wide| {
+                let mut interior = Interior::with(&problem, wide);
+                interior.slow_down(&problem);
+                interior.solve(&problem, 1e-6, 0.3, MOST_STEPS);
+                interior
+            });
+            assert_eq!(wide.x, plain.x);
+            assert!(wide.iterations > 5 && wide.iterations == plain.iterations);
+            assert!(wide.time().is_finite());
         }
     }
 }

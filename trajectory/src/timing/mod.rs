@@ -11,16 +11,24 @@ mod bench;
 mod bound;
 mod certificate;
 mod grid;
+mod hull;
 mod interior;
+mod joint;
 mod lanes;
 mod law;
 mod least;
+mod lines;
 mod moving;
 mod options;
 mod pieces;
 mod problem;
 mod reach;
+mod rows;
 mod samples;
+mod share;
+mod state;
+mod stations;
+mod stride;
 mod survey;
 mod tighten;
 mod warp;
@@ -33,6 +41,7 @@ pub use reach::{ReachGrid, duration as reach_duration};
 pub use samples::RandomPaths;
 
 use grid::{Bounded, Grid};
+use stations::Stations;
 use survey::Survey;
 
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
@@ -76,10 +85,10 @@ pub fn time_path<const N: usize>(
     let stretch = if moving {
         1.0
     } else {
-        audit.stretch() * (1.0 + 1e-12)
+        audit.stretch * (1.0 + 1e-12)
     };
-    let trajectory = Trajectory::new(pieces.joint).stretched(stretch);
-    let law = Trajectory::new(pieces.law).stretched(stretch);
+    let trajectory = Trajectory::new(pieces.joint).into_stretched(stretch);
+    let law = Trajectory::new(pieces.law).into_stretched(stretch);
     let certificate = TimeCertificate {
         peaks: audit.peaks(stretch),
         active: audit.active(stretch),
@@ -113,7 +122,7 @@ fn draft<P: Path<N>, const N: usize>(
     let mut refused = None;
     for _ in 0..FINER {
         let grid = Grid::new(survey, bounded.path.knots(), bounded.path.end(), &options);
-        match tighten::best(bounded, &grid) {
+        match tighten::best(bounded, &Stations::new(bounded, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

@@ -5,9 +5,10 @@
 //! limits to what that needs, and so on until they are the true ones.
 
 use super::certificate::Limit;
-use super::grid::{Bounded, Grid};
+use super::grid::Bounded;
 use super::interior::Interior;
 use super::problem::Problem;
+use super::stations::Stations;
 use super::tighten::{Draft, MOST_STEPS, tighten};
 use crate::{Path, TimingError};
 
@@ -23,23 +24,21 @@ const ROUNDING: f64 = 1e-6;
 /// The fastest law found over `grid` that meets every bound as it is.
 pub(super) fn best<P: Path<N>, const N: usize>(
     bounded: Bounded<'_, P, N>,
-    grid: &Grid,
+    stations: &Stations<'_, N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {
     problem.release_start();
-    let mut x = vec![1.0; problem.cells() + 2];
-    let mut iterations = 0;
+    let mut interior = Interior::new(&problem);
     for round in 0..ROUNDS {
-        let mut interior = Interior::new(&problem, enter(&problem, x)?);
-        interior.solve(bounded.options.gap, 0.3, MOST_STEPS);
-        iterations += interior.iterations;
-        let draft = Draft::new(bounded, (grid, &problem), interior.x, iterations);
+        enter(&mut interior, &problem)?;
+        interior.slow_down(&problem);
+        interior.solve(&problem, bounded.options.gap, 0.3, MOST_STEPS);
+        let draft = Draft::new(bounded, (stations, &problem), &interior);
         if draft.audit.stretch_after_first() <= 1.0 {
             return start_holds(draft);
         }
         tighten(&mut problem, &draft, 1.0 + 5e-4 * (round + 1) as f64);
         problem.release_start();
-        x = draft.x;
     }
     Err(TimingError::StartTooFast {
         ratio: 1.0,
@@ -59,21 +58,19 @@ fn start_holds<const N: usize>(draft: Draft<N>) -> Result<Draft<N>, TimingError>
     })
 }
 
-/// A law near `x` in which every row has a slack.
-fn enter(problem: &Problem, x: Vec<f64>) -> Result<Vec<f64>, TimingError> {
-    let mut x = x;
-    let mut wide = 1.02 * Interior::new(problem, x.clone()).worst();
+/// Goes to a law in which every row has a slack.
+fn enter(interior: &mut Interior, problem: &Problem) -> Result<(), TimingError> {
+    let mut wide = 1.02 * interior.worst(problem);
     for _ in 0..NARROWINGS {
         if wide <= 1.0 {
-            return Ok(x);
+            return Ok(());
         }
         let relaxed = problem.relaxed(wide);
-        let mut interior = Interior::new(&relaxed, x);
-        interior.center(STEPS);
-        x = interior.x;
-        let worst = Interior::new(problem, x.clone()).worst();
+        interior.slow_down(&relaxed);
+        interior.center(&relaxed, STEPS);
+        let worst = interior.worst(problem);
         if worst < 1.0 {
-            return Ok(x);
+            return Ok(());
         }
         if worst > 0.9995 * wide {
             break;

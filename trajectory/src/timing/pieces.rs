@@ -3,9 +3,12 @@
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 
-use super::grid::{Bounded, Grid, Local};
+use super::grid::Bounded;
+use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
+use super::stations::{Station, Stations};
 use crate::Path;
+use crate::wide::Wide;
 
 /// Jerk of a piece may differ from that of the law by this share of the limit.
 const JERK_FIT: f64 = 2e-3;
@@ -33,62 +36,62 @@ struct State<const N: usize> {
     spot: Spot,
 }
 
-/// Makes pieces out of one law.
-pub(super) struct Maker<'a, P, const N: usize> {
-    bounded: Bounded<'a, P, N>,
-    grid: &'a Grid,
-    out: Pieces<N>,
-}
-
-impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
-    /// For laws over `grid`.
-    pub(super) fn new(bounded: Bounded<'a, P, N>, grid: &'a Grid) -> Self {
-        let out = Pieces {
-            joint: Vec::new(),
-            law: Vec::new(),
-            cell: Vec::new(),
-            fit_error: 0.0,
-        };
-        Self { bounded, grid, out }
-    }
-
-    /// The pieces of the law `x`.
-    pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
-        let nodes = &self.grid.nodes;
-        for k in 0..problem.cells() {
-            let spot = problem.spot(k, x);
-            // The same place seen from both sides gives the same values; only jerks differ.
-            let side = |k: usize| if self.grid.knot[k] { 1.0 } else { 0.0 };
-            let start = self.state(nodes[k], side(k), spot);
-            let end = self.state(nodes[k + 1], -side(k + 1), spot.moved(problem.widths[k]));
-            self.halve(k, (nodes[k], start), (nodes[k + 1], end), DEPTH);
-        }
-        self.out
-    }
-
-    /// The motion at `w`, where the law is `spot`.
-    fn state(&self, w: f64, side: f64, spot: Spot) -> State<N> {
-        let (point, warp) = self.grid.point(self.bounded.path, w, side);
-        let local = Local::new(&point, warp);
+impl<const N: usize> State<N> {
+    /// The motion at a station, where the law is `spot`.
+    fn new(wide: Wide, station: &Station<N>, spot: Spot) -> Self {
         let root = spot.a.sqrt();
-        let joint = Sample {
-            position: point.joint.q[0],
-            velocity: local.joint[0] * root,
-            acceleration: local.joint[1] * spot.a + local.joint[0] * spot.b,
-            jerk: (local.joint[2] * spot.a
-                + local.joint[1] * (3.0 * spot.b)
-                + local.joint[0] * spot.c)
-                * root,
-        };
+        let joint = wide.run(Motion { station, spot });
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
-        let [u, u1, u2, u3] = warp;
+        let [u, u1, u2, u3] = station.warp;
         let law = Sample {
             position: one(u),
             velocity: one(u1 * root),
             acceleration: one(u2 * spot.a + u1 * spot.b),
             jerk: one((u3 * spot.a + 3.0 * u2 * spot.b + u1 * spot.c) * root),
         };
-        State { joint, law, spot }
+        Self { joint, law, spot }
+    }
+}
+
+/// Makes pieces out of one law.
+pub(super) struct Maker<'a, P, const N: usize> {
+    bounded: Bounded<'a, P, N>,
+    stations: &'a Stations<'a, N>,
+    /// One over the jerk limits.
+    narrow: SVector<f64, N>,
+    wide: Wide,
+    out: Pieces<N>,
+}
+
+impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
+    /// For laws over the grid of `stations`.
+    pub(super) fn new(bounded: Bounded<'a, P, N>, stations: &'a Stations<'a, N>) -> Self {
+        let count = 2 * stations.grid.nodes.len();
+        let out = Pieces {
+            joint: Vec::with_capacity(count),
+            law: Vec::with_capacity(count),
+            cell: Vec::with_capacity(count),
+            fit_error: 0.0,
+        };
+        Self {
+            bounded,
+            stations,
+            narrow: bounded.joint.jerk.map(|x| 1.0 / x),
+            wide: Wide::detect(),
+            out,
+        }
+    }
+
+    /// The pieces of the law `x`.
+    pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
+        let nodes = &self.stations.grid.nodes;
+        for k in 0..problem.cells() {
+            let (spot, stations) = (problem.spot(k, x), self.stations);
+            let start = State::new(self.wide, stations.left(k), spot);
+            let end = State::new(self.wide, stations.right(k), spot.moved(problem.widths[k]));
+            self.halve(k, (nodes[k], &start), (nodes[k + 1], &end), DEPTH);
+        }
+        self.out
     }
 
     /// Adds the pieces between two places in cell `k`: one if it is true to the path, else those
@@ -96,20 +99,40 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
     fn halve(
         &mut self,
         k: usize,
-        (w0, start): (f64, State<N>),
-        (w1, end): (f64, State<N>),
+        (w0, start): (f64, &State<N>),
+        (w1, end): (f64, &State<N>),
         depth: usize,
     ) {
         let duration = passage(start.spot, w1 - w0);
-        let joint = Piece::hermite(duration, &start.joint, &end.joint);
+        let (joint, jerk_off) = self.wide.run(Join {
+            duration,
+            start: &start.joint,
+            end: &end.joint,
+            narrow: &self.narrow,
+        });
+        // Both ends of the cell have the same third derivative of the law only within it.
+        let fits = depth == 0 || jerk_off <= JERK_FIT;
         let law = Piece::hermite(duration, &start.law, &end.law);
-        let error = self.fit_error(&joint, &law);
-        if depth > 0 && (error > self.bounded.options.fit || !self.jerk_fits(&joint, &start, &end))
-        {
+        let error = if fits {
+            self.fit_error(&joint, &law)
+        } else {
+            f64::INFINITY
+        };
+        if depth > 0 && error > self.bounded.options.fit {
             let middle = 0.5 * (w0 + w1);
-            let state = self.state(middle, 0.0, start.spot.moved(middle - w0));
-            self.halve(k, (w0, start), (middle, state), depth - 1);
-            self.halve(k, (middle, state), (w1, end), depth - 1);
+            let spot = start.spot.moved(middle - w0);
+            let state = if depth == DEPTH {
+                State::new(self.wide, self.stations.middle(k), spot)
+            } else {
+                let grid = self.stations.grid;
+                State::new(
+                    self.wide,
+                    &grid.place(self.bounded.path, middle, 0.0).0,
+                    spot,
+                )
+            };
+            self.halve(k, (w0, start), (middle, &state), depth - 1);
+            self.halve(k, (middle, &state), (w1, end), depth - 1);
             return;
         }
         self.out.fit_error = self.out.fit_error.max(error);
@@ -121,23 +144,17 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
     /// Distance of the joints from the path in the middle of a piece.
     fn fit_error(&self, joint: &Piece<N>, law: &Piece<1>) -> f64 {
         let t = 0.5 * joint.duration;
-        let u = law.sample(t).position[0];
+        let u = position(law, t)[0];
         let end = self.bounded.path.end();
-        let wanted = self.bounded.path.at(u.clamp(0.0, end)).joint.q[0];
-        (joint.sample(t).position - wanted).amax()
+        let wanted = self.bounded.path.joint_at(u.clamp(0.0, end)).q[0];
+        (position(joint, t) - wanted).amax()
     }
+}
 
-    /// Whether the jerk of a piece at its ends is near that of the law.
-    fn jerk_fits(&self, piece: &Piece<N>, start: &State<N>, end: &State<N>) -> bool {
-        let limit = &self.bounded.joint.jerk;
-        let off = |t: f64, state: &State<N>| {
-            (piece.sample(t).jerk - state.joint.jerk)
-                .component_div(limit)
-                .amax()
-        };
-        // Both ends of the cell have the same third derivative of the law only within it.
-        off(0.0, start).max(off(piece.duration, end)) <= JERK_FIT
-    }
+/// The position of a piece at `t` (s).
+fn position<const N: usize>(piece: &Piece<N>, t: f64) -> SVector<f64, N> {
+    let [c0, c1, c2, c3, c4, c5] = &piece.coefficients;
+    c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t
 }
 
 /// Time (s) in which the law that is `spot` here goes `width` further within the cell.

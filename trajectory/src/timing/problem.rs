@@ -1,36 +1,62 @@
 //! The time law as an optimisation problem over a grid of cells.
 
-use nalgebra::Vector3;
-
 use super::lanes::{LANE, Lane};
+
+/// Jerk places in a cell: both ends and the middle.
+const JERK_SLOTS: usize = 3;
+/// The same in a block with cells whose jerk rows stand closer: the quarters too.
+const DENSE_SLOTS: usize = 5;
+/// Cells from either end whose jerk rows stand closer: the path starts there like the cube of the
+/// parameter, which two places cannot hold.
+const DENSE: usize = 2;
 
 /// A law `a(w) = (dw/dt)^2`, C1 and quadratic in each cell, is given by its first value, the middle
 /// Bézier point of each cell, and its last value. In a cell with `a`, `b = a'/2`, `c = a''/2` at
 /// its left end: `d²w/dt² = b` and `d³w/dt³ = c sqrt(a)`.
 ///
-/// Every row is divided by its limit. Locations are numbered `2 k` for node `k` and `2 k + 1` for
-/// the middle of cell `k`. Jerk rows stand at places that are evenly spread over each cell, both
-/// ends included: three in most cells, more where the path turns fast against the law.
+/// Every row is divided by its limit. Four neighbouring cells are a block, whose rows stand side by
+/// side. A cell has two slots for values, its left end and its middle, and three for jerks, both
+/// ends and the middle; five in blocks at either end of the path. The last node is the left end of
+/// a cell of no width. Rows that no cell needs are zero and bound nothing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
     /// Widths of the cells.
     pub widths: Vec<f64>,
-    /// Groups of joint rows at a location.
-    pub lanes: usize,
-    /// Acceleration rows `|p b + q a| <= 1` at each location, as `[p, q]`.
+    /// Joint rows at a slot.
+    pub joints: usize,
+    /// Tool rows of acceleration at a slot.
+    pub tool_accelerations: usize,
+    /// Tool rows of jerk at a slot.
+    pub tool_jerks: usize,
+    /// How the law follows from the unknowns, in each block.
+    pub basis: Vec<Basis>,
+    /// Index of the first jerk slot of each block, then their number.
+    pub jerk_slots: Vec<usize>,
+    /// Acceleration rows `|p b + q a| <= 1` of each slot, as `[p, q]`.
     pub acceleration: Vec<[Lane; 2]>,
-    /// Jerk rows `sqrt(a) |x a + y b + z c| <= 1` at each jerk place, as `[x, y, z]`.
+    /// Jerk rows `sqrt(a) |x a + y b + z c| <= 1` of each jerk slot, as `[x, y, z]`.
     pub jerk: Vec<[Lane; 3]>,
-    /// Index of the first jerk place of each cell, then their number.
-    pub jerk_places: Vec<usize>,
-    /// Reciprocal of the cap of `a` at each location.
-    pub cap: Vec<f64>,
-    /// Acceleration rows of the tool, bounded in norm; the same number at each location.
-    pub norm_acceleration: Vec<[Vector3<f64>; 2]>,
+    /// Of both slots of values in each block: the share in the time, over `1 / sqrt(a)` (Simpson's
+    /// rule in each cell), and the reciprocal of the cap of `a`.
+    pub value: Vec<[[Lane; 2]; 2]>,
+    /// Acceleration rows of the tool, bounded in norm.
+    pub norm_acceleration: Vec<[[Lane; 3]; 2]>,
     /// Jerk rows of the tool, bounded in norm.
-    pub norm_jerk: Vec<[Vector3<f64>; 3]>,
+    pub norm_jerk: Vec<[[Lane; 3]; 3]>,
     /// Whether the law has to begin with `a = 1`, `b = 0`.
     pub moving: bool,
+}
+
+/// The law in the cells of a block: `a = first x[k] + second x[k+1]`, `b = left (x[k+1] - x[k])`
+/// at the left end, `c` the gain of `b` from there to the right end times `inverse`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Basis {
+    pub first: Lane,
+    pub second: Lane,
+    pub left: Lane,
+    pub right: Lane,
+    pub width: Lane,
+    pub inverse: Lane,
 }
 
 /// The law at one place: `a`, `b` there and `c` of the cell.
@@ -56,9 +82,108 @@ impl Spot {
 }
 
 impl Problem {
+    /// A problem over `nodes` with `joints` joint rows and so many tool rows of acceleration and
+    /// jerk at each slot, all zero.
+    pub(super) fn new(nodes: &[f64], joints: usize, tools: [usize; 2], moving: bool) -> Self {
+        let widths: Vec<f64> = nodes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let cells = widths.len();
+        let blocks = (cells + 1).div_ceil(LANE);
+        let mut problem = Self {
+            widths,
+            joints,
+            tool_accelerations: tools[0],
+            tool_jerks: tools[1],
+            acceleration: vec![[[0.0; LANE]; 2]; 2 * blocks * joints],
+            value: vec![[[[0.0; LANE]; 2]; 2]; blocks],
+            norm_acceleration: vec![[[[0.0; LANE]; 3]; 2]; 2 * blocks * tools[0]],
+            basis: vec![Basis::default(); blocks],
+            moving,
+            ..Self::default()
+        };
+        let mut slots = 0;
+        for block in 0..blocks {
+            problem.jerk_slots.push(slots);
+            let dense = (block * LANE..(block + 1) * LANE).any(|k| k < cells && problem.dense(k));
+            slots += if dense { DENSE_SLOTS } else { JERK_SLOTS };
+        }
+        problem.jerk_slots.push(slots);
+        problem.jerk = vec![[[0.0; LANE]; 3]; slots * joints];
+        problem.norm_jerk = vec![[[[0.0; LANE]; 3]; 3]; slots * tools[1]];
+        for k in 0..blocks * LANE {
+            problem.fill_basis(k);
+        }
+        problem
+    }
+
+    /// Fills in what cell `k` says of the law. Past the end the law is the unknown itself, which
+    /// stays 1 there.
+    fn fill_basis(&mut self, k: usize) {
+        let cells = self.cells();
+        let width = |k: usize| self.widths.get(k).copied().unwrap_or(0.0);
+        let before = if k == 0 { 0.0 } else { width(k - 1) };
+        let (h, after) = (width(k), width(k + 1));
+        let (i, l) = (k / LANE, k % LANE);
+        let (weight, middle) = ((before + h) / 6.0, h * (4.0 / 6.0));
+        let basis = &mut self.basis[i];
+        basis.second[l] = 1.0;
+        if k <= cells {
+            let left = 1.0 / (before + h);
+            (basis.first[l], basis.second[l], basis.left[l]) = (h * left, before * left, left);
+            self.value[i][0][0][l] = weight;
+            self.value[i][1][0][l] = middle;
+        }
+        if k < cells {
+            (basis.width[l], basis.inverse[l]) = (h, 1.0 / h);
+            basis.right[l] = 1.0 / (h + after);
+        }
+    }
+
     /// Number of cells.
     pub(super) fn cells(&self) -> usize {
         self.widths.len()
+    }
+
+    /// Rows that count in the mean of multiplier times slack: those of the joints as if they were
+    /// a multiple of four. What is more than there are bounds nothing; it keeps the mean from
+    /// falling ahead of the centring.
+    pub(super) fn counted_rows(&self) -> usize {
+        let cells = self.cells();
+        let values = 2 * cells + 1;
+        let dense = (0..cells).filter(|k| self.dense(*k)).count();
+        let jerks = JERK_SLOTS * (cells - dense) + DENSE_SLOTS * dense;
+        let joints = self.joints.next_multiple_of(4) * (values + jerks);
+        joints + values * (1 + self.tool_accelerations) + jerks * self.tool_jerks
+    }
+
+    /// Number of unknowns, with those past the end that no row depends on.
+    pub(super) fn unknowns(&self) -> usize {
+        LANE * self.basis.len() + 2
+    }
+
+    /// Whether the jerk rows of cell `k` stand closer.
+    pub(super) fn dense(&self, k: usize) -> bool {
+        k.min(self.cells() - 1 - k) < DENSE
+    }
+
+    /// The slot of values of cell `k`: its left end, or its middle.
+    pub(super) fn value_slot(k: usize, middle: bool) -> usize {
+        2 * (k / LANE) + usize::from(middle)
+    }
+
+    /// The jerk slots of the block of cell `k`.
+    pub(super) fn jerk_slots(&self, k: usize) -> std::ops::Range<usize> {
+        self.jerk_slots[k / LANE]..self.jerk_slots[k / LANE + 1]
+    }
+
+    /// The jerk slots of block `i`, each by its share of the way from left to right.
+    #[inline(always)]
+    pub(super) fn jerk_shares(&self, i: usize) -> &'static [f64] {
+        const SHARES: [f64; JERK_SLOTS] = [0.0, 0.5, 1.0];
+        const DENSE: [f64; DENSE_SLOTS] = [0.0, 0.25, 0.5, 0.75, 1.0];
+        match self.jerk_slots[i..] {
+            [first, end, ..] if end - first == JERK_SLOTS => &SHARES,
+            _ => &DENSE,
+        }
     }
 
     /// The problem with all limits of speed, acceleration and jerk `factor` times as wide.
@@ -68,85 +193,36 @@ impl Problem {
         let rows = wide.acceleration.iter_mut().flatten().flatten();
         let rows = rows.chain(wide.jerk.iter_mut().flatten().flatten());
         rows.for_each(|x| *x *= narrow);
-        let vectors = wide.norm_acceleration.iter_mut().flatten();
-        let vectors = vectors.chain(wide.norm_jerk.iter_mut().flatten());
-        vectors.for_each(|x| *x *= narrow);
-        wide.cap.iter_mut().for_each(|cap| *cap *= narrow * narrow);
+        let vectors = wide.norm_acceleration.iter_mut().flatten().flatten();
+        let vectors = vectors.chain(wide.norm_jerk.iter_mut().flatten().flatten());
+        vectors.flatten().for_each(|x| *x *= narrow);
+        for [_, cap] in wide.value.iter_mut().flatten() {
+            cap.iter_mut().for_each(|cap| *cap *= narrow * narrow);
+        }
         wide
     }
 
     /// Takes away the rows of the first node that a given start state decides by itself.
     pub(super) fn release_start(&mut self) {
-        let norms = self.norm_accelerations();
-        self.acceleration[..self.lanes].fill([[0.0; LANE]; 2]);
-        self.norm_acceleration[..norms].fill([Vector3::zeros(); 2]);
-        self.cap[0] = 1e-6;
-    }
-
-    /// Tool rows of acceleration at each location.
-    pub(super) fn norm_accelerations(&self) -> usize {
-        self.norm_acceleration.len() / (2 * self.cells() + 1)
-    }
-
-    /// Tool rows of jerk at each jerk place.
-    pub(super) fn norm_jerks(&self) -> usize {
-        self.norm_jerk.len() / self.jerk_places.last().copied().unwrap_or(0).max(1)
-    }
-
-    /// The jerk places of cell `k`, each with its distance from the left end.
-    pub(super) fn jerk_spots(&self, k: usize) -> impl Iterator<Item = (usize, f64)> {
-        let (first, end) = (self.jerk_places[k], self.jerk_places[k + 1]);
-        let step = self.widths[k] / (end - first - 1) as f64;
-        (first..end).map(move |i| (i, step * (i - first) as f64))
-    }
-
-    /// Width of the cell before `k`; 0 before the first.
-    fn width_before(&self, k: usize) -> f64 {
-        if k == 0 { 0.0 } else { self.widths[k - 1] }
-    }
-
-    /// The rows of `a`, `b`, `c` at the left end of cell `k` over the unknowns `k`, `k+1`, `k+2`.
-    pub(super) fn basis(&self, k: usize) -> [[f64; 3]; 3] {
-        let (before, h) = (self.width_before(k), self.widths[k]);
-        let after = self.widths.get(k + 1).copied().unwrap_or(0.0);
-        let (left, right) = (1.0 / (before + h), 1.0 / (h + after));
-        let a = [h * left, before * left, 0.0];
-        let b = [-left, left, 0.0];
-        let c = [left / h, -(left + right) / h, right / h];
-        [a, b, c]
+        for row in self.acceleration[..self.joints].iter_mut().flatten() {
+            row[0] = 0.0;
+        }
+        let norms = self.norm_acceleration[..self.tool_accelerations].iter_mut();
+        for lane in norms.flatten().flatten() {
+            lane[0] = 0.0;
+        }
+        self.value[0][0][1][0] = 1e-6;
     }
 
     /// The law at the left end of cell `k`.
     pub(super) fn spot(&self, k: usize, x: &[f64]) -> Spot {
-        let (before, h) = (self.width_before(k), self.widths[k]);
-        let after = self.widths.get(k + 1).copied().unwrap_or(0.0);
-        let (left, right) = (1.0 / (before + h), 1.0 / (h + after));
-        let b = (x[k + 1] - x[k]) * left;
-        let next = (x[k + 2] - x[k + 1]) * right;
+        let (basis, l) = (&self.basis[k / LANE], k % LANE);
+        let b = (x[k + 1] - x[k]) * basis.left[l];
+        let next = (x[k + 2] - x[k + 1]) * basis.right[l];
         Spot {
-            a: (h * x[k] + before * x[k + 1]) * left,
+            a: basis.first[l] * x[k] + basis.second[l] * x[k + 1],
             b,
-            c: (next - b) / h,
+            c: (next - b) * basis.inverse[l],
         }
-    }
-
-    /// Share of location `i` in the time, over `1 / sqrt(a)` (Simpson's rule in each cell).
-    pub(super) fn weight(&self, i: usize) -> f64 {
-        let k = i / 2;
-        if i % 2 == 1 {
-            return self.widths[k] * (4.0 / 6.0);
-        }
-        (self.width_before(k) + self.widths.get(k).copied().unwrap_or(0.0)) / 6.0
-    }
-
-    /// The time that the law `x` takes.
-    pub(super) fn time(&self, x: &[f64]) -> f64 {
-        let mut time = 0.0;
-        for (k, h) in self.widths.iter().enumerate() {
-            let spot = self.spot(k, x);
-            let (middle, end) = (spot.moved(0.5 * h), spot.moved(*h));
-            time += h / 6.0 * (1.0 / spot.a.sqrt() + 4.0 / middle.a.sqrt() + 1.0 / end.a.sqrt());
-        }
-        time
     }
 }

@@ -1,6 +1,7 @@
 //! The fastest law under velocity and acceleration limits alone, by reachability.
 
 use super::lanes::{LANE, Lane};
+use crate::wide::{Four, Op, Wide};
 
 /// A path on a grid with its limits, ready for [`ReachGrid::solve`]: `a = (du/dt)^2` and
 /// `b = d²u/dt²` have to meet `a <= cap` and `|p b + q a| <= 1` for each row `(p, q)`, at both ends
@@ -11,12 +12,10 @@ pub struct ReachGrid {
     cap: Vec<f64>,
     /// Groups of rows at a point; as many again follow for the next point, seen from this one.
     width: usize,
-    /// `|1 / p|` of each row.
-    reach: Vec<Lane>,
-    /// `q / p` of each row.
-    slope: Vec<Lane>,
-    /// The rows of the newest point.
-    newest: Vec<(f64, f64)>,
+    /// `|1 / p|` and `q / p` of each row.
+    lines: Vec<[Lane; 2]>,
+    /// The rows `(p, q)` of the newest point; zeros where a group is not full.
+    newest: Vec<[Lane; 2]>,
 }
 
 /// The lines that bound `b` at a given `a`: the least upper and the greatest lower one, each
@@ -26,61 +25,68 @@ struct Envelope {
     low: (f64, f64),
 }
 
-/// Slots for rows: `|1 / p|` and `q / p`.
-type Slots<'a> = (&'a mut [Lane], &'a mut [Lane]);
-
-/// Fills slots with rows; returns what rows without `p` leave of the cap.
-fn fill((reach, slope): Slots<'_>, rows: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let mut cap = f64::INFINITY;
-    let slots = reach.iter_mut().flatten().zip(slope.iter_mut().flatten());
-    for ((reach, slope), (p, q)) in slots.zip(rows) {
-        let inverse = 1.0 / p;
+/// Fills a group of lines from rows `(p, q)`, for each `|1 / p|` and `q / p`; returns the largest
+/// `|q|` of those without `p`.
+#[inline]
+fn fill(line: &mut [Lane; 2], [p, q]: &[Lane; 2]) -> f64 {
+    let mut flat = 0.0_f64;
+    for l in 0..LANE {
+        let inverse = 1.0 / p[l];
         // A joint that hardly moves here bounds the speed by its curvature alone.
-        if inverse.abs() < 1e12 {
-            *reach = inverse.abs();
-            *slope = q * inverse;
-        } else if q != 0.0 {
-            cap = cap.min(1.0 / q.abs());
-        }
+        let steep = inverse.abs() < 1e12;
+        line[0][l] = if steep { inverse.abs() } else { f64::MAX };
+        line[1][l] = if steep { q[l] * inverse } else { 0.0 };
+        flat = flat.max(if steep { 0.0 } else { q[l].abs() });
     }
-    cap
+    flat
 }
 
 impl ReachGrid {
     /// An empty grid for `rows` rows at each point.
     pub fn new(rows: usize) -> Self {
+        Self::with_room(rows, 0)
+    }
+
+    /// An empty grid with room for so many points.
+    pub(super) fn with_room(rows: usize, points: usize) -> Self {
+        let width = rows.div_ceil(LANE);
         Self {
-            width: rows.div_ceil(LANE),
-            ..Self::default()
+            at: Vec::with_capacity(points),
+            cap: Vec::with_capacity(points),
+            width,
+            lines: Vec::with_capacity(2 * width * points),
+            newest: vec![[[0.0; LANE]; 2]; width],
         }
     }
 
     /// Adds the next point, at `u`, with the cap of `a` and rows `(p, q)`. Rows beyond the number
     /// given to [`ReachGrid::new`] are not taken.
     pub fn push(&mut self, u: f64, cap: f64, rows: impl Iterator<Item = (f64, f64)>) {
-        self.newest.clear();
-        self.newest.extend(rows);
-        let (width, first) = (self.width, self.reach.len());
+        self.newest.fill([[0.0; LANE]; 2]);
+        for (i, (p, q)) in rows.take(LANE * self.width).enumerate() {
+            let group = &mut self.newest[i / LANE];
+            (group[0][i % LANE], group[1][i % LANE]) = (p, q);
+        }
+        let (width, first) = (self.width, self.lines.len());
         if let Some(before) = self.at.last() {
             // At the end of the cell before, a = a_before + 2 h b.
-            let h = u - before;
-            let seen = self.newest.iter().map(|(p, q)| (p + 2.0 * h * q, *q));
-            let slots = first - width..first;
-            fill(
-                (&mut self.reach[slots.clone()], &mut self.slope[slots]),
-                seen,
-            );
+            let twice = 2.0 * (u - before);
+            for (line, [p, q]) in self.lines[first - width..].iter_mut().zip(&self.newest) {
+                let mut seen = *p;
+                for (p, q) in seen.iter_mut().zip(q) {
+                    *p += twice * q;
+                }
+                fill(line, &[seen, *q]);
+            }
         }
-        self.reach.resize(first + 2 * width, [f64::MAX; LANE]);
-        self.slope.resize(first + 2 * width, [0.0; LANE]);
-        let slots = first..first + width;
-        let own = self.newest.iter().copied();
-        let left = fill(
-            (&mut self.reach[slots.clone()], &mut self.slope[slots]),
-            own,
-        );
+        let none = [[f64::MAX; LANE], [0.0; LANE]];
+        self.lines.resize(first + 2 * width, none);
+        let mut flat = 0.0_f64;
+        for (line, row) in self.lines[first..].iter_mut().zip(&self.newest) {
+            flat = flat.max(fill(line, row));
+        }
         self.at.push(u);
-        self.cap.push(cap.min(left));
+        self.cap.push(cap.min(1.0 / flat));
     }
 
     /// Parameter values of the points.
@@ -96,28 +102,17 @@ impl ReachGrid {
     /// analysis", IEEE T-RO 34(3), 2018, algorithms 1 and 2. Each linear program has two
     /// unknowns; it is solved by Newton steps on the concave gap between the bounds of `b`.
     pub fn solve(&self, first: f64, last: f64) -> Vec<f64> {
-        let count = self.at.len();
         let mut top = self.cap.clone();
-        if count == 0 {
-            return top;
-        }
-        top[count - 1] = top[count - 1].min(last);
-        for k in (0..count - 1).rev() {
-            let half = 0.5 / (self.at[k + 1] - self.at[k]);
-            top[k] = self.controllable(k, half, top[k + 1]);
-        }
-        top[0] = top[0].min(first);
-        for k in 0..count - 1 {
-            let half = 0.5 / (self.at[k + 1] - self.at[k]);
-            let (a, next) = (top[k], top[k + 1]);
-            let bounds = self.envelope(k, a);
-            let b = (bounds.high.0 - bounds.high.1 * a).min((next - a) * half);
-            top[k + 1] = (a + b / half).clamp(0.0, next);
-        }
+        Wide::detect().run(Passes {
+            grid: self,
+            top: &mut top,
+            ends: (first, last),
+        });
         top
     }
 
     /// The largest `a` at point `k` from which some `b` leads to at most `next` at the next.
+    #[inline(always)]
     fn controllable(&self, k: usize, half: f64, next: f64) -> f64 {
         let mut a = self.cap[k];
         for _ in 0..30 {
@@ -140,11 +135,12 @@ impl ReachGrid {
     }
 
     /// The bounds of `b` at point `k` for `a`.
+    #[inline(always)]
     fn envelope(&self, k: usize, a: f64) -> Envelope {
         let rows = 2 * k * self.width..2 * (k + 1) * self.width;
         let mut high = ([f64::MAX; LANE], [f64::MAX; LANE], [0.0; LANE]);
         let mut low = ([f64::MIN; LANE], [f64::MIN; LANE], [0.0; LANE]);
-        for (reach, slope) in self.reach[rows.clone()].iter().zip(&self.slope[rows]) {
+        for [reach, slope] in &self.lines[rows] {
             for l in 0..LANE {
                 let shift = slope[l] * a;
                 let (up, down) = (reach[l] - shift, -reach[l] - shift);
@@ -170,6 +166,41 @@ impl ReachGrid {
         Envelope {
             high: (high.1[best_high], high.2[best_high]),
             low: (low.1[best_low], low.2[best_low]),
+        }
+    }
+}
+
+/// Both passes over a grid: `top` holds the caps before, the law after; with its values at the
+/// ends.
+struct Passes<'a> {
+    grid: &'a ReachGrid,
+    top: &'a mut [f64],
+    ends: (f64, f64),
+}
+
+impl Op for Passes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, _: S) {
+        let Self { grid, top, ends } = self;
+        let at = &grid.at;
+        let count = at.len();
+        if count == 0 {
+            return;
+        }
+        top[count - 1] = top[count - 1].min(ends.1);
+        for k in (0..count - 1).rev() {
+            let half = 0.5 / (at[k + 1] - at[k]);
+            top[k] = grid.controllable(k, half, top[k + 1]);
+        }
+        top[0] = top[0].min(ends.0);
+        for k in 0..count - 1 {
+            let half = 0.5 / (at[k + 1] - at[k]);
+            let (a, next) = (top[k], top[k + 1]);
+            let bounds = grid.envelope(k, a);
+            let b = (bounds.high.0 - bounds.high.1 * a).min((next - a) * half);
+            top[k + 1] = (a + b / half).clamp(0.0, next);
         }
     }
 }

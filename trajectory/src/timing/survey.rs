@@ -59,19 +59,16 @@ impl Survey {
         options: &TimingOptions,
     ) -> Result<Self, TimingError> {
         let at = places(path)?;
-        let mut points = Vec::with_capacity(at.len());
-        for &u in &at {
-            points.push(finite(path.at(u), u)?);
-        }
-        if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
-            corners(path, &points)?;
-        }
         let rows = Rows {
             joint,
             tool,
             rate_cap: options.rate_cap,
         };
-        let grid = rows.grid(&at, &points, 1);
+        let bends = Bends::new(path, &at, tool)?;
+        if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
+            corners(path, bends.sizes)?;
+        }
+        let grid = rows.grid(&at, &bends, 1);
         let first = first_value(options);
         let last = if options.end == Boundary::Rest {
             0.0
@@ -91,10 +88,10 @@ impl Survey {
             return Err(TimingError::Unbounded);
         }
         // The change that a grid of half the points makes tells how far off this one may be.
-        let coarse = rows.grid(&at, &points, 2);
+        let coarse = rows.grid(&at, &bends, 2);
         let coarse = reach::duration(coarse.at(), &coarse.solve(first, last));
         let bound = (total - 2.0 * (coarse - total).abs()).max(0.0);
-        let ramp = ramp(joint, tool, &at, &a, &points);
+        let ramp = ramp(joint, tool, &at, &a, &bends);
         let times = clock(&at, &a);
         let rate = a.into_iter().map(f64::sqrt).collect();
         Ok(Self {
@@ -159,6 +156,45 @@ fn places<const N: usize>(path: &impl Path<N>) -> Result<Vec<f64>, TimingError> 
     Ok(at)
 }
 
+/// The first two derivatives of a path at many places.
+struct Bends<const N: usize> {
+    joints: Vec<[SVector<f64, N>; 2]>,
+    /// Of the tool, of its position and then of its orientation; empty if nothing limits it.
+    tools: Vec<[[Vector3<f64>; 2]; 2]>,
+    /// The largest number of each derivative of the joints.
+    sizes: [f64; 4],
+}
+
+impl<const N: usize> Bends<N> {
+    /// Looks at `path`.
+    fn new(path: &impl Path<N>, at: &[f64], limits: &ToolLimits) -> Result<Self, TimingError> {
+        let limited = limits.limited();
+        let mut bends = Self {
+            joints: Vec::with_capacity(at.len()),
+            tools: Vec::with_capacity(if limited { at.len() } else { 0 }),
+            sizes: [0.0; 4],
+        };
+        for &u in at {
+            let PathPoint { joint, tool } = finite(path.at(u), u)?;
+            for (size, d) in bends.sizes.iter_mut().zip(&joint.q) {
+                *size = size.max(d.amax());
+            }
+            bends.joints.push([joint.q[1], joint.q[2]]);
+            if limited {
+                let two = |[p, q, _]: [Vector3<f64>; 3]| [p, q];
+                bends.tools.push([two(tool.linear), two(tool.angular)]);
+            }
+        }
+        Ok(bends)
+    }
+
+    /// The tool at place `i`: position, then orientation.
+    fn tool(&self, i: usize) -> [[Vector3<f64>; 2]; 2] {
+        let tool = self.tools.get(i).copied();
+        tool.unwrap_or_else(|| [[Vector3::zeros(); 2]; 2])
+    }
+}
+
 /// The point, if it is finite.
 fn finite<const N: usize>(point: PathPoint<N>, u: f64) -> Result<PathPoint<N>, TimingError> {
     let joints = point
@@ -175,24 +211,14 @@ fn finite<const N: usize>(point: PathPoint<N>, u: f64) -> Result<PathPoint<N>, T
     }
 }
 
-/// Looks for jumps of the first two derivatives at knots.
-fn corners<const N: usize>(
-    path: &impl Path<N>,
-    points: &[PathPoint<N>],
-) -> Result<(), TimingError> {
+/// Looks for jumps of the first two derivatives at knots, beside the `sizes` that they have.
+fn corners<const N: usize>(path: &impl Path<N>, sizes: [f64; 4]) -> Result<(), TimingError> {
     let end = path.end();
-    let size = |order: usize| {
-        points
-            .iter()
-            .map(|p| p.joint.q[order].amax())
-            .fold(0.0, f64::max)
-    };
-    let first = size(1);
-    let second = size(2) + 4.0 * first / end;
-    let third = size(3);
+    let [_, first, second, third] = sizes;
+    let second = second + 4.0 * first / end;
     for &u in path.knots().iter().filter(|u| **u > 0.0 && **u < end) {
-        let before = path.at(u - ASIDE * end).joint;
-        let after = path.at(u + ASIDE * end).joint;
+        let before = path.joint_at(u - ASIDE * end);
+        let after = path.joint_at(u + ASIDE * end);
         let allowed = [
             1e-6 * first + 1e-8 * end * second,
             1e-4 * second + 1e-8 * end * third,
@@ -222,9 +248,11 @@ struct Rows<'a, const N: usize> {
 
 impl<const N: usize> Rows<'_, N> {
     /// The grid at every `step`-th of the places `at`, and at the last.
-    fn grid(&self, at: &[f64], points: &[PathPoint<N>], step: usize) -> ReachGrid {
-        let mut grid = ReachGrid::new(N + 6);
-        let caps: Vec<f64> = points.iter().map(|point| self.cap(point)).collect();
+    fn grid(&self, at: &[f64], bends: &Bends<N>, step: usize) -> ReachGrid {
+        let tool = [self.tool.acceleration, self.tool.angular_acceleration];
+        let tools = tool.iter().filter(|limit| limit.is_finite()).count();
+        let mut grid = ReachGrid::with_room(N + 3 * tools, at.len() / step + 2);
+        let caps: Vec<f64> = (0..at.len()).map(|i| self.cap(bends, i)).collect();
         let most = caps
             .iter()
             .copied()
@@ -232,40 +260,47 @@ impl<const N: usize> Rows<'_, N> {
             .fold(0.0, f64::max);
         // Where the path stands still over its parameter nothing bounds the rate by itself.
         let most = if most > 0.0 { most } else { FREE };
-        let all = at.iter().zip(points).zip(caps).enumerate();
-        for (_, ((&u, point), cap)) in all.filter(|(i, _)| i % step == 0 || i + 1 == at.len()) {
-            grid.push(u, cap.min(most), self.rows(point));
+        let narrow = self.joint.acceleration.map(|x| 1.0 / x);
+        for (i, cap) in caps.iter().enumerate() {
+            if i % step == 0 || i + 1 == at.len() {
+                grid.push(at[i], cap.min(most), self.rows(bends, i, &narrow));
+            }
         }
         grid
     }
 
-    /// What speeds allow at a point. Jerk limits count as if the rate were constant there.
-    fn cap(&self, point: &PathPoint<N>) -> f64 {
+    /// What speeds allow at place `i`. Jerk limits count as if the rate were constant there.
+    fn cap(&self, bends: &Bends<N>, i: usize) -> f64 {
+        let [linear, angular] = bends.tool(i);
         let speeds = [
-            joint_ratio(&point.joint.q[1], &self.joint.velocity),
-            point.tool.linear[0].norm(),
-            point.tool.angular[0].norm(),
+            joint_ratio(&bends.joints[i][0], &self.joint.velocity),
+            linear[0].norm(),
+            angular[0].norm(),
         ];
-        speed_cap::<N>(
-            speeds,
-            self.tool,
-            self.rate_cap.map_or(0.0, |cap| 1.0 / cap),
-        )
+        let rate = self.rate_cap.map_or(0.0, |cap| 1.0 / cap);
+        speed_cap::<N>(speeds, self.tool, rate)
     }
 
-    /// Acceleration rows `(p, q)` of a point; those of the tool for each axis, which is a little
-    /// weaker than for the norm.
-    fn rows(&self, point: &PathPoint<N>) -> impl Iterator<Item = (f64, f64)> {
-        let limit = self.joint.acceleration;
-        let [_, first, second, _] = point.joint.q;
-        let joints = (0..N).map(move |j| (first[j] / limit[j], second[j] / limit[j]));
-        let axes = |[p, q, _]: [Vector3<f64>; 3], limit: f64| {
-            (0..3).map(move |i| (p[i] / limit, q[i] / limit))
+    /// Acceleration rows `(p, q)` at place `i`, those of joints times `narrow`; those of the tool
+    /// for each axis, which is a little weaker than for the norm.
+    fn rows(
+        &self,
+        bends: &Bends<N>,
+        i: usize,
+        narrow: &SVector<f64, N>,
+    ) -> impl Iterator<Item = (f64, f64)> {
+        let [first, second] = bends.joints[i];
+        let narrow = *narrow;
+        let joints = (0..N).map(move |j| (first[j] * narrow[j], second[j] * narrow[j]));
+        let axes = |[p, q]: [Vector3<f64>; 2], limit: f64| {
+            let count = if limit.is_finite() { 3 } else { 0 };
+            (0..count).map(move |i| (p[i] / limit, q[i] / limit))
         };
-        let linear = axes(point.tool.linear, self.tool.acceleration);
+        let [linear, angular] = bends.tool(i);
+        let linear = axes(linear, self.tool.acceleration);
         joints
             .chain(linear)
-            .chain(axes(point.tool.angular, self.tool.angular_acceleration))
+            .chain(axes(angular, self.tool.angular_acceleration))
     }
 }
 
@@ -275,18 +310,18 @@ fn ramp<const N: usize>(
     tool: &ToolLimits,
     at: &[f64],
     a: &[f64],
-    points: &[PathPoint<N>],
+    bends: &Bends<N>,
 ) -> f64 {
     let mut ramp = 0.0_f64;
     for k in 0..at.len() - 1 {
         let b = 0.5 * (a[k + 1] - a[k]) / (at[k + 1] - at[k]);
-        let [_, first, second, _] = points[k].joint.q;
+        let [first, second] = bends.joints[k];
         let joints = first * b + second * a[k];
         ramp = ramp.max(joint_ratio(&joints, &joint.jerk));
-        let used = |[p, q, _]: [Vector3<f64>; 3]| (p * b + q * a[k]).norm();
-        ramp = ramp.max(used(points[k].tool.linear).min(tool.acceleration) / tool.jerk);
-        let angular = used(points[k].tool.angular).min(tool.angular_acceleration);
-        ramp = ramp.max(angular / tool.angular_jerk);
+        let used = |[p, q]: [Vector3<f64>; 2]| (p * b + q * a[k]).norm();
+        let [linear, angular] = bends.tool(k).map(used);
+        ramp = ramp.max(linear.min(tool.acceleration) / tool.jerk);
+        ramp = ramp.max(angular.min(tool.angular_acceleration) / tool.angular_jerk);
     }
     ramp
 }

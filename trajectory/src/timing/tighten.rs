@@ -3,10 +3,12 @@
 
 use super::audit::{self, Audit};
 use super::certificate::Limit;
-use super::grid::{Bounded, Grid};
+use super::grid::Bounded;
 use super::interior::Interior;
+use super::lanes::{LANE, Lane};
 use super::pieces::{Maker, Pieces};
 use super::problem::Problem;
+use super::stations::Stations;
 use crate::{Path, TimingError};
 
 /// Newton steps after which the best law so far is taken.
@@ -25,7 +27,6 @@ pub(super) struct Draft<const N: usize> {
     pub(super) audit: Audit,
     pub(super) iterations: usize,
     pub(super) cells: usize,
-    pub(super) x: Vec<f64>,
     duration: f64,
 }
 
@@ -33,20 +34,18 @@ impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
     pub(super) fn new<P: Path<N>>(
         bounded: Bounded<'_, P, N>,
-        (grid, problem): (&Grid, &Problem),
-        x: Vec<f64>,
-        iterations: usize,
+        (stations, problem): (&Stations<'_, N>, &Problem),
+        interior: &Interior,
     ) -> Self {
-        let pieces = Maker::new(bounded, grid).make(problem, &x);
+        let pieces = Maker::new(bounded, stations).make(problem, &interior.x);
         let audit = Audit::new(bounded, &pieces);
         let total: f64 = pieces.joint.iter().map(|piece| piece.duration).sum();
-        let duration = total * audit.stretch();
+        let duration = total * audit.stretch;
         Self {
             pieces,
             audit,
-            iterations,
+            iterations: interior.iterations,
             cells: problem.cells(),
-            x,
             duration,
         }
     }
@@ -55,32 +54,39 @@ impl<const N: usize> Draft<N> {
 /// The fastest law found over `grid` once it is stretched to meet every bound.
 pub(super) fn best<P: Path<N>, const N: usize>(
     bounded: Bounded<'_, P, N>,
-    grid: &Grid,
+    stations: &Stations<'_, N>,
 ) -> Result<Draft<N>, TimingError> {
-    let mut problem = bounded.problem(grid);
+    let mut problem = bounded.problem(stations);
     if problem.moving {
-        return super::moving::best(bounded, grid, problem);
+        return super::moving::best(bounded, stations, problem);
     }
-    let mut interior = Interior::new(&problem, vec![1.0; problem.cells() + 2]);
-    interior.solve(bounded.options.gap, 0.3, MOST_STEPS);
-    let (x, mut iterations) = (interior.x, interior.iterations);
-    let mut best = Draft::new(bounded, (grid, &problem), x, iterations);
-    let mut last = best.clone();
+    let gap = bounded.options.gap;
+    let mut interior = Interior::new(&problem);
+    interior.slow_down(&problem);
+    interior.solve(&problem, gap, 0.3, MOST_STEPS);
+    let mut last = Draft::new(bounded, (stations, &problem), &interior);
+    let mut best = None;
     for _ in 0..ROUNDS {
-        if last.audit.stretch() < ENOUGH {
+        if last.audit.stretch < ENOUGH {
             break;
         }
         tighten(&mut problem, &last, 1.0);
-        let mut interior = Interior::new(&problem, last.x);
-        interior.solve(bounded.options.gap, 0.02, FEW_STEPS);
-        iterations += interior.iterations;
-        last = Draft::new(bounded, (grid, &problem), interior.x, iterations);
-        if last.duration < best.duration {
-            best = last.clone();
-        }
+        best = Some(faster(best, last));
+        interior.slow_down(&problem);
+        interior.solve(&problem, gap, 0.02, FEW_STEPS);
+        last = Draft::new(bounded, (stations, &problem), &interior);
     }
-    best.iterations = iterations;
+    let mut best = faster(best, last);
+    best.iterations = interior.iterations;
     Ok(best)
+}
+
+/// The faster of two drafts, the first when they are even.
+fn faster<const N: usize>(first: Option<Draft<N>>, second: Draft<N>) -> Draft<N> {
+    match first {
+        Some(first) if first.duration <= second.duration => first,
+        _ => second,
+    }
 }
 
 /// Divides the limits that pieces exceed by their excess and `more`, in the cells of these pieces.
@@ -90,7 +96,7 @@ pub(super) fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>, m
     let mut excess = vec![1.0_f64; count];
     for (row, cell) in draft.audit.ratios.chunks(columns).zip(&draft.pieces.cell) {
         for (most, ratio) in excess[cell * columns..].iter_mut().zip(row) {
-            *most = most.max(*ratio);
+            *most = if *ratio > *most { *ratio } else { *most };
         }
     }
     let tools = Tools::new(&draft.audit.limits);
@@ -124,43 +130,46 @@ impl Tools {
 
 /// Scales the rows of one limit in cell `k`.
 fn scale(problem: &mut Problem, (k, tools): (usize, &Tools), limit: Limit, factor: f64) {
-    let values = 2 * k..2 * k + 3;
-    let places = problem.jerk_places[k]..problem.jerk_places[k + 1];
-    let (norm_values, norm_places) = (problem.norm_accelerations(), problem.norm_jerks());
+    let ends = [(k, false), (k, true), (k + 1, false)];
+    let values = ends.map(|(k, middle)| (Problem::value_slot(k, middle), k % LANE));
+    let (jerks, l) = (problem.jerk_slots(k), k % LANE);
+    let (joints, tool_jerks) = (problem.joints, problem.tool_jerks);
     match limit {
         Limit::JointAcceleration(j) => {
-            let (group, l) = (j / super::lanes::LANE, j % super::lanes::LANE);
-            for i in values {
-                let rows = &mut problem.acceleration[i * problem.lanes + group];
-                rows.iter_mut().for_each(|row| row[l] *= factor);
+            for (slot, l) in values {
+                widen(&mut problem.acceleration[slot * joints + j], l, factor);
             }
         }
         Limit::JointJerk(j) => {
-            let (group, l) = (j / super::lanes::LANE, j % super::lanes::LANE);
-            for i in places {
-                let rows = &mut problem.jerk[i * problem.lanes + group];
-                rows.iter_mut().for_each(|row| row[l] *= factor);
+            for slot in jerks {
+                widen(&mut problem.jerk[slot * joints + j], l, factor);
             }
         }
         Limit::ToolAcceleration | Limit::AngularAcceleration => {
             let second = limit == Limit::AngularAcceleration && tools.linear_acceleration;
-            for i in values {
-                let row = &mut problem.norm_acceleration[i * norm_values + usize::from(second)];
-                row.iter_mut().for_each(|x| *x *= factor);
+            for (slot, l) in values {
+                let row = slot * problem.tool_accelerations + usize::from(second);
+                let vectors = &mut problem.norm_acceleration[row];
+                vectors.iter_mut().for_each(|x| widen(x, l, factor));
             }
         }
         Limit::ToolJerk | Limit::AngularJerk => {
             let second = limit == Limit::AngularJerk && tools.linear_jerk;
-            for i in places {
-                let row = &mut problem.norm_jerk[i * norm_places + usize::from(second)];
-                row.iter_mut().for_each(|x| *x *= factor);
+            for slot in jerks {
+                let vectors = &mut problem.norm_jerk[slot * tool_jerks + usize::from(second)];
+                vectors.iter_mut().for_each(|x| widen(x, l, factor));
             }
         }
         _ => {
             debug_assert_eq!(audit::order(limit), 1);
-            problem.cap[values]
-                .iter_mut()
-                .for_each(|cap| *cap *= factor * factor);
+            for (slot, l) in values {
+                problem.value[slot / 2][slot % 2][1][l] *= factor * factor;
+            }
         }
     }
+}
+
+/// Scales the numbers of one cell in a row.
+fn widen(row: &mut [Lane], l: usize, factor: f64) {
+    row.iter_mut().for_each(|lane| lane[l] *= factor);
 }

@@ -3,6 +3,7 @@
 use super::band::Band;
 use super::basis::{FIRST, SECOND, THIRD, weights};
 use super::problem::{Point, Problem, Room, part, sample_weights, square};
+use crate::wide::{Four, Op, Wide};
 
 /// Gradient and Hessian of the barrier: a band for the control points, one
 /// border column for `z`. `B` is `5 D` and the spare diagonals of [`Band`].
@@ -145,12 +146,12 @@ impl<const D: usize, const B: usize> System<D, B> {
         self.band.clear();
         self.sides.fill([0.0; 2]);
         (self.gradient_z, self.hessian_z) = (t, 0.0);
-        for g in 0..Problem::<D>::GROUPS {
-            self.limits(problem, point, room, g);
-            if problem.groups[g].width.is_finite() {
-                self.corridor(problem, point, room, g);
-            }
-        }
+        Wide::detect().run(Norms {
+            system: self,
+            problem,
+            point,
+            room,
+        });
         self.balls(problem, point, room);
         self.solve()
     }
@@ -190,26 +191,33 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 
     /// Speed, acceleration and jerk of one group.
-    fn limits(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
+    #[inline(always)]
+    fn limits<S: Four>(
+        &mut self,
+        simd: S,
+        (problem, point, room): (&Problem<D>, &Point<D>, &Room),
+        g: usize,
+    ) {
         let pinned = problem.pinned(point.z);
         let last = point.control.len() - 1;
         let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room));
         for k in 0..last {
-            self.norm(point, &pinned, (k, &FIRST, g), &caps[0]);
+            self.norm(simd, (point, &pinned), (k, &FIRST, g), &caps[0]);
             if k + 2 <= last {
-                self.norm(point, &pinned, (k, &SECOND, g), &caps[1]);
+                self.norm(simd, (point, &pinned), (k, &SECOND, g), &caps[1]);
             }
             if k + 3 <= last {
-                self.norm(point, &pinned, (k, &THIRD, g), &caps[2]);
+                self.norm(simd, (point, &pinned), (k, &THIRD, g), &caps[2]);
             }
         }
     }
 
     /// One term `-log(R(z)^2 - |y|^2)`, `y` a difference of control points.
-    fn norm<const M: usize>(
+    #[inline(always)]
+    fn norm<S: Four, const M: usize>(
         &mut self,
-        point: &Point<D>,
-        pinned: &[[[f64; D]; 2]; 4],
+        simd: S,
+        (point, pinned): (&Point<D>, &[[[f64; D]; 2]; 4]),
         (first, w, g): (usize, &[f64; M], usize),
         [r, r1, r2]: &[f64; 3],
     ) {
@@ -236,11 +244,17 @@ impl<const D: usize, const B: usize> System<D, B> {
                 border[d] += bent;
             }
         }
-        self.add((first, w, g), &gradient, &border, &hessian);
+        self.add(simd, (first, w, g), [&gradient, &border], &hessian);
     }
 
     /// Corridor samples of one group.
-    fn corridor(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room, g: usize) {
+    #[inline(always)]
+    fn corridor<S: Four>(
+        &mut self,
+        simd: S,
+        (problem, point, room): (&Problem<D>, &Point<D>, &Room),
+        g: usize,
+    ) {
         for k in 0..point.samples() {
             let foot = problem.nearest(&point.sample(k, g), room.legs[k], g);
             let (y, slide) = (foot.offset, problem.slide(&foot, g));
@@ -254,18 +268,23 @@ impl<const D: usize, const B: usize> System<D, B> {
                 }
             }
             let (first, w) = sample_weights(k);
-            self.add((first, w, g), &gradient, &[0.0; 3], &hessian);
+            self.add(simd, (first, w, g), [&gradient, &[0.0; 3]], &hessian);
         }
     }
 
     /// Adds a term in the weighted sum of consecutive control points.
-    fn add<const M: usize>(
+    #[inline(always)]
+    fn add<S: Four, const M: usize>(
         &mut self,
+        simd: S,
         (first, w, g): (usize, &[f64; M], usize),
-        gradient: &[f64; 3],
-        border: &[f64; 3],
-        hessian: &[[f64; 3]; 3],
+        [gradient, border]: [&[f64; 3]; 2],
+        h: &[[f64; 3]; 3],
     ) {
+        // Columns of the symmetric block, whole and from the diagonal on.
+        let whole = [0, 1, 2].map(|b| simd.load(&[h[b][0], h[b][1], h[b][2], 0.0]));
+        let second = simd.load(&[h[1][1], h[1][2], 0.0, 0.0]);
+        let lower = [whole[0], second, simd.load(&[h[2][2], 0.0, 0.0, 0.0])];
         let free = self.sides.len() / D;
         for i in 0..M {
             if first + i < 4 || first + i - 4 >= free || w[i] == 0.0 {
@@ -280,12 +299,13 @@ impl<const D: usize, const B: usize> System<D, B> {
                 if first + j < 4 {
                     continue;
                 }
-                let (back, both) = ((i - j) * D, w[i] * w[j]);
+                let (back, both) = ((i - j) * D, simd.splat(w[i] * w[j]));
+                let block = if i == j { &lower } else { &whole };
                 let columns = &mut self.band.columns[row - back..row - back + 3];
                 for (b, column) in columns.iter_mut().enumerate() {
-                    for a in (if i == j { b } else { 0 })..3 {
-                        column[back + a - b] += both * hessian[a][b];
-                    }
+                    let to = &mut column[back.saturating_sub(b)..];
+                    let sum = simd.add(simd.load(to), simd.mul(both, block[b]));
+                    simd.store(sum, to);
                 }
             }
         }
@@ -359,7 +379,31 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 }
 
+/// The terms of limits and corridors of a system.
+struct Norms<'a, const D: usize, const B: usize> {
+    system: &'a mut System<D, B>,
+    problem: &'a Problem<D>,
+    point: &'a Point<D>,
+    room: &'a Room,
+}
+
+impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) {
+        let at = (self.problem, self.point, self.room);
+        for g in 0..Problem::<D>::GROUPS {
+            self.system.limits(simd, at, g);
+            if self.problem.groups[g].width.is_finite() {
+                self.system.corridor(simd, at, g);
+            }
+        }
+    }
+}
+
 /// `diagonal I + scale y y^T`.
+#[inline(always)]
 fn outer(y: &[f64; 3], diagonal: f64, scale: f64) -> [[f64; 3]; 3] {
     let mut result = [[0.0; 3]; 3];
     for a in 0..3 {

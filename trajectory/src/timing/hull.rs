@@ -1,0 +1,152 @@
+//! Hulls of the derivatives of a piece, all joints at once.
+
+use nalgebra::SVector;
+use realtime::Piece;
+
+use super::lanes::{Wave, groups};
+use crate::wide::{Four, Op};
+
+/// Ratios below this need no better bound than the hull: no such piece decides anything.
+pub(super) const FLOOR: f64 = 0.9;
+/// A hull that is so near to a ratio that is reached is exact enough.
+pub(super) const TOLERANCE: f64 = 1e-7;
+
+/// Of one derivative of each joint over a piece, over its limit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hull<const N: usize> {
+    /// The largest magnitude of its Bernstein points, which bounds it all along.
+    pub most: [f64; N],
+    /// By how much that is more than what is reached at the ends.
+    pub over: [f64; N],
+    /// Whether for some joint the bound may be too high by more than the tolerance, above the
+    /// floor.
+    pub loose: bool,
+}
+
+/// The hulls of velocity, acceleration and jerk over a piece, times `narrow`: one over each limit.
+///
+/// # Source
+/// Convex hull property of the Bernstein form (Farin, Curves and Surfaces for CAGD, 2002,
+/// chapter 5).
+pub(super) struct Hulls<'a, const N: usize> {
+    pub piece: &'a Piece<N>,
+    pub narrow: &'a [SVector<f64, N>; 3],
+}
+
+impl<const N: usize> Op for Hulls<'_, N> {
+    type Output = [Hull<N>; 3];
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> [Hull<N>; 3] {
+        let mut hulls = [Hull {
+            most: [0.0; N],
+            over: [0.0; N],
+            loose: false,
+        }; 3];
+        let [velocity, acceleration, jerk] = &mut hulls;
+        let [n1, n2, n3] = self.narrow;
+        let [_, c1, c2, c3, c4, c5] = &self.piece.coefficients;
+        let t = Wave::splat(simd, self.piece.duration);
+        let t2 = t * t;
+        let (t3, t4) = (t2 * t, t2 * t2);
+        for at in groups(N) {
+            let (c1, c2) = (
+                Wave::some(simd, c1.as_slice(), at),
+                Wave::some(simd, c2.as_slice(), at),
+            );
+            let (c3, c4, c5) = (
+                Wave::some(simd, c3.as_slice(), at),
+                Wave::some(simd, c4.as_slice(), at),
+                Wave::some(simd, c5.as_slice(), at),
+            );
+            let (a, b, c) = (c2 * t, c3 * t2, c4 * t3);
+            let near = c1 + a + b * 0.5;
+            let far = c1 + (a + b) * 1.5 + c;
+            let last = c1 + a * 2.0 + b * 3.0 + c * 4.0 + c5 * t4 * 5.0;
+            velocity.take(n1, at, [c1, c1 + a * 0.5, near, far, last]);
+            let (a, b, c) = (c2 * 2.0, c3 * t * 2.0, c4 * t2 * 4.0);
+            let last = a + b * 3.0 + c * 3.0 + c5 * t3 * 20.0;
+            acceleration.take(n2, at, [a, a + b, a + b * 2.0 + c, last]);
+            let (a, b) = (c3 * 6.0, c4 * t * 12.0);
+            jerk.take(n3, at, [a, a + b, a + b * 2.0 + c5 * t2 * 60.0]);
+        }
+        hulls
+    }
+}
+
+impl<const N: usize> Hull<N> {
+    /// Takes in the Bernstein points of the joints from `at` on.
+    #[inline(always)]
+    fn take<S: Four, const M: usize>(
+        &mut self,
+        narrow: &SVector<f64, N>,
+        at: usize,
+        points: [Wave<S>; M],
+    ) {
+        let simd = points[0].simd();
+        let narrow = Wave::some(simd, narrow.as_slice(), at);
+        let ends = points[0].abs().max(points[M - 1].abs());
+        let mut most = ends;
+        for point in &points[1..M - 1] {
+            most = point.abs().max(most);
+        }
+        let (most, over) = (most * narrow, (most - ends) * narrow);
+        most.put(&mut self.most, at);
+        over.put(&mut self.over, at);
+        let below = Wave::splat(simd, FLOOR) - most;
+        let exact = Wave::splat(simd, TOLERANCE) - over;
+        self.loose |= below.max(exact).least() < 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wide::Wide;
+
+    /// Against the derivatives at many places: bounded everywhere, met at the ends; the same in
+    /// both builds, for more and fewer joints than a register holds.
+    fn bounds<const N: usize>() {
+        let coefficients = [0.3, -2.0, 1.0, 4.0, -3.0, 1.5]
+            .map(|c| SVector::<f64, N>::from_fn(|j, _| c * (1.0 + 0.3 * j as f64).sin()));
+        let piece = Piece {
+            duration: 0.7,
+            coefficients,
+        };
+        let narrow = [0.5, 0.1, 0.02].map(SVector::repeat);
+        let hulls = |wide: Wide| {
+            wide.run(Hulls {
+                piece: &piece,
+                narrow: &narrow,
+            })
+        };
+        let (hulls, plain) = (hulls(Wide::detect()), hulls(Wide::plain()));
+        let samples = (0..=1000).map(|i| piece.sample(0.7 * f64::from(i) / 1000.0));
+        let samples: Vec<_> = samples
+            .map(|s| [s.velocity, s.acceleration, s.jerk])
+            .collect();
+        for order in 0..3 {
+            let (hull, plain) = (&hulls[order], &plain[order]);
+            assert_eq!((hull.most, hull.over), (plain.most, plain.over));
+            let mut loose = false;
+            for j in 0..N {
+                let ratio = |i: usize| (samples[i][order][j] * narrow[order][j]).abs();
+                let most = (0..=1000).map(ratio).fold(0.0, f64::max);
+                let ends = ratio(0).max(ratio(1000));
+                assert!(most <= hull.most[j] * (1.0 + 1e-12));
+                assert!((hull.most[j] - hull.over[j] - ends).abs() < 1e-12 * (1.0 + ends));
+                loose |= hull.most[j] > FLOOR && hull.over[j] > TOLERANCE;
+            }
+            assert_eq!((hull.loose, plain.loose), (loose, loose));
+        }
+    }
+
+    #[test]
+    fn hulls_bound_every_joint() {
+        bounds::<1>();
+        bounds::<3>();
+        bounds::<4>();
+        bounds::<7>();
+        bounds::<9>();
+    }
+}

@@ -1,0 +1,140 @@
+//! The rows of a path and its limits at the places of a [`Problem`].
+
+use nalgebra::{SVector, Vector3};
+
+use super::grid::Bounded;
+use super::lanes::{LANE, Lane};
+use super::problem::Problem;
+use super::stations::{Station, Stations, ToolStation};
+use super::survey::{joint_ratio, speed_cap};
+use super::{Boundary, TimingOptions};
+use crate::{JointLimits, Path, ToolLimits};
+
+/// Limits as factors: what rows are multiplied by.
+struct Rows<'a, const N: usize> {
+    joint: &'a JointLimits<N>,
+    tool: &'a ToolLimits,
+    rate_cap: Option<f64>,
+    /// One over the acceleration limits of the joints.
+    acceleration: SVector<f64, N>,
+    /// One over their jerk limits.
+    jerk: SVector<f64, N>,
+}
+
+impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
+    /// The problem over the places of `stations`.
+    pub(super) fn problem(&self, stations: &Stations<'_, N>) -> Problem {
+        let tool = self.tool;
+        let finite = |limits: [f64; 2]| limits.iter().filter(|x| x.is_finite()).count();
+        let tools = [
+            finite([tool.acceleration, tool.angular_acceleration]),
+            finite([tool.jerk, tool.angular_jerk]),
+        ];
+        let TimingOptions { start, .. } = self.options;
+        let moving = matches!(start, Boundary::Moving { .. });
+        let nodes = &stations.grid.nodes;
+        let mut problem = Problem::new(nodes, N, tools, moving);
+        let rows = Rows {
+            joint: self.joint,
+            tool,
+            rate_cap: self.options.rate_cap,
+            acceleration: self.joint.acceleration.map(|x| 1.0 / x),
+            jerk: self.joint.jerk.map(|x| 1.0 / x),
+        };
+        let cells = problem.cells();
+        for k in 0..cells {
+            let (left, middle, right) = (stations.left(k), stations.middle(k), stations.right(k));
+            let [left_tool, middle_tool] = stations.tools(k);
+            let (left, middle) = ((left, left_tool), (middle, middle_tool));
+            rows.values(&mut problem, (k, false), left);
+            rows.values(&mut problem, (k, true), middle);
+            let slots = problem.jerk_slots(k);
+            let (first, last) = (slots.start, slots.end - 1);
+            rows.jerks(&mut problem, (k, first), left);
+            rows.jerks(&mut problem, (k, first + slots.len() / 2), middle);
+            rows.jerks(&mut problem, (k, last), (right, stations.tool_right(k)));
+            if problem.dense(k) {
+                for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
+                    let w = nodes[k] + share * problem.widths[k];
+                    let (joint, tool) = stations.grid.place(self.path, w, 0.0);
+                    rows.jerks(&mut problem, (k, slot), (&joint, tool));
+                }
+            }
+        }
+        let end = (stations.right(cells - 1), stations.tool_right(cells - 1));
+        rows.values(&mut problem, (cells, false), end);
+        problem
+    }
+}
+
+impl<const N: usize> Rows<'_, N> {
+    /// Sets the rows at an end or the middle of cell `k` that do not know the jerk.
+    fn values(
+        &self,
+        problem: &mut Problem,
+        (k, middle): (usize, bool),
+        (station, tool): (&Station<N>, ToolStation),
+    ) {
+        let (slot, l) = (Problem::value_slot(k, middle), k % LANE);
+        let [first, second, _] = &station.joint;
+        for (j, row) in problem.acceleration[slot * N..][..N].iter_mut().enumerate() {
+            let narrow = self.acceleration[j];
+            (row[0][l], row[1][l]) = (first[j] * narrow, second[j] * narrow);
+        }
+        let tools = [
+            (tool.linear, self.tool.acceleration),
+            (tool.angular, self.tool.angular_acceleration),
+        ];
+        let finite = tools.iter().filter(|(_, limit)| limit.is_finite());
+        let count = problem.tool_accelerations;
+        let rows = problem.norm_acceleration[slot * count..].iter_mut();
+        for (row, ([p, q, _], limit)) in rows.zip(finite) {
+            set(&mut row[0], l, p / *limit);
+            set(&mut row[1], l, q / *limit);
+        }
+        let speeds = [
+            joint_ratio(first, &self.joint.velocity),
+            tool.linear[0].norm(),
+            tool.angular[0].norm(),
+        ];
+        let rate = self.rate_cap.map_or(0.0, |cap| station.warp[1] / cap);
+        // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
+        problem.value[slot / 2][slot % 2][1][l] =
+            (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
+    }
+
+    /// Sets the jerk rows of cell `k` at a slot.
+    fn jerks(
+        &self,
+        problem: &mut Problem,
+        (k, slot): (usize, usize),
+        (station, tool): (&Station<N>, ToolStation),
+    ) {
+        let l = k % LANE;
+        let [first, second, third] = &station.joint;
+        for (j, row) in problem.jerk[slot * N..][..N].iter_mut().enumerate() {
+            let narrow = self.jerk[j];
+            row[0][l] = third[j] * narrow;
+            row[1][l] = 3.0 * second[j] * narrow;
+            row[2][l] = first[j] * narrow;
+        }
+        let tools = [
+            (tool.linear, self.tool.jerk),
+            (tool.angular, self.tool.angular_jerk),
+        ];
+        let finite = tools.iter().filter(|(_, limit)| limit.is_finite());
+        let rows = problem.norm_jerk[slot * problem.tool_jerks..].iter_mut();
+        for (row, ([p, q, r], limit)) in rows.zip(finite) {
+            set(&mut row[0], l, r / *limit);
+            set(&mut row[1], l, q * (3.0 / limit));
+            set(&mut row[2], l, p / *limit);
+        }
+    }
+}
+
+/// Sets the vector of one cell.
+fn set(to: &mut [Lane; 3], l: usize, vector: Vector3<f64>) {
+    for (lane, x) in to.iter_mut().zip(vector.iter()) {
+        lane[l] = *x;
+    }
+}

@@ -1,0 +1,156 @@
+//! How far a Newton step may go.
+
+use super::lanes::{LANE, Lane, Wave, combine, dot};
+use super::lines::{Jerks, Lines, Values};
+use super::problem::Problem;
+use super::state::{Norm, Row, Spots, State, vector};
+use crate::wide::{Four, Op};
+
+/// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stride {
+    pub primal: f64,
+    pub dual: f64,
+}
+
+/// The same for the cells of a block.
+#[derive(Clone, Copy)]
+struct Strides<S: Four> {
+    simd: S,
+    mu: Wave<S>,
+    primal: Wave<S>,
+    dual: Wave<S>,
+}
+
+impl<S: Four> Strides<S> {
+    /// Takes in a row that changes by `d`, and writes the step of its multiplier.
+    #[inline(always)]
+    fn row(&mut self, row: &mut Row, d: Wave<S>) {
+        let one = Wave::splat(self.simd, 1.0);
+        let (g, m) = (
+            Wave::load(self.simd, &row.g),
+            Wave::load(self.simd, &row.multiplier),
+        );
+        let gd = g * d;
+        let slack = one - g * g;
+        // One division for both reciprocals.
+        let both = (slack * m).inverse();
+        let inverse = both * m;
+        self.primal = ((gd + d).max(gd - d) * inverse).max(self.primal);
+        let change = (self.mu + (m + m) * gd) * inverse - m;
+        change.store(&mut row.change);
+        self.dual = (one - (change + m) * (both * slack)).max(self.dual);
+    }
+
+    /// Takes in a row bounded in norm that changes by `d`.
+    #[inline(always)]
+    fn norm(&mut self, row: &mut Norm, d: [Wave<S>; 3]) {
+        let one = Wave::splat(self.simd, 1.0);
+        let g = vector(self.simd, &row.g);
+        let m = Wave::load(self.simd, &row.multiplier);
+        let slack = one - dot(g, g);
+        let (half, square) = (dot(g, d), dot(d, d));
+        let inverse = slack.inverse();
+        // |g + t d| = 1, for 1 / t: slack r² - 2 half r - square = 0.
+        let ratio = (half + (half * half + slack * square).sqrt()) * inverse;
+        self.primal = ratio.max(self.primal);
+        let new = (self.mu + (m + m) * half) * inverse;
+        (new - m).store(&mut row.change);
+        self.dual = (one - new / m).max(self.dual);
+    }
+
+    /// Takes in a cap of `a`, which changes by `da`.
+    #[inline(always)]
+    fn value(&mut self, cap: &Lane, row: &mut Row, (a, da): (Wave<S>, Wave<S>)) {
+        let one = Wave::splat(self.simd, 1.0);
+        let d = Wave::load(self.simd, cap) * da;
+        let m = Wave::load(self.simd, &row.multiplier);
+        let inverse = (one - Wave::load(self.simd, &row.g)).inverse();
+        let fall = Wave::splat(self.simd, 0.0) - da / a;
+        self.primal = (d * inverse).max(fall).max(self.primal);
+        let new = (self.mu + m * d) * inverse;
+        (new - m).store(&mut row.change);
+        self.dual = (one - new / m).max(self.dual);
+    }
+
+    /// Takes in the rows of a slot of values.
+    #[inline(always)]
+    fn values(&mut self, slot: Values<'_>, d: Spots<S>) {
+        let simd = self.simd;
+        for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
+            self.row(row, Wave::load(simd, p) * d.b + Wave::load(simd, q) * d.a);
+        }
+        for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
+            self.norm(norm, d);
+        }
+    }
+
+    /// Takes in the rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
+    #[inline(always)]
+    fn jerks(&mut self, slot: Jerks<'_>, at: Spots<S>, d: Spots<S>) {
+        let simd = self.simd;
+        let root = at.a.sqrt();
+        let half = d.a * 0.5 / at.a;
+        let a = root * (d.a + half * at.a);
+        let b = root * (d.b + half * at.b);
+        let c = root * (d.c + half * at.c);
+        for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
+            let (x, y, z) = (
+                Wave::load(simd, x),
+                Wave::load(simd, y),
+                Wave::load(simd, z),
+            );
+            self.row(row, x * a + y * b + z * c);
+        }
+        for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
+            self.norm(norm, combine(line, [a, b, c]));
+        }
+    }
+}
+
+/// How far the law `x` may go along `step`; also computes the steps of the multipliers, for the
+/// centring `mu`. Jerk rows are taken by their tangents.
+pub(super) struct Measure<'a> {
+    pub problem: &'a Problem,
+    pub x: &'a [f64],
+    pub step: &'a [f64],
+    pub state: &'a mut State,
+    pub mu: f64,
+}
+
+impl Op for Measure<'_> {
+    type Output = Stride;
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> Stride {
+        let least = Wave::splat(simd, 1e-9);
+        let mut strides = Strides {
+            simd,
+            mu: Wave::splat(simd, self.mu),
+            primal: least,
+            dual: least,
+        };
+        let (mut lines, blocks) = Lines::all(self.problem, self.state);
+        for (i, (basis, value, cap)) in blocks.enumerate() {
+            let left = Spots::left(simd, basis, &self.x[LANE * i..]);
+            let change = Spots::left(simd, basis, &self.step[LANE * i..]);
+            let width = Wave::load(simd, &basis.width);
+            let half = width * 0.5;
+            let (middle, further) = (left.moved(half), change.moved(half));
+            strides.value(&value[0][1], &mut cap[0], (left.a, change.a));
+            strides.value(&value[1][1], &mut cap[1], (middle.a, further.a));
+            strides.values(lines.values(), change);
+            strides.values(lines.values(), further);
+            for share in self.problem.jerk_shares(i) {
+                let x = width * *share;
+                strides.jerks(lines.jerks(), left.moved(x), change.moved(x));
+            }
+        }
+        Stride {
+            primal: strides.primal.largest(),
+            dual: strides.dual.largest(),
+        }
+    }
+}
