@@ -84,10 +84,9 @@ impl<const N: usize> Op for Descent<'_, N> {
                     q: seed,
                     position: miss.position,
                     rotation: miss.rotation,
-                    reached: false,
+                    reached: miss.position <= stop.position && miss.rotation <= stop.rotation,
                 };
-                if miss.position <= stop.position && miss.rotation <= stop.rotation {
-                    best.reached = true;
+                if best.reached {
                     return best;
                 }
             }

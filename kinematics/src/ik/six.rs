@@ -13,7 +13,7 @@
 
 use super::frames::Frames;
 use super::lanes::Held;
-use super::product::{Columns, Product, inverse};
+use super::product::{Columns, Padded, Product, inverse, padded};
 use super::solving::Solving;
 use crate::arith::Arith;
 use crate::links::{Line, foot};
@@ -47,8 +47,9 @@ pub(crate) struct Six {
     /// Squared relative miss that counts as rounding; large for approximate shapes.
     pub(super) slack: f64,
     pub(super) frames: Frames,
-    /// What the product of turns is multiplied with on either side.
-    sides: [Columns; 2],
+    /// What the product of turns is multiplied with from the left and from the right.
+    left: Padded,
+    right: Columns,
     /// Where joint positions are found in angles of the frames: `sign * angle + offset`.
     signs: [f64; 6],
     offsets: [f64; 6],
@@ -100,7 +101,7 @@ impl Six {
         for i in 0..6 {
             offsets[i] = -signs[i] * frames.zero[i];
         }
-        let sides = if reversed {
+        let [left, right] = if reversed {
             [inverse(&frames.last), inverse(&frames.back)]
         } else {
             [frames.back, frames.last]
@@ -117,7 +118,8 @@ impl Six {
             reversed,
             slack,
             frames,
-            sides,
+            left: padded(&left),
+            right,
             signs,
             offsets,
             links,
@@ -127,7 +129,7 @@ impl Six {
 
     /// What the product of turns is to be multiplied with from the right.
     pub(crate) fn right(&self) -> &Columns {
-        &self.sides[1]
+        &self.right
     }
 
     /// Which joints those of the frames are.
@@ -145,7 +147,7 @@ impl Six {
     /// for joints that a singular pose leaves free.
     #[inline(always)]
     pub(crate) fn solve<A: Arith>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
-        let mut seen = product.seen_from(&self.sides[0]);
+        let mut seen = product.seen_from(&self.left);
         if self.reversed {
             seen = inverse(&seen);
         }
