@@ -288,7 +288,7 @@ fn tick<const N: usize>(name: &str, solver: &Solver<N>) -> f64 {
         let lot = || {
             let begin = Instant::now();
             for _ in 0..16 {
-                let _ = black_box(solver.nearest(black_box(&next), black_box(&q)));
+                let _ = black_box(&solver.nearest(black_box(&next), black_box(&q)));
             }
             begin.elapsed().as_secs_f64() * 1e9 / 16.0
         };

@@ -6,7 +6,8 @@
 //! Everything that a dispatched function calls must be inlined into it, or it
 //! falls back to the plain instruction set.
 
-use crate::wide::{F4, Four};
+use crate::four::Four;
+use crate::wide::F4;
 
 /// Multiply and add, fused or not, one number or four at a time.
 pub(crate) trait Arith: Four {
@@ -140,56 +141,60 @@ impl V4 {
     }
 }
 
-/// Sine and cosine of several angles at once, within 2e-16 of the exact ones.
+/// Sine and cosine of several angles at once, see [`sin_cos_of`].
+#[inline(always)]
+pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
+    for first in (0..N).step_by(4) {
+        let mut four = [0.0; 4];
+        let count = (N - first).min(4);
+        four[..count].copy_from_slice(&angles[first..first + count]);
+        let (s, c) = sin_cos_of(F4::new(a, four));
+        let (s, c) = (s.array(), c.array());
+        sin[first..first + count].copy_from_slice(&s[..count]);
+        cos[first..first + count].copy_from_slice(&c[..count]);
+    }
+    (sin, cos)
+}
+
+/// Sine and cosine of four angles (rad), within 2e-16 of the exact ones.
 ///
 /// # Source
 /// S. L. Moshier, Cephes Mathematical Library, 1989: reduction by pi/2 in three
 /// parts, minimax polynomials on [-pi/4, pi/4].
 #[inline(always)]
-pub(crate) fn sin_cos<A: Arith, const N: usize>(a: A, angles: [f64; N]) -> ([f64; N], [f64; N]) {
+pub(crate) fn sin_cos_of<A: Arith>(angles: F4<A>) -> (F4<A>, F4<A>) {
     const FAR: f64 = 1e6;
-    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-    let mut near = true;
-    for first in (0..N).step_by(4) {
-        let mut four = [0.0; 4];
-        let count = (N - first).min(4);
-        four[..count].copy_from_slice(&angles[first..first + count]);
-        let four = F4::new(a, four);
-        near &= four.abs().le(F4::splat(a, FAR)).bits() == 15;
-        let (s, c) = sin_cos_of(four);
-        let (s, c) = (s.array(), c.array());
-        sin[first..first + count].copy_from_slice(&s[..count]);
-        cos[first..first + count].copy_from_slice(&c[..count]);
+    let a = angles.build();
+    if angles.abs().le(F4::splat(a, FAR)).bits() == 15 {
+        return near_sin_cos_of(angles);
     }
-    if !near {
-        for i in 0..N {
-            (sin[i], cos[i]) = angles[i].sin_cos();
-        }
-    }
-    (sin, cos)
+    let far = far_sin_cos_of(angles.array());
+    (F4::new(a, far.0), F4::new(a, far.1))
+}
+
+/// Sine and cosine of angles for which the reduction has not enough figures.
+#[cold]
+fn far_sin_cos_of(angles: [f64; 4]) -> ([f64; 4], [f64; 4]) {
+    (angles.map(f64::sin), angles.map(f64::cos))
 }
 
 /// Sine and cosine of four angles below 1e6 rad.
 #[inline(always)]
-fn sin_cos_of<A: Arith>(angles: F4<A>) -> (F4<A>, F4<A>) {
+fn near_sin_cos_of<A: Arith>(angles: F4<A>) -> (F4<A>, F4<A>) {
     const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to an integer
     let a = angles.build();
     let quarter = F4::splat(a, std::f64::consts::FRAC_2_PI);
-    let turns = angles.fma(quarter, F4::splat(a, MAGIC)) - F4::splat(a, MAGIC);
+    let count = angles.fma(quarter, F4::splat(a, MAGIC));
+    let turns = count - F4::splat(a, MAGIC);
     let mut x = turns.taken_from(F4::splat(a, 1.570_796_251_296_997), angles);
     x = turns.taken_from(F4::splat(a, 7.549_789_415_861_596e-8), x);
     x = turns.taken_from(F4::splat(a, 5.390_302_858_158_119e-15), x);
     let (s, c) = sin_cos_core(x);
-    // The quadrant is 0 to 3; odd ones swap sine and cosine.
-    let quadrant = (turns * 0.25).floor().taken_from(F4::splat(a, 4.0), turns);
-    let even = ((quadrant * 0.5).floor() * 2.0 - quadrant)
-        .abs()
-        .le(F4::splat(a, 0.5));
-    let (sin, cos) = (even.select(s, c), even.select(c, s));
-    let upper = quadrant.le(F4::splat(a, 1.5));
-    let right = (quadrant - F4::splat(a, 1.5)).abs();
-    let right = right.le(F4::splat(a, 1.0));
-    (upper.select(sin, -sin), right.select(-cos, cos))
+    // Odd quarter turns swap sine and cosine; the second bit is half a turn.
+    let (odd, half) = (count.bit::<63>(), count.bit::<62>());
+    let (sin, cos) = (odd.select(c, s), odd.select(s, c));
+    (half.select(-sin, sin), (odd ^ half).select(-cos, cos))
 }
 
 /// Both polynomials for `|x| <= pi/4`.

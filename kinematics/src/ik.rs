@@ -19,9 +19,9 @@ pub use goal::Goal;
 pub(crate) use goal::{LENGTH, Miss};
 pub(crate) use numeric::restart;
 pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
-pub(crate) use six::Line;
 
 use crate::chain::Chain;
+use crate::frame::Frame;
 use crate::measure;
 use closed::{Branching, Closed, Raw};
 use goal::Target;
@@ -315,8 +315,8 @@ impl<const N: usize> Solver<N> {
 
     /// Distance of the tool from a goal at `q`, and the Jacobian there.
     pub(crate) fn miss_at(&self, goal: &Goal, q: &SVector<f64, N>) -> (Miss, SMatrix<f64, 6, N>) {
-        let chain = &self.chain;
-        let (tool, jacobian) = chain.build().run(crate::chain::Jacobian { chain, q });
+        let (tool, jacobian) = self.chain.jacobian(q);
+        let tool = Frame::from_isometry(&tool);
         (goal.target().miss(crate::arith::Plain, &tool), jacobian)
     }
 

@@ -16,7 +16,10 @@
 mod arith;
 pub mod chain;
 pub mod follow;
+mod four;
+mod frame;
 pub mod ik;
+mod links;
 pub mod measure;
 pub mod reach;
 pub mod urdf;

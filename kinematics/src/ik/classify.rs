@@ -1,7 +1,8 @@
 //! Which closed form an arm has, from its axes at q = 0.
 
-use super::six::{Line, Placing, Shape, Six};
+use super::six::{Placing, Shape, Six};
 use super::swivel::Swivel;
+use crate::links::Line;
 use nalgebra::Vector3;
 
 /// How far the axes may be from a family's structure.

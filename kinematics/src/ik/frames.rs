@@ -10,7 +10,7 @@
 //! that nothing grows large where axes are nearly parallel.
 
 use super::product::Columns;
-use super::six::Line;
+use crate::links::{Line, normal};
 use nalgebra::Vector3;
 
 /// From one axis to the next: a shift (m), then a turn about x by sine and cosine.
@@ -62,27 +62,4 @@ impl Frames {
             zero,
         }
     }
-}
-
-/// The direction square to two axes about which the first turns into the second; along the
-/// way between them where they are parallel.
-fn normal(from: &Vector3<f64>, to: &Vector3<f64>, way: &Vector3<f64>) -> Vector3<f64> {
-    let cross = from.cross(to);
-    if cross.norm() > PARALLEL {
-        return cross.normalize();
-    }
-    let side = way - from * from.dot(way);
-    if side.norm() > 1e-9 {
-        return side.normalize();
-    }
-    Vector3::from(super::six::across((*from).into()))
-}
-
-/// Sine below which two axes are parallel to rounding.
-const PARALLEL: f64 = 1e-13;
-
-/// The point of an axis that is nearest to `point`.
-pub(crate) fn foot(line: &Line, point: &Vector3<f64>) -> Vector3<f64> {
-    let (h, p) = (Vector3::from(line.h), Vector3::from(line.p));
-    p + h * h.dot(&(point - p))
 }

@@ -1,9 +1,9 @@
 //! What the tool is to reach, and how far it is from it.
 
 use crate::arith::{Arith, V4};
-use crate::chain::Frame;
+use crate::frame::Frame;
 use crate::wide::F4;
-use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 /// Length that counts as much as one radian, m.
 pub(crate) const LENGTH: f64 = 0.3;
@@ -52,7 +52,7 @@ impl Goal {
                 Kind::Position,
             ),
             Self::Axis(point, axis) => {
-                let turn = crate::chain::z_to(axis);
+                let turn = z_to(axis);
                 (Isometry3::from_parts(point.coords.into(), turn), Kind::Axis)
             }
         };
@@ -105,6 +105,13 @@ impl Target {
             }
         }
     }
+}
+
+/// A rotation that takes z to `axis`.
+fn z_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), axis).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    })
 }
 
 /// Rotation vector, in base axes, that turns frame `from` into frame `to`.

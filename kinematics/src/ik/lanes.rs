@@ -274,11 +274,29 @@ pub(crate) fn angles_of<A: Arith>([x, y, z]: [Angle<A>; 3]) -> [F4<A>; 3] {
     [angle_of(x), angle_of(y), angle_of(z)]
 }
 
+/// Coefficients of the arc tangent, see [`angle_of`].
+const ARC: [f64; 10] = [
+    -0.333_333_333_333_332_5,
+    0.199_999_999_998_984_07,
+    -0.142_857_142_660_966_2,
+    0.111_111_096_365_343_53,
+    -0.090_908_525_571_757_48,
+    0.076_910_551_583_877_16,
+    -0.066_496_136_952_342_56,
+    0.057_363_321_655_555_98,
+    -0.044_833_346_211_129_645,
+    0.022_750_526_977_488_576,
+];
+
 /// Angles from their sines and cosines, in (-pi, pi].
 ///
+/// After reduction at tan(pi/8) the arc tangent is `t + t z P(z)` with `z = t^2`: one
+/// division in all. `P` interpolates at Chebyshev points of `z` up to tan(pi/8)^2; the
+/// error is 5.4e-17 rad before rounding.
+///
 /// # Source
-/// S. L. Moshier, Cephes Mathematical Library, 1989: arc tangent by a rational
-/// function after reduction at tan(pi/8).
+/// L. N. Trefethen, "Approximation Theory and Approximation Practice", 2013, chapter 8:
+/// how many terms are enough.
 #[inline(always)]
 pub(crate) fn angle_of<A: Arith>(angle: Angle<A>) -> F4<A> {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -293,16 +311,13 @@ pub(crate) fn angle_of<A: Arith>(angle: Angle<A>) -> F4<A> {
     let bottom = lower.select(high, low + high);
     let t = top / bottom;
     let z = t * t;
-    let mut p = number(-8.750_608_600_031_904e-1).fma(z, number(-1.615_753_718_733_365e1));
-    p = p.fma(z, number(-7.500_855_792_314_705e1));
-    p = p.fma(z, number(-1.228_866_684_490_136_1e2));
-    p = p.fma(z, number(-6.485_021_904_942_025e1));
-    let mut q = z + number(2.485_846_490_142_306_3e1);
-    q = q.fma(z, number(1.650_270_098_316_988_6e2));
-    q = q.fma(z, number(4.328_810_604_912_902_6e2));
-    q = q.fma(z, number(4.853_903_996_359_137e2));
-    q = q.fma(z, number(1.945_506_571_482_614e2));
-    let angle = (t * z).fma(p / q, t) + lower.select(zero, number(FRAC_PI_4));
+    // By pairs, so that few terms wait for each other.
+    let pair = |i: usize| z.fma(number(ARC[i + 1]), number(ARC[i]));
+    let (z2, z4) = (z * z, (z * z) * (z * z));
+    let low = z2.fma(pair(2), pair(0));
+    let high = z2.fma(pair(6), pair(4));
+    let p = z4.fma(z4.fma(pair(8), high), low);
+    let angle = (t * z).fma(p, t) + lower.select(zero, number(FRAC_PI_4));
     let angle = ay.le(ax).select(angle, number(FRAC_PI_2) - angle);
     let angle = zero.le(x).select(angle, number(PI) - angle);
     angle.signed(y)

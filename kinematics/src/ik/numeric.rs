@@ -74,7 +74,8 @@ impl<const N: usize> Op for Descent<'_, N> {
         let mut best_square = f64::INFINITY;
         let (mut mark, mut marked_at) = (f64::INFINITY, 0);
         for step in 0..=stop.steps {
-            let (tool, mut rows) = chain.jacobian_rows(a, &seed);
+            let reached = chain.reach(a, &seed);
+            let tool = reached.end.frame();
             let miss = target.miss(a, &tool);
             let square = miss.rows.iter().fold(0.0, |sum, e| a.fma(*e, *e, sum));
             if square < best_square {
@@ -83,10 +84,9 @@ impl<const N: usize> Op for Descent<'_, N> {
                     q: seed,
                     position: miss.position,
                     rotation: miss.rotation,
-                    reached: false,
+                    reached: miss.position <= stop.position && miss.rotation <= stop.rotation,
                 };
-                if miss.position <= stop.position && miss.rotation <= stop.rotation {
-                    best.reached = true;
+                if best.reached {
                     return best;
                 }
             }
@@ -95,6 +95,7 @@ impl<const N: usize> Op for Descent<'_, N> {
             } else if step - marked_at >= PATIENCE || !square.is_finite() {
                 break;
             }
+            let mut rows = chain.rows(&reached);
             target.shape(&tool, &mut rows);
             let mut rest = miss.rows;
             let damping = a.fma(0.03, square, 1e-12);

@@ -1,12 +1,20 @@
 //! The product of the turns of an arm's joints, as closed forms take it.
 
-use super::six::Line;
 use crate::arith::{self, Arith};
+use crate::links::Line;
 use crate::wide::F4;
 use nalgebra::Isometry3;
 
 /// Columns of a rotation, and a position.
 pub(crate) type Columns = [[f64; 3]; 4];
+
+/// The same with a zero behind each column, to be read as wide numbers.
+pub(crate) type Padded = [[f64; 4]; 4];
+
+/// Columns with a zero behind each.
+pub(crate) fn padded(columns: &Columns) -> Padded {
+    columns.map(|[x, y, z]| [x, y, z, 0.0])
+}
 
 /// A product of turns: the columns of a rotation and a translation, one wide number each.
 #[derive(Clone, Copy)]
@@ -76,8 +84,8 @@ impl<A: Arith> Product<A> {
 
     /// `left * self`.
     #[inline(always)]
-    pub(crate) fn seen_from(&self, left: &Columns) -> Columns {
-        let left = Self::new(self.build(), *left);
+    pub(crate) fn seen_from(&self, left: &Padded) -> Columns {
+        let left = Self(left.map(|column| F4::new(self.build(), column)));
         left.times(&self.columns()).columns()
     }
 

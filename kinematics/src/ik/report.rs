@@ -1,5 +1,6 @@
 //! Answers of the solver: solutions, or why there is none.
 
+use arrayvec::ArrayVec;
 use nalgebra::{Isometry3, SVector};
 use std::fmt;
 
@@ -17,30 +18,18 @@ pub struct Solution<const N: usize> {
 }
 
 /// The solutions of one pose, on the stack.
-#[derive(Clone, Copy, Debug)]
-pub struct Branches<const N: usize> {
-    items: [Solution<N>; MOST_BRANCHES],
-    count: usize,
-}
+#[derive(Clone, Debug)]
+pub struct Branches<const N: usize>(ArrayVec<Solution<N>, MOST_BRANCHES>);
 
 impl<const N: usize> Branches<N> {
     pub(crate) fn new() -> Self {
-        let none = Solution {
-            q: SVector::zeros(),
-            branch: None,
-        };
-        Self {
-            items: [none; MOST_BRANCHES],
-            count: 0,
-        }
+        Self(ArrayVec::new_const())
     }
 
     /// Adds a solution while there is room.
+    #[inline]
     pub(crate) fn push(&mut self, solution: Solution<N>) {
-        if let Some(place) = self.items.get_mut(self.count) {
-            *place = solution;
-            self.count += 1;
-        }
+        let _full = self.0.try_push(solution);
     }
 }
 
@@ -48,7 +37,7 @@ impl<const N: usize> std::ops::Deref for Branches<N> {
     type Target = [Solution<N>];
 
     fn deref(&self) -> &[Solution<N>] {
-        self.items.get(..self.count).unwrap_or(&[])
+        &self.0
     }
 }
 

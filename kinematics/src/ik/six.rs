@@ -11,20 +11,14 @@
 //! A. J. Elias and J. T. Wen, "IK-Geo: unified robot inverse kinematics using
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025, sections 4.1 and 4.3.
 
-use super::frames::{Frames, foot};
+use super::frames::Frames;
 use super::lanes::Held;
-use super::product::{Columns, Product, inverse};
+use super::product::{Columns, Padded, Product, inverse, padded};
 use super::solving::Solving;
 use crate::arith::Arith;
+use crate::links::{Line, foot};
 use crate::wide::{B4, F4};
 use nalgebra::Vector3;
-
-/// An axis at q = 0: its direction and a point on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line {
-    pub(crate) h: [f64; 3],
-    pub(crate) p: [f64; 3],
-}
 
 /// How the first three joints place the wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,8 +47,9 @@ pub(crate) struct Six {
     /// Squared relative miss that counts as rounding; large for approximate shapes.
     pub(super) slack: f64,
     pub(super) frames: Frames,
-    /// What the product of turns is multiplied with on either side.
-    sides: [Columns; 2],
+    /// What the product of turns is multiplied with from the left and from the right.
+    left: Padded,
+    right: Columns,
     /// Where joint positions are found in angles of the frames: `sign * angle + offset`.
     signs: [f64; 6],
     offsets: [f64; 6],
@@ -84,18 +79,6 @@ pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A unit vector at right angles to `h`.
-#[inline(always)]
-pub(crate) fn across(h: [f64; 3]) -> [f64; 3] {
-    let v = if h[0].abs() < 0.7 {
-        [0.0, h[2], -h[1]]
-    } else {
-        [-h[2], 0.0, h[0]]
-    };
-    let length = dot(v, v).sqrt();
-    [v[0] / length, v[1] / length, v[2] / length]
-}
-
 impl Six {
     /// The closed form of axes that have this shape exactly.
     pub(crate) fn new(mut lines: [Line; 6], shape: Shape, reversed: bool, slack: f64) -> Self {
@@ -118,7 +101,7 @@ impl Six {
         for i in 0..6 {
             offsets[i] = -signs[i] * frames.zero[i];
         }
-        let sides = if reversed {
+        let [left, right] = if reversed {
             [inverse(&frames.last), inverse(&frames.back)]
         } else {
             [frames.back, frames.last]
@@ -135,7 +118,8 @@ impl Six {
             reversed,
             slack,
             frames,
-            sides,
+            left: padded(&left),
+            right,
             signs,
             offsets,
             links,
@@ -145,7 +129,7 @@ impl Six {
 
     /// What the product of turns is to be multiplied with from the right.
     pub(crate) fn right(&self) -> &Columns {
-        &self.sides[1]
+        &self.right
     }
 
     /// Which joints those of the frames are.
@@ -163,7 +147,7 @@ impl Six {
     /// for joints that a singular pose leaves free.
     #[inline(always)]
     pub(crate) fn solve<A: Arith>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
-        let mut seen = product.seen_from(&self.sides[0]);
+        let mut seen = product.seen_from(&self.left);
         if self.reversed {
             seen = inverse(&seen);
         }

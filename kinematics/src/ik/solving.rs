@@ -14,6 +14,9 @@ type V3<A> = [F4<A>; 3];
 /// Squared length, relative, below which a direction says nothing.
 const FREE: f64 = 1e-50;
 
+/// Squared lengths this near to one are made one by a single step of Newton's method.
+const NEAR_ONE: f64 = 1e-8;
+
 /// One solution under way.
 pub(super) struct Solving<'a, A: Arith> {
     a: A,
@@ -76,6 +79,31 @@ impl<'a, A: Arith> Solving<'a, A> {
         self.or_held(angle, self.number(scale * FREE).le(square), joint)
     }
 
+    /// The same where the length is known to be `length` but for rounding, so that no root
+    /// has to be waited for; `real` tells where it must be right.
+    #[inline(always)]
+    fn turn_by(
+        &mut self,
+        [cos, sin]: [F4<A>; 2],
+        length: F4<A>,
+        (scale, real): (f64, B4<A>),
+        joint: usize,
+    ) -> Angle<A> {
+        let one = self.number(1.0);
+        let inverse = one / length;
+        let (c, s) = (cos * inverse, sin * inverse);
+        let over = c.fma(c, s.fma(s, -one));
+        let near = over.abs().le(self.number(NEAR_ONE));
+        if !near.bits() & real.bits() != 0 {
+            return self.turn([cos, sin], scale, joint);
+        }
+        let scale = over.taken_from(self.number(0.5), one);
+        Angle {
+            sin: s * scale,
+            cos: c * scale,
+        }
+    }
+
     /// Turns about axis 1 that bring a point, from where it is at the right height along
     /// axis 2, to where it is `seen`. Beside them the point seen from axis 2, and which exist.
     #[inline(always)]
@@ -135,16 +163,17 @@ impl<'a, A: Arith> Solving<'a, A> {
         (angle, real)
     }
 
-    /// Turns about axis 2 that bring the links, bent by `bend`, to a point in their plane.
+    /// Turns about axis 2 that bring the links, bent by `bend`, to a point in their plane;
+    /// `real` tells where they reach it.
     #[inline(always)]
-    fn lift(&mut self, [u, v]: [F4<A>; 2], bend: Angle<A>) -> Angle<A> {
+    fn lift(&mut self, [u, v]: [F4<A>; 2], bend: Angle<A>, real: B4<A>) -> Angle<A> {
         let [upper, fore] = self.six.links;
         let along = bend.cos.fma(self.number(fore), self.number(upper));
         let off = bend.sin * fore;
         let cos = u.fma(along, v * off);
         let sin = u.taken_from(off, v * along);
         let square = upper * upper + fore * fore;
-        self.turn([cos, sin], square * square, 1)
+        self.turn_by([cos, sin], u.fma(u, v * v), (square * square, real), 1)
     }
 
     /// A spherical wrist placed by two parallel axes.
@@ -157,7 +186,7 @@ impl<'a, A: Arith> Solving<'a, A> {
             sin: bend.sin * F4::new(self.a, SECOND),
             cos: bend.cos,
         };
-        let lift = self.lift(point, bend);
+        let lift = self.lift(point, bend, bends);
         let [sin, cos] = self.six.bend;
         let fore = Angle {
             sin: self.number(-sin),
@@ -197,7 +226,8 @@ impl<'a, A: Arith> Solving<'a, A> {
         let (px, py) = (self.number(p[0]), self.number(p[1]));
         let cos = px.fma(out[0], py * level);
         let sin = px.taken_from(level, py * out[0]);
-        let swing = self.turn([cos, sin], far * far, 0);
+        let across = self.number(p[0] * p[0] + p[1] * p[1]);
+        let swing = self.turn_by([cos, sin], across, (far * far, bends & lifts), 0);
         let [sin, cos] = self.six.bend;
         let twist = bend.plus(Angle {
             sin: self.number(-sin),
@@ -302,15 +332,25 @@ impl<'a, A: Arith> Solving<'a, A> {
         };
         let (mut tilt, real) = self.arc_with(cos, rest, zero, one);
         tilt.sin = tilt.sin * F4::new(self.a, sign);
-        // The last axis as the joint before axis 5 carries it.
-        let out = tilt.sin * fifth.sin;
-        let side = tilt.cos.taken_from(
-            self.number(fifth.sin * fourth.cos),
-            self.number(-fifth.cos * fourth.sin),
-        );
-        let cos = axis[0].fma(out, axis[1] * side);
-        let sin = axis[0].taken_from(side, axis[1] * out);
-        let swing = self.turn([cos, sin], 1.0, joints[0]);
+        let swing = if self.six.square {
+            // The last axis leans over by the tilt, right to where it is to point.
+            let unit = tilt.sin * (one / rest);
+            let angle = Angle {
+                sin: axis[1] * unit,
+                cos: axis[0] * unit,
+            };
+            self.or_held(angle, self.number(FREE.sqrt()).le(rest), joints[0])
+        } else {
+            // The last axis as the joint before axis 5 carries it.
+            let out = tilt.sin * fifth.sin;
+            let side = tilt.cos.taken_from(
+                self.number(fifth.sin * fourth.cos),
+                self.number(-fifth.cos * fourth.sin),
+            );
+            let cos = axis[0].fma(out, axis[1] * side);
+            let sin = axis[0].taken_from(side, axis[1] * out);
+            self.turn([cos, sin], 1.0, joints[0])
+        };
         let left = about_x(about_z(spin, swing), fourth.sin, fourth.cos);
         let [x, y, _] = about_x(about_z(left, tilt), fifth.sin, fifth.cos);
         ([swing, tilt, Angle { sin: y, cos: x }], real)
@@ -332,7 +372,8 @@ impl<'a, A: Arith> Solving<'a, A> {
         let u = sum.sin.fma(b, sum.cos.taken_from(a, u));
         let v = v - sum.sin.fma(a, sum.cos * b);
         let (bend, bends) = self.elbow([u, v]);
-        let (q2, r2) = (self.lift([u, v], bend), self.lift([u, v], bend.back()));
+        let q2 = self.lift([u, v], bend, bends);
+        let r2 = self.lift([u, v], bend.back(), bends);
         let (q1, [sum, q5, q6]) = (angle_of(swing), angles_of([sum, q5, q6]));
         let [q2, r2, q3] = angles_of([q2, r2, bend]);
         let real = real & tilts & bends;

@@ -7,8 +7,9 @@
 use super::lanes::{FIRST, Held, SECOND, Vec4, Wave, angle_of, angles_of};
 use super::orient::{orient, orient_both};
 use super::product::Product;
-use super::six::{Joints, Line, across, dot, minus};
+use super::six::{Joints, dot, minus};
 use crate::arith::{self, Arith};
+use crate::links::{Line, across};
 use crate::wide::F4;
 use nalgebra::{Rotation3, Unit, Vector3};
 

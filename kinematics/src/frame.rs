@@ -1,0 +1,218 @@
+//! A frame as numbers: the columns of its rotation and its origin.
+
+use crate::arith::{Arith, Plain, V4};
+use crate::wide::F4;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use std::ops::Mul;
+
+/// Columns of a rotation and a position.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    pub(crate) x: V4,
+    pub(crate) y: V4,
+    pub(crate) z: V4,
+    pub(crate) p: V4,
+}
+
+impl Frame {
+    pub(crate) fn from_isometry(pose: &Isometry3<f64>) -> Self {
+        let r = pose.rotation.to_rotation_matrix();
+        let column = |j: usize| V4::new(r[(0, j)], r[(1, j)], r[(2, j)]);
+        let t = &pose.translation.vector;
+        Self {
+            x: column(0),
+            y: column(1),
+            z: column(2),
+            p: V4::new(t.x, t.y, t.z),
+        }
+    }
+
+    /// The frame that this one is seen from, as this one sees it.
+    pub(crate) fn inverse(&self) -> Self {
+        let [x, y, z, p] = [self.x.0, self.y.0, self.z.0, self.p.0];
+        let along = |v: [f64; 4]| -(v[0] * p[0] + v[1] * p[1] + v[2] * p[2]);
+        Self {
+            x: V4::new(x[0], y[0], z[0]),
+            y: V4::new(x[1], y[1], z[1]),
+            z: V4::new(x[2], y[2], z[2]),
+            p: V4::new(along(x), along(y), along(z)),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn isometry(&self) -> Isometry3<f64> {
+        let [x, y, z, _] = self.p.0;
+        Isometry3::from_parts(Translation3::new(x, y, z), self.rotation())
+    }
+
+    /// The rotation as a quaternion.
+    ///
+    /// # Source
+    /// S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.
+    #[inline(always)]
+    fn rotation(&self) -> UnitQuaternion<f64> {
+        let [[xx, xy, xz, _], [yx, yy, yz, _], [zx, zy, zz, _]] = [self.x.0, self.y.0, self.z.0];
+        if xx + yy + zz <= 0.0 {
+            return self.far_rotation();
+        }
+        let real = 1.0 + xx + yy + zz;
+        let scale = 0.5 / real.sqrt();
+        let [i, j, k] = [yz - zy, zx - xz, xy - yx].map(|x| x * scale);
+        UnitQuaternion::new_unchecked(Quaternion::new(real * scale, i, j, k))
+    }
+
+    /// The same for a turn by more than 120 degrees: half a turn about one of the axes brings
+    /// the largest number into the place of the real one, where nothing cancels. It is done
+    /// by signs and places instead of branches.
+    #[inline(always)]
+    fn far_rotation(&self) -> UnitQuaternion<f64> {
+        let [[xx, xy, xz, _], [yx, yy, yz, _], [zx, zy, zz, _]] = [self.x.0, self.y.0, self.z.0];
+        let about_z_or_y = if zz >= yy { 1 } else { 2 };
+        let about_x = (xx > yy) & (xx > zz);
+        let half_turn = if about_x { 3 } else { about_z_or_y };
+        let ([sx, sy, sz], signs) = HALF_TURNS[half_turn];
+        let real = 1.0 + sx * xx + sy * yy + sz * zz;
+        let scale = 0.5 / real.sqrt();
+        let numbers = [
+            (sy * yz - sz * zy) * scale,
+            (sz * zx - sx * xz) * scale,
+            (sx * xy - sy * yx) * scale,
+            real * scale,
+        ];
+        let place = |i: usize| signs[i] * numbers[i ^ half_turn];
+        let [i, j, k, w] = [place(0), place(1), place(2), place(3)];
+        UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))
+    }
+}
+
+/// No turn, and half a turn about z, y and x: the signs that it gives a frame's axes, and
+/// those that taking it back gives the numbers of a quaternion.
+const HALF_TURNS: [([f64; 3], [f64; 4]); 4] = [
+    ([1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]),
+    ([-1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]),
+    ([-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0, -1.0]),
+    ([1.0, -1.0, -1.0], [1.0, 1.0, -1.0, -1.0]),
+];
+
+impl Mul for Frame {
+    type Output = Self;
+
+    fn mul(self, right: Self) -> Self {
+        Moving::of(Plain, &self).times(&right).frame()
+    }
+}
+
+/// A turn by its sine and cosine.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    pub(crate) sin: f64,
+    pub(crate) cos: f64,
+}
+
+/// A frame on its way along a chain, in registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Moving<A: Arith> {
+    pub(crate) x: F4<A>,
+    pub(crate) y: F4<A>,
+    pub(crate) z: F4<A>,
+    pub(crate) p: F4<A>,
+}
+
+impl<A: Arith> Moving<A> {
+    #[inline(always)]
+    pub(crate) fn of(a: A, frame: &Frame) -> Self {
+        Self {
+            x: F4::new(a, frame.x.0),
+            y: F4::new(a, frame.y.0),
+            z: F4::new(a, frame.z.0),
+            p: F4::new(a, frame.p.0),
+        }
+    }
+
+    /// `self * local`: the pose of `local` in the frame that `self` is in.
+    #[inline(always)]
+    pub(crate) fn times(self, local: &Frame) -> Self {
+        Self {
+            x: self.direction(local.x),
+            y: self.direction(local.y),
+            z: self.direction(local.z),
+            p: self.direction(local.p) + self.p,
+        }
+    }
+
+    /// A direction given in this frame.
+    #[inline(always)]
+    fn direction(self, V4([x, y, z, _]): V4) -> F4<A> {
+        let a = self.p.build();
+        let first = self.y.fma(F4::splat(a, y), self.x * x);
+        self.z.fma(F4::splat(a, z), first)
+    }
+
+    /// This frame turned about its z axis, and then about its new x axis.
+    #[inline(always)]
+    pub(crate) fn turned(self, about_z: Turn, about_x: Turn) -> Self {
+        let number = |x: f64| F4::splat(self.p.build(), x);
+        let Self { x, y, z, p } = self;
+        // What is known late comes last into every sum.
+        let (sin, cos) = (number(about_z.sin), number(about_z.cos));
+        let back = y.taken_from(cos, x * sin);
+        let x = y.fma(sin, x * cos);
+        let (sin, cos) = (number(about_x.sin), number(about_x.cos));
+        Self {
+            x,
+            y: back.taken_from(cos, z * sin),
+            z: back.fma(sin, z * cos),
+            p,
+        }
+    }
+
+    /// This frame moved along its own x and y axis, m.
+    #[inline(always)]
+    pub(crate) fn shifted(self, [x, y]: [f64; 2]) -> Self {
+        let a = self.p.build();
+        let along = self.x.fma(F4::splat(a, x), self.p);
+        Self {
+            p: self.y.fma(F4::splat(a, y), along),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn frame(self) -> Frame {
+        Frame {
+            x: V4(self.x.array()),
+            y: V4(self.y.array()),
+            z: V4(self.z.array()),
+            p: V4(self.p.array()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    /// The quaternion of a turn, found by way of its frame.
+    fn found(turn: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let pose = Isometry3::from_parts(Translation3::identity(), *turn);
+        Frame::from_isometry(&pose).isometry().rotation
+    }
+
+    /// Turns about all axes come back as the quaternions that nalgebra finds.
+    #[test]
+    fn quaternion_agrees_with_nalgebra() {
+        for i in 0..20_000 {
+            let (a, b) = (f64::from(i) * 0.618, f64::from(i % 141) * 0.0446);
+            let axis = Vector3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
+            let turn = UnitQuaternion::from_scaled_axis(axis * f64::from(i % 7919) * 4e-4);
+            let theirs = UnitQuaternion::from_rotation_matrix(&turn.to_rotation_matrix());
+            let error = (found(&turn).coords - theirs.coords).amax();
+            assert!(error < 2e-15, "{turn}: {error}");
+        }
+        for axis in [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()] {
+            let turn = UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI);
+            assert!((found(&turn).coords - turn.coords).amax() < 1e-15, "{turn}");
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The links of a serial arm, as frames on its axes: z along each axis, and x square to it
+//! and to the one before, so that each link is one turn about x and a shift in the plane.
+//!
+//! # Source
+//! J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based
+//! on matrices", J. Appl. Mech. 22, 1955; here each origin is the point of its axis that is
+//! nearest to the origin before it, so that nothing grows large where axes are nearly parallel.
+
+use crate::arith::{Arith, V4, sin_cos_of};
+use crate::frame::{Frame, Moving, Turn};
+use crate::urdf::{JointKind, Model};
+use crate::wide::F4;
+use nalgebra::{Isometry3, SVector, Vector3};
+
+/// An axis with all joints at zero: its direction and a point on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Line {
+    pub(crate) h: [f64; 3],
+    pub(crate) p: [f64; 3],
+}
+
+/// The links of an arm of `N` joints. From the frame of a joint, turned about its z axis,
+/// to that of the next it is a turn about x and then a shift along the new x and y axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Links<const N: usize> {
+    /// The first joint's frame.
+    first: Frame,
+    /// Angle from x axis to x axis with all joints at zero, rad.
+    zero: [f64; N],
+    /// Turn and shift (m) beyond each joint; none beyond the last.
+    turn: [Turn; N],
+    shift: [[f64; 2]; N],
+    /// The end in the frame of the last joint.
+    last: Frame,
+    /// One for a joint that turns and zero for one that slides.
+    turns: [f64; N],
+    all_turn: bool,
+}
+
+/// Position and axis of every joint, and the end, on the way along the links.
+pub(crate) struct Reached<A: Arith, const N: usize> {
+    pub(crate) points: [F4<A>; N],
+    pub(crate) axes: [F4<A>; N],
+    pub(crate) end: Moving<A>,
+}
+
+impl<const N: usize> Links<N> {
+    /// The links of a model with `N` joints, from its base to its flange.
+    pub(crate) fn of(model: &Model) -> Self {
+        let mut place = Isometry3::identity();
+        let lines: [Line; N] = std::array::from_fn(|i| {
+            place *= model.frames[i];
+            Line {
+                h: (place.rotation * model.axes[i]).into_inner().into(),
+                p: place.translation.vector.into(),
+            }
+        });
+        let turns = |i: usize| model.joints[i].kind != JointKind::Prismatic;
+        let mut links = Self::along(&lines);
+        let flange = Frame::from_isometry(&(place * model.last_from_flange));
+        links.last = links.last.inverse() * flange;
+        links.turns = std::array::from_fn(|i| f64::from(u8::from(turns(i))));
+        links.all_turn = (0..N).all(turns);
+        links
+    }
+
+    /// The links between turning joints on axes, and the frame of the last joint as that of
+    /// the end.
+    fn along(lines: &[Line; N]) -> Self {
+        let z = lines.map(|line| Vector3::from(line.h));
+        let mut x = [Vector3::from(across(lines[0].h)); N];
+        let mut origins = [Vector3::from(lines[0].p); N];
+        let (mut zero, mut shift) = ([0.0; N], [[0.0; 2]; N]);
+        let mut turn = [Turn { sin: 0.0, cos: 1.0 }; N];
+        for i in 1..N {
+            origins[i] = foot(&lines[i], &origins[i - 1]);
+            let way = origins[i] - origins[i - 1];
+            x[i] = normal(&z[i - 1], &z[i], &way);
+            if i == 1 {
+                x[0] = x[1];
+            }
+            let y = z[i - 1].cross(&x[i - 1]);
+            zero[i - 1] = y.dot(&x[i]).atan2(x[i - 1].dot(&x[i]));
+            turn[i - 1] = Turn {
+                sin: z[i - 1].cross(&z[i]).dot(&x[i]),
+                cos: z[i - 1].dot(&z[i]),
+            };
+            shift[i - 1] = [way.dot(&x[i]), way.dot(&z[i].cross(&x[i]))];
+        }
+        let column = |v: Vector3<f64>| V4::new(v.x, v.y, v.z);
+        let frame = |i: usize| Frame {
+            x: column(x[i]),
+            y: column(z[i].cross(&x[i])),
+            z: column(z[i]),
+            p: column(origins[i]),
+        };
+        Self {
+            first: frame(0),
+            zero,
+            turn,
+            shift,
+            last: frame(N - 1),
+            turns: [1.0; N],
+            all_turn: true,
+        }
+    }
+
+    /// The same links between other ends: standing in a workstation and carrying a tool.
+    pub(crate) fn between(&self, base: &Isometry3<f64>, tool: &Isometry3<f64>) -> Self {
+        Self {
+            first: Frame::from_isometry(base) * self.first,
+            last: self.last * Frame::from_isometry(tool),
+            ..*self
+        }
+    }
+
+    /// Whether no joint slides.
+    pub(crate) fn all_turn(&self) -> bool {
+        self.all_turn
+    }
+
+    /// Whether a joint slides.
+    #[inline(always)]
+    pub(crate) fn slides(&self, joint: usize) -> bool {
+        !self.all_turn && self.turns[joint] == 0.0
+    }
+
+    /// Goes along the links with the joints at `q` (rad, m).
+    #[inline(always)]
+    pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
+        let mut frame = Moving::of(a, &self.first);
+        let (mut points, mut axes) = ([frame.p; N], [frame.z; N]);
+        for group in (0..N).step_by(4) {
+            // The last four overlap those before, so that there always are four.
+            let first = group.min(N - N.min(4));
+            let (at, zero) = (four(a, &q.data.0[0], first), four(a, &self.zero, first));
+            let angles = at.fma(four(a, &self.turns, first), zero);
+            let (sin, cos) = sin_cos_of(angles);
+            let (sin, cos) = (sin.array(), cos.array());
+            for i in group..N.min(group + 4) {
+                if self.slides(i) {
+                    frame.p = frame.z.fma(F4::splat(a, q[i]), frame.p);
+                }
+                (points[i], axes[i]) = (frame.p, frame.z);
+                let (sin, cos) = (sin[i - first], cos[i - first]);
+                frame = frame
+                    .turned(Turn { sin, cos }, self.turn[i])
+                    .shifted(self.shift[i]);
+            }
+        }
+        let end = frame.times(&self.last);
+        Reached { points, axes, end }
+    }
+}
+
+/// Four numbers of `N` from one on; of fewer than four all, and zeros.
+#[inline(always)]
+fn four<A: Arith, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<A> {
+    let (mut four, count) = ([0.0; 4], N.min(4));
+    four[..count].copy_from_slice(&numbers[first..first + count]);
+    F4::new(a, four)
+}
+
+/// The direction square to two axes about which the first turns into the second; along the
+/// way between them where they are parallel.
+pub(crate) fn normal(from: &Vector3<f64>, to: &Vector3<f64>, way: &Vector3<f64>) -> Vector3<f64> {
+    let across_from = |v: &Vector3<f64>| v - from * from.dot(v);
+    let cross = from.cross(to);
+    if cross.norm() > PARALLEL {
+        // The product of nearly parallel axes has few figures; again square to the first,
+        // it is square to both.
+        return across_from(&cross.normalize()).normalize();
+    }
+    let side = across_from(way);
+    if side.norm() > 1e-9 {
+        return side.normalize();
+    }
+    Vector3::from(across((*from).into()))
+}
+
+/// Sine below which two axes are parallel to rounding.
+const PARALLEL: f64 = 1e-14;
+
+/// The point of an axis that is nearest to `point`.
+pub(crate) fn foot(line: &Line, point: &Vector3<f64>) -> Vector3<f64> {
+    let (h, p) = (Vector3::from(line.h), Vector3::from(line.p));
+    p + h * h.dot(&(point - p))
+}
+
+/// A unit vector at right angles to `h`.
+#[inline(always)]
+pub(crate) fn across(h: [f64; 3]) -> [f64; 3] {
+    let v = if h[0].abs() < 0.7 {
+        [0.0, h[2], -h[1]]
+    } else {
+        [-h[2], 0.0, h[0]]
+    };
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    [v[0] / length, v[1] / length, v[2] / length]
+}
