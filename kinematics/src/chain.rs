@@ -24,7 +24,7 @@ fn cross<A: Arith>(a: F4<A>, b: F4<A>) -> F4<A> {
 /// #  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/>
 /// #  <origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="2" effort="5"/>
 /// #  </joint></robot>"#;
-/// use nalgebra::{ArrayStorage, Isometry3, vector};
+/// use nalgebra::{Isometry3, vector};
 /// let arm = kinematics::urdf::read(text, None)?.chain::<1>()?
 ///     .with_tool(&Isometry3::translation(0.5, 0.0, 0.0));
 /// let base_from_tool = arm.forward(&vector![0.0]);

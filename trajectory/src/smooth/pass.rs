@@ -164,12 +164,9 @@ pub(crate) fn settled(
         let next = spans.partition_point(|span| span.start <= time);
         (next.saturating_sub(1), time)
     };
-    let distance = |pose: &Isometry3<f64>, place: &Isometry3<f64>| {
-        (pose.translation.vector - place.translation.vector).norm()
-    };
     let mut since = moment(0.0);
     for (pass, pose) in passes.iter().zip(&poses[1..]) {
-        let at_end = distance(pose, goal);
+        let at_end = (pose.translation.vector - goal.translation.vector).norm();
         if at_end > RESOLUTION
             && at_end <= pass.deviation + 1e3 * RESOLUTION
             && approach(spans, since, pose, options.tolerance).is_none()

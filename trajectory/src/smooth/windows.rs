@@ -199,8 +199,8 @@ impl Windows {
             end += 1;
         }
         // A window that has to end at rest had better do so at a corner.
-        let near = (end..self.poses.len()).take(self.options.window / 2);
-        let end = near.into_iter().find(|i| self.turns(*i)).unwrap_or(end);
+        let mut near = (end..self.poses.len()).take(self.options.window / 2);
+        let end = near.find(|i| self.turns(*i)).unwrap_or(end);
         // A short rest of the list joins this window.
         if self.poses.len() - 1 - end <= self.options.window / 4 {
             self.poses.len() - 1
