@@ -7,6 +7,7 @@
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
 //! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
 //!   report back.
+//! - [`Observer`] sees the cyclic messages of an arm and takes part in nothing.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
 //! in a signature. Nobody else names iceoryx2. All segments belong to one user and are readable by
@@ -20,6 +21,7 @@ mod engine_link;
 mod error;
 mod hello;
 mod node;
+mod observer;
 mod probe;
 mod setpoint;
 mod state;
@@ -36,6 +38,7 @@ pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
 pub use node::{Leftovers, cleanup, survey};
+pub use observer::Observer;
 pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
@@ -57,7 +60,7 @@ pub const TOOL_CHANGER: usize = 1;
 /// The version of the driver protocol. Both sides must have the same.
 pub const PROTOCOL: u32 = 1;
 
-/// A checksum of the byte layout of the two cyclic messages; part of the handshake, so that a
+/// A checksum of the byte layout of the messages and of the number of fault codes; part of the handshake, so that a
 /// driver built from other headers is refused before it moves.
 ///
 /// # Source
@@ -77,6 +80,7 @@ pub const fn schema_checksum() -> u64 {
         core::mem::offset_of!(State, digital_inputs),
         size_of::<Hello>(),
         size_of::<HelloAck>(),
+        FaultCode::COUNT,
     ];
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
     let mut index = 0;

@@ -26,7 +26,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
         &["crcl", "kinematics", "trajectory", "realtime", "ipc"],
     ),
     ("trajectory", &["realtime"]),
-    ("driver-kit", &["ipc", "realtime"]),
+    ("driver-kit", &["ipc"]),
     ("driver-sim", &["driver-kit", "ipc"]),
     ("crcl", &[]),
     ("kinematics", &[]),
