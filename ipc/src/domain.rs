@@ -199,7 +199,7 @@ mod tests {
     use std::fs::Permissions;
     use std::os::unix::fs::{PermissionsExt, symlink};
 
-    fn environment(pairs: &[(&str, &Path)]) -> impl Fn(&str) -> Option<OsString> {
+    fn environment(pairs: &[(&str, &Path)]) -> impl Fn(&str) -> Option<OsString> + use<> {
         let pairs: Vec<_> = pairs
             .iter()
             .map(|(name, value)| (name.to_string(), value.as_os_str().to_owned()))
