@@ -45,11 +45,12 @@ impl Robot for MyRobot {
 
 fn main() -> Result<(), DriverError> {
     let arm = std::env::args().nth(1).unwrap_or("cell/arm".to_owned());
+    let domain = ipc::Domain::choose(None, |name| std::env::var_os(name))?;
     let home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0].map(|at| Reference::rest(at).into());
     let robot = MyRobot(home, ToolStatus::Open);
     // Ctrl-C and SIGTERM: the kit brakes the arm first.
     let stop = asked_to_end()?;
-    let report = run(&arm.parse()?, robot, &RunOptions::default(), &stop)?;
+    let report = run(&domain.arm(&arm)?, robot, &RunOptions::default(), &stop)?;
     report.braked.iter().for_each(|text| eprintln!("{text}"));
     Ok(())
 }

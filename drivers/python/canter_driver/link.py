@@ -1,9 +1,8 @@
 """The driver's end of shared memory, over the `iceoryx2` wheel of version 0.9.3."""
 
-import os
-
 import iceoryx2 as iox2
 
+from . import domain
 from . import messages as m
 
 
@@ -13,7 +12,9 @@ class Link:
     def __init__(self, arm):
         iox2.set_log_level(iox2.LogLevel.Fatal)
         config = iox2.config.default()
-        config.global_cfg.prefix = iox2.FileName.new(f"canter_{os.geteuid()}_")
+        place = domain.directory()
+        config.global_cfg.root_path = iox2.Path.new(place)
+        config.global_cfg.prefix = iox2.FileName.new(domain.prefix(place))
         self.node = (
             iox2.NodeBuilder.new()
             .name(iox2.NodeName.new(f"driver of {arm}"))

@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::robot::RobotOption;
 
 /// The Python side, as it is in `drivers/python`.
-const SOURCES: [(&str, &str); 6] = [
+const SOURCES: [(&str, &str); 7] = [
     (
         "mujoco_driver.py",
         include_str!("../../../../drivers/python/mujoco_driver.py"),
@@ -38,6 +38,10 @@ const SOURCES: [(&str, &str); 6] = [
     (
         "canter_driver/link.py",
         include_str!("../../../../drivers/python/canter_driver/link.py"),
+    ),
+    (
+        "canter_driver/domain.py",
+        include_str!("../../../../drivers/python/canter_driver/domain.py"),
     ),
     (
         "canter_driver/messages.py",
@@ -84,10 +88,12 @@ impl Mujoco {
     }
 
     fn spawn(&self, robot: &Robot, folder: &Path) -> Result<Child, Failure> {
+        let arm = self.arm.open()?;
         let mut command = Command::new(&self.python);
         command
+            .env(ipc::DOMAIN_VARIABLE, arm.domain().directory())
             .arg(folder.join("mujoco_driver.py"))
-            .arg(self.arm.arm.to_string())
+            .arg(arm.to_string())
             .arg(folder.join("robot.urdf"))
             .arg("--until-end-of-input")
             .arg(format!("--joints={}", robot.joint_names().join(",")));
