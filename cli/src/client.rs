@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, IpcError, Verb};
+use ipc::{Answer, Arm, Client, Verb};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -24,8 +24,8 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.arm, "canter").map_err(failure)?;
-        accepted(client.ask(verb, PATIENCE).map_err(failure)?)
+        let client = Client::open(&self.arm, "canter")?;
+        accepted(client.ask(verb, PATIENCE)?)
     }
 
     /// Asks, prints the engine's words, if any, to standard error.
@@ -51,13 +51,4 @@ pub(crate) fn accepted(answer: Answer) -> Result<Answer, Failure> {
     } else {
         Err(Failure::new(Exit::Refused, anyhow::anyhow!(answer.message)))
     }
-}
-
-/// A fault of the border to other processes with its exit code.
-pub(crate) fn failure(error: IpcError) -> Failure {
-    let exit = match error {
-        IpcError::BadArmName { .. } => Exit::Usage,
-        _ => Exit::NoPeer,
-    };
-    Failure::new(exit, error)
 }
