@@ -41,6 +41,8 @@ impl ClientChannels {
 /// Fields are dropped in this order: the session stops the arm while the driver still lives.
 #[derive(Debug)]
 pub struct Host<D> {
+    /// The arm.
+    pub arm: Arm,
     /// The session.
     pub session: Session,
     channels: ClientChannels,
@@ -64,6 +66,7 @@ impl<D> Host<D> {
         driver: D,
     ) -> Result<Self, SessionError> {
         Ok(Self {
+            arm: config.arm.clone(),
             session: Session::start(robot, config)?,
             channels,
             reported: None,
