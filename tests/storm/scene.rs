@@ -69,7 +69,7 @@ impl Arm {
     pub(crate) fn new(number: usize, seed: u64) -> Self {
         let name = format!("storm-{}/{number}", std::process::id());
         let folder = tempfile::tempdir().unwrap();
-        let observer = Observer::open(&name.parse().unwrap()).unwrap();
+        let observer = Observer::open(&system_tests::domain::arm(&name)).unwrap();
         let file = folder.path().join("0");
         let driver = Peer::start(&["driver", &name, file.to_str().unwrap()]);
         let engine = Peer::start(&["engine", &name]);

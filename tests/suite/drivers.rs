@@ -78,7 +78,7 @@ fn the_simulated_driver_passes_its_test() {
 
 /// Waits until a joint of `arm` moves with more than 0.05 rad/s.
 fn wait_for_motion(arm: &str) {
-    let observer = ipc::Observer::open(&arm.parse().unwrap()).unwrap();
+    let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(60) {
         if let Some(state) = observer.next_state() {
@@ -141,6 +141,7 @@ fn a_python_driver_that_ends_brakes_first() {
     }
     for (name, signal) in [("python-int", libc::SIGINT), ("python-hup", libc::SIGHUP)] {
         let mut python = Command::new("python3");
+        system_tests::domain::join(&mut python);
         python.arg("-B");
         python.arg(system_tests::repository::root().join("drivers/python/template.py"));
         ends_in_motion(python, name, signal);

@@ -12,8 +12,9 @@ use std::thread;
 use std::time::Duration;
 
 use driver_kit::RunOptions;
-use engine::executor::{Event, Executor, Feeder};
 use realtime::{Piece, Sample, Segment};
+use servo::{Event, Executor, Feeder};
+use system_tests::domain::inherited;
 use system_tests::servo_arm::{JOINTS, Joints, driver_options, executor_config, limits};
 use system_tests::witness::Witness;
 
@@ -37,13 +38,14 @@ fn main() -> ExitCode {
 }
 
 fn driver(arm: &str, file: &str) -> Outcome {
-    let mut options = driver_options(arm.parse()?);
+    let arm = inherited()?.arm(arm)?;
+    let mut options = driver_options(arm.clone());
     options.position = vec![0.0; JOINTS];
     options.lower = vec![ENDS[0]; JOINTS];
     options.upper = vec![ENDS[1]; JOINTS];
     let robot = Witness::new(driver_sim::Simulated::new(options)?, Path::new(file))?;
     let stop = driver_kit::asked_to_end()?;
-    let report = driver_kit::run(&arm.parse()?, robot, &RunOptions::default(), &stop)?;
+    let report = driver_kit::run(&arm, robot, &RunOptions::default(), &stop)?;
     if let Some(braked) = report.braked {
         eprintln!("{braked}");
     }
@@ -51,7 +53,7 @@ fn driver(arm: &str, file: &str) -> Outcome {
 }
 
 fn engine(arm: &str) -> Outcome {
-    let mut config = executor_config(arm.parse()?, ipc::Clock::Wall);
+    let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::Wall);
     config.record = false;
     let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
     let remote = executor.remote();
