@@ -3,6 +3,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use crcl::ReadOptions;
+use engine::control::ControlThread;
 use engine::dry_run::FailurePolicy;
 use engine::executor::{Control, ExecutorError};
 use engine::robot::Robot;
@@ -124,12 +125,15 @@ impl HostOptions {
         config.record = true;
         config.on_refusal = on_refusal;
         config.default_length = default_length;
+        let arm = config.arm.clone();
         let session = Session::start(robot, &config).map_err(failure)?;
+        let control = ControlThread::start(&arm, session.steering()).map_err(client::failure)?;
         if let Some(warning) = &session.warning {
             tracing::warn!("{warning}");
         }
         Ok(Host {
             session,
+            _control: control,
             clients,
             status,
             reported: None,
@@ -161,6 +165,7 @@ fn failure(error: SessionError) -> Failure {
 pub(crate) struct Host {
     /// The session.
     pub(crate) session: Session,
+    _control: ControlThread,
     clients: ClientServer,
     status: StatusWriter,
     reported: Option<Instant>,
@@ -305,22 +310,27 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
     }
 }
 
-/// Passes on what acts on the motion that is under way.
+/// Passes on what acts on the motion that is under way, for clients that do not use the control
+/// channel.
 fn control(session: &Session, ask: &Verb) -> Answer {
-    match ask {
-        Verb::Pause => session.control(Control::Pause),
-        Verb::Resume => session.control(Control::Resume),
-        Verb::Override { share } if (0.0..=1.0).contains(share) => {
-            session.control(Control::Override(*share));
-        }
+    let control = match ask {
+        Verb::Pause => Control::Pause,
+        Verb::Resume => Control::Resume,
+        Verb::Override { share } if (0.0..=1.0).contains(share) => Control::Override(*share),
         Verb::Override { share } => {
             return Answer::refuse(format!("an override is 0 to 1, got {share}"));
         }
-        Verb::Stop { fast } => session.control(Control::Stop { fast: *fast }),
-        Verb::Abort => session.control(Control::Abort),
-        Verb::Recover => session.recover(),
+        Verb::Stop { fast } => Control::Stop { fast: *fast },
+        Verb::Abort => Control::Abort,
+        Verb::Recover => {
+            return match session.recover() {
+                Ok(_) => Answer::accept(Value::Null),
+                Err(error) => Answer::refuse(error.to_string()),
+            };
+        }
         _ => return Answer::refuse("this engine cannot do that"),
-    }
+    };
+    session.control(control);
     Answer::accept(Value::Null)
 }
 

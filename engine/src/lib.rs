@@ -10,6 +10,7 @@
 
 pub mod command_error;
 pub mod conformance;
+pub mod control;
 pub mod controller;
 pub mod doctor;
 mod dof;
