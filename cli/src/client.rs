@@ -3,7 +3,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, IpcError, Verb};
+use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, Verb};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -33,8 +33,8 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.arm, "canter").map_err(failure)?;
-        accepted(client.ask(verb, PATIENCE).map_err(failure)?)
+        let client = Client::open(&self.arm, "canter")?;
+        accepted(client.ask(verb, PATIENCE)?)
     }
 
     /// Asks something of the motion under way and waits until it acts; with `rest`, also until the
@@ -44,9 +44,9 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn control(&self, ask: ControlAsk, rest: bool) -> Result<Exit, Failure> {
-        let client = ControlClient::open(&self.arm).map_err(failure)?;
+        let client = ControlClient::open(&self.arm)?;
         let asked = Instant::now();
-        let mut answer = client.ask(ask, PATIENCE).map_err(failure)?;
+        let mut answer = client.ask(ask, PATIENCE)?;
         if answer.accepted == 0 {
             let reason = anyhow::anyhow!(answer.reason());
             return Err(Failure::new(Exit::Refused, reason));
@@ -54,7 +54,7 @@ impl ArmOption {
         let first = answer.tick;
         while rest && answer.resting == 0 && asked.elapsed() < REST {
             sleep(LOOK);
-            answer = client.ask(ControlAsk::Look, PATIENCE).map_err(failure)?;
+            answer = client.ask(ControlAsk::Look, PATIENCE)?;
         }
         let text = reached(&answer, first, asked.elapsed());
         writeln!(io::stdout().lock(), "{text}")?;
@@ -105,13 +105,4 @@ pub(crate) fn accepted(answer: Answer) -> Result<Answer, Failure> {
     } else {
         Err(Failure::new(Exit::Refused, anyhow::anyhow!(answer.message)))
     }
-}
-
-/// A fault of the border to other processes with its exit code.
-pub(crate) fn failure(error: IpcError) -> Failure {
-    let exit = match error {
-        IpcError::BadArmName { .. } => Exit::Usage,
-        _ => Exit::NoPeer,
-    };
-    Failure::new(exit, error)
 }

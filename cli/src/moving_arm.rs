@@ -12,7 +12,7 @@ use plan::run::MotionFailure;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::Host;
+use crate::host_options::Host;
 use crate::printer::Printer;
 use crate::progress::Progress;
 use crate::recording::Recording;

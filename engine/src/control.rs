@@ -9,12 +9,9 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
-use ipc::{
-    Arm, ControlAnswer, ControlAsk, ControlServer, Controlled, IpcError, Urgency, now_ns,
-    sleep_until_ns, urge,
-};
-
-use crate::executor::{Control, Progress, Steering};
+use ipc::{Arm, ControlAnswer, ControlAsk, ControlServer, Controlled, IpcError};
+use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
+use servo::{Control, Progress, Steering};
 
 /// Time from one look for requests to the next (ns).
 const LOOK_NS: u64 = 300_000;

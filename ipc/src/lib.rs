@@ -14,7 +14,6 @@
 
 mod arm;
 mod client;
-mod clock;
 mod control;
 mod driver_link;
 mod engine_link;
@@ -26,13 +25,11 @@ mod probe;
 mod setpoint;
 mod state;
 mod tool;
-mod urgency;
 
 pub use arm::{Arm, model_hash};
 pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
 };
-pub use clock::{now_ns, sleep_until_ns};
 pub use control::{
     ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
 };
@@ -46,7 +43,6 @@ pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
 pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
-pub use urgency::{Granted, Urgency, urge};
 
 /// How many joints fit into a message.
 pub const MAX_JOINTS: usize = 16;

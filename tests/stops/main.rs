@@ -72,7 +72,7 @@ fn stops(burden: Burden, way: Way, count: usize) -> Vec<Taken> {
                     fast: way == Way::Fast,
                 },
             };
-            let called = ipc::now_ns();
+            let called = scheduling::now_ns();
             let answer = client.ask(ask, Duration::from_secs(3)).unwrap();
             assert_eq!(answer.accepted, 1, "{}", answer.reason());
             taken.extend(watch.taken(called));
@@ -92,7 +92,7 @@ fn interrupts(burden: Burden, count: usize) -> Vec<Taken> {
         let watch = Watch::start(&scene.arm);
         watch.wait_for_speed();
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.5 * random.next()));
-        let called = ipc::now_ns();
+        let called = scheduling::now_ns();
         scene.interrupt();
         taken.extend(watch.taken(called));
         scene.wait_for_the_end();

@@ -45,7 +45,7 @@ impl Watch {
         let (seen, ends) = (Arc::default(), Arc::new(AtomicBool::new(false)));
         let (arm, list, stop) = (arm.clone(), Arc::clone(&seen), Arc::clone(&ends));
         let thread = std::thread::spawn(move || read(&arm, &list, &stop));
-        let robot = engine::robot::load("ur5e").unwrap();
+        let robot = planner::robot::load("ur5e").unwrap();
         let chain = robot.chain::<6>().unwrap();
         Self {
             seen,

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::rate;
+use crate::host_options::rate;
 use crate::output;
 
 /// Look at what the servo loop needs of this machine, and say what would repair it

@@ -3,7 +3,7 @@ use engine::session::Note;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{HostOptions, RefusalOption};
+use crate::host_options::{HostOptions, RefusalOption};
 use crate::printer::Printer;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;

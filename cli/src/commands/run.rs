@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use engine::dry_run::FailurePolicy;
-use engine::robot::Robot;
 use engine::session::{Blame, Note};
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
 use serde_json::json;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{DriverChoice, Host, HostOptions, RefusalOption};
+use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;

@@ -6,10 +6,11 @@ use core::time::Duration;
 use std::fs;
 use std::thread;
 
-use ipc::{Arm, Probe, Urgency, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Probe};
+use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
 use serde::Serialize;
 
-use crate::robot::Robot;
+use planner::robot::Robot;
 
 /// How a check ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -321,7 +322,7 @@ mod tests {
         let options = DoctorOptions {
             wake_up: Duration::from_millis(100),
             driver: Some("doctor/nobody-there".parse().unwrap()),
-            robot: Some(crate::robot::load("ur5e").unwrap()),
+            robot: Some(planner::robot::load("ur5e").unwrap()),
             ..DoctorOptions::default()
         };
         let checks = examine(&options);

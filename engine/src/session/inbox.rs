@@ -3,7 +3,7 @@
 use crcl::{Command, Located};
 
 use super::SubmitError;
-use crate::executor::{Control, Steering};
+use servo::{Control, Steering};
 use crate::queue::{Full, Queue, Queued};
 
 /// The queue with what decides whether commands are taken.

@@ -15,14 +15,13 @@ use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
 use super::{Begun, Live, Order, RunSample, SessionConfig, SessionError, Shared, Status};
-use crate::controller::{Controller, Step};
-use crate::dry_run::FailurePolicy;
-use crate::executor::{
-    Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, Steering,
-    ToolOrder,
+use planner::controller::{Controller, Step};
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
+use planner::task::{Task, ToolAction};
+use servo::{
+    Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, Steering, ToolOrder,
 };
-use crate::robot::Robot;
-use crate::task::{Task, ToolAction};
 
 /// How many commands are planned ahead of the one that moves.
 const AHEAD: usize = 8;
