@@ -375,6 +375,7 @@ impl<const N: usize> Runner<N> {
 
     /// Sends a tool order; says whether it may begin now.
     fn start_tool(&mut self, order: ToolOrder) -> bool {
+        let moving = matches!(self.demand(), Demand::Run(share) if share > 0.0);
         let Some(command) = self.tools.get_mut(order.tool) else {
             self.latch(Fault::Tool {
                 tool: order.tool,
@@ -382,7 +383,6 @@ impl<const N: usize> Runner<N> {
             });
             return true;
         };
-        let moving = matches!(self.demand(), Demand::Run(share) if share > 0.0);
         if !self.ready || !moving {
             return false;
         }
