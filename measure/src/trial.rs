@@ -9,12 +9,13 @@ use std::time::Instant;
 
 use kinematics::Solver;
 use nalgebra::{Isometry3, SVector, Translation3, Vector3};
-use trajectory::ToolLimits;
-
 use planner::motion::{PlannedMove, Planner};
 use planner::robot::{Robot, RobotError, vector};
 use planner::task::{Move, Shape};
 use planner::with_dof;
+use trajectory::ToolLimits;
+
+use crate::smooth::Measure;
 
 /// A smooth motion to be tried: the first pose is its start.
 #[derive(Clone, Debug, PartialEq)]

@@ -88,7 +88,6 @@ impl fmt::Display for Fault {
 
 /// What happened, and in which period since the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Event {
     /// A command starts to move, or a tool order goes out.
     Started {

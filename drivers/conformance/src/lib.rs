@@ -7,7 +7,7 @@ use core::time::Duration;
 use std::time::Instant;
 
 use ipc::{
-    Arm, Clock, DriverState, EngineLink, GRIPPER, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint,
+    Arm, Clock, DriverState, EngineLink, GRIPPER, Hello, HelloAck, IpcError, Setpoint,
     SetpointFlags, State, ToolAction, ToolStatus, text_of,
 };
 use scheduling::{now_ns, sleep_until_ns};

@@ -101,7 +101,7 @@ fn positions_stay_inside() {
                 kept += 1;
                 assert!(Audit::of(&motion, start, target, limits).worst() < 1e-12);
                 assert_eq!(motion.duration(), free.duration());
-                let inside = |m: &super::super::Motion<3>| {
+                let inside = |m: &trajectory::otg::Motion<3>| {
                     (0..=400).all(|step| {
                         let p = m.sample(m.duration() * f64::from(step) / 400.0).position;
                         (p - limits.position_max).max() < 1e-9

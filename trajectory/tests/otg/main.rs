@@ -5,7 +5,7 @@ mod peer;
 mod replan;
 
 use measure::Problems;
-use trajectory::otg::{Audit, Interface, Otg, Problem};
+use trajectory::otg::{Audit, Interface, Otg, Problem, Synchronisation};
 
 /// Kinds of problems beyond the plain one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,7 @@ fn draw<const N: usize>(problems: &mut Problems, kind: Kind) -> Problem<N> {
             problem.options.minimum_duration = problems.between(0.0, 30.0);
         }
         Kind::Periods => problem.options.period = Some(PERIOD),
-        Kind::Apart => problem.options.synchronisation = super::Synchronisation::None,
+        Kind::Apart => problem.options.synchronisation = Synchronisation::None,
     }
     if matches!(kind, Kind::Velocity | Kind::VelocitySecondOrder) {
         problem.options.interface = [Interface::Velocity; N];
