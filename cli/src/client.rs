@@ -1,9 +1,10 @@
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, Verb};
+use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, Domain, Verb};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -18,22 +19,51 @@ const REST: Duration = Duration::from_secs(3);
 /// How often the engine is asked whether the arm rests.
 const LOOK: Duration = Duration::from_millis(2);
 
+/// In which domain engine, driver and clients find each other.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DomainOption {
+    /// Directory in which engine, driver and clients find each other, for this user only [default:
+    /// $CANTER_DOMAIN, else canter in the user's runtime directory]
+    #[arg(long, value_name = "DIR")]
+    domain: Option<PathBuf>,
+}
+
+impl DomainOption {
+    /// The domain that was chosen.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] when its directory cannot be used.
+    pub(crate) fn open(&self) -> Result<Domain, Failure> {
+        Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name)).map_err(Failure::from)
+    }
+}
+
 /// Which arm a command is about.
 #[derive(Args, Debug)]
 pub(crate) struct ArmOption {
     /// Name of the arm, as cell/arm; engine, driver and clients find each other by it
     #[arg(long, value_name = "CELL/ARM", default_value = "canter/arm")]
-    pub(crate) arm: Arm,
+    arm: String,
+    #[command(flatten)]
+    domain: DomainOption,
 }
 
 impl ArmOption {
+    /// The arm in its domain.
+    ///
+    /// # Errors
+    /// [`Exit::Usage`] for a wrong name, [`Exit::NoPeer`] when the domain cannot be used.
+    pub(crate) fn open(&self) -> Result<Arm, Failure> {
+        self.domain.open()?.arm(&self.arm).map_err(Failure::from)
+    }
+
     /// Asks the arm's engine and waits for the answer.
     ///
     /// # Errors
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.arm, "canter")?;
+        let client = Client::open(&self.open()?, "canter")?;
         accepted(client.ask(verb, PATIENCE)?)
     }
 
@@ -44,7 +74,7 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn control(&self, ask: ControlAsk, rest: bool) -> Result<Exit, Failure> {
-        let client = ControlClient::open(&self.arm)?;
+        let client = ControlClient::open(&self.open()?)?;
         let asked = Instant::now();
         let mut answer = client.ask(ask, PATIENCE)?;
         if answer.accepted == 0 {

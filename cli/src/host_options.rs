@@ -93,7 +93,7 @@ impl HostOptions {
         default_length: crcl::LengthUnit,
         on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
-        let arm = self.arm.arm.clone();
+        let arm = self.arm.open()?;
         // Before the driver: a second engine must not disturb the arm of the first.
         let channels = ClientChannels::open(&arm)?;
         let simulation = match self.driver {

@@ -42,6 +42,8 @@ impl ClientChannels {
 /// Fields are dropped in this order: the session stops the arm while the driver still lives.
 #[derive(Debug)]
 pub struct Host<D> {
+    /// The arm.
+    pub arm: Arm,
     /// The session.
     pub session: Session,
     _control: ControlThread,
@@ -69,6 +71,7 @@ impl<D> Host<D> {
         let control =
             ControlThread::start(&config.arm, session.steering()).map_err(ExecutorError::from)?;
         Ok(Self {
+            arm: config.arm.clone(),
             session,
             _control: control,
             channels,

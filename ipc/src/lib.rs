@@ -9,12 +9,13 @@
 //!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
-//! in a signature. Nobody else names iceoryx2. All segments belong to one user and are readable by
-//! that user only.
+//! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
+//! readable by that user only.
 
 mod arm;
 mod client;
 mod control;
+mod domain;
 mod driver_link;
 mod engine_link;
 mod error;
@@ -33,11 +34,12 @@ pub use client::{
 pub use control::{
     ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
 };
+pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
-pub use node::{Leftovers, cleanup, survey};
+pub use node::{NodeCount, count_nodes, remove_dead_nodes};
 pub use observer::Observer;
 pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};

@@ -67,6 +67,7 @@ fn canter() -> Command {
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null());
+    system_tests::domain::join(&mut command);
     command
 }
 
@@ -75,7 +76,7 @@ impl Scene {
     pub(crate) fn engine(burden: Burden) -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let name = format!("stops{}/arm{number}", std::process::id());
+        let name = format!("stops/arm{number}");
         let mut command = canter();
         command.args(["engine", "--robot", "ur5e", "--arm", &name]);
         let mut reader = None;
@@ -86,7 +87,7 @@ impl Scene {
         }
         let engine = command.spawn().unwrap();
         let mut scene = Self {
-            arm: name.parse().unwrap(),
+            arm: system_tests::domain::arm(&name),
             burden,
             engine,
             others: Vec::new(),

@@ -9,6 +9,7 @@ mod canter;
 mod command_line;
 mod control;
 mod documents;
+mod domains;
 mod drivers;
 mod killed_plans;
 mod made_kits;

@@ -40,7 +40,7 @@ impl Engine {
         signals.steer(&host.session);
         printer.note(&format!(
             "canter: engine of {} at {}, driver {}",
-            robot.name, self.host.arm.arm, host.session.driver
+            robot.name, host.arm, host.session.driver
         ));
         let exit = loop {
             if signals.has_stopped(&host.session) {
