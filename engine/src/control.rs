@@ -57,7 +57,7 @@ impl ControlThread {
         };
         let thread = Builder::new()
             .name("control".to_owned())
-            .spawn(move || run(&name, steering, &stop, &tell))
+            .spawn(move || run(&name, &steering, &stop, &tell))
             .map_err(|cause| failed(cause.to_string()))?;
         match opened.recv() {
             Ok(Ok(())) => Ok(Self {
@@ -98,7 +98,7 @@ struct Waiting {
 
 fn run(
     arm: &Arm,
-    steering: Steering,
+    steering: &Steering,
     ends: &AtomicBool,
     tell: &SyncSender<Result<(), IpcError>>,
 ) {
@@ -118,7 +118,7 @@ fn run(
     while !ends.load(Ordering::Acquire) {
         for _ in 0..A_LOOK {
             let Some(client) = server.next() else { break };
-            if let Some(given) = obey(&steering, client) {
+            if let Some(given) = obey(steering, client) {
                 waiting.push(given);
             }
         }

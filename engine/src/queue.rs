@@ -79,6 +79,13 @@ impl Queue {
         self.commands.front()
     }
 
+    /// All commands count as given at `age`.
+    pub fn renew(&mut self, age: u32) {
+        for queued in &mut self.commands {
+            queued.age = age;
+        }
+    }
+
     /// Drops the commands that were given at another age than `age`, and returns how many there
     /// were.
     pub fn keep(&mut self, age: u32) -> usize {

@@ -78,6 +78,11 @@ impl Inbox {
         self.queue.front().is_some_and(|queued| queued.age == age)
     }
 
+    /// What waits counts as given at `age`.
+    pub(super) fn renew(&mut self, age: u32) {
+        self.queue.renew(age);
+    }
+
     /// Drops what waits and, unless it is given, what was given at another age than `age`;
     /// returns how many commands that were.
     pub(super) fn drop_all(&mut self, age: Option<u32>) -> usize {

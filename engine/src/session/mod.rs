@@ -27,6 +27,7 @@ pub use note::{Blame, Note};
 pub use status::{Cycles, Status};
 
 use crate::queue::Full;
+use inbox::Inbox;
 use planner::dry_run::FailurePolicy;
 use planner::robot::{Robot, RobotError};
 use planner::with_dof;

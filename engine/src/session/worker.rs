@@ -69,6 +69,8 @@ pub(super) struct Worker<'a, const N: usize> {
     steering: Steering,
     /// How many aborts were carried out: what was given at another age waits or is dropped.
     age: u32,
+    /// Aborts of jogs that are under way.
+    pub(super) jog_aborts: u32,
     /// The chain in force, for who asks where the controlled point is.
     seen: Arc<Mutex<Chain<N>>>,
     pub(super) work: VecDeque<Work<N>>,
@@ -151,6 +153,7 @@ fn start<'a, const N: usize>(
         monitor,
         steering: remote.steering(),
         age: remote.steering().aborts(),
+        jog_aborts: 0,
         remote,
         work: VecDeque::new(),
         flight: VecDeque::new(),
@@ -375,11 +378,11 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Stopped { .. } => self.say(Note::Stopped),
             Event::Aborted { aborts, .. } => {
+                let asked = aborts.wrapping_sub(self.age);
+                let ours = asked <= self.jog_aborts;
+                self.jog_aborts = self.jog_aborts.saturating_sub(asked);
                 self.age = aborts;
-                if !self.rest_from_jog() {
-                    let dropped = self.drop_all(Some(aborts));
-                    self.say(Note::Aborted { dropped });
-                }
+                self.on_abort(ours);
             }
             Event::Faulted { fault, tick } => {
                 let (blame, reason) = (blame(&fault), fault.to_string());
@@ -401,6 +404,21 @@ impl<const N: usize> Worker<'_, N> {
                 self.say(Note::Recovered);
             }
             Event::Ended { .. } => self.closing = true,
+        }
+    }
+
+    /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. What
+    /// was given before drops with the latter only.
+    fn on_abort(&mut self, ends_jog: bool) {
+        if ends_jog {
+            self.ends.shared.inbox().renew(self.age);
+        }
+        if !self.rest_from_jog() {
+            let dropped = self.drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
+        } else if !ends_jog {
+            let dropped = self.ends.shared.inbox().drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
         }
     }
 
