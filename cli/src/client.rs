@@ -34,7 +34,9 @@ impl DomainOption {
     /// # Errors
     /// [`Exit::NoPeer`] when its directory cannot be used.
     pub(crate) fn open(&self) -> Result<Domain, Failure> {
-        Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name)).map_err(Failure::from)
+        Ok(Domain::choose(self.domain.as_deref(), |name| {
+            std::env::var_os(name)
+        })?)
     }
 }
 
@@ -54,7 +56,7 @@ impl ArmOption {
     /// # Errors
     /// [`Exit::Usage`] for a wrong name, [`Exit::NoPeer`] when the domain cannot be used.
     pub(crate) fn open(&self) -> Result<Arm, Failure> {
-        self.domain.open()?.arm(&self.arm).map_err(Failure::from)
+        Ok(self.domain.open()?.arm(&self.arm)?)
     }
 
     /// Asks the arm's engine and waits for the answer.
