@@ -3,8 +3,8 @@
 use crcl::{Command, Located};
 
 use super::SubmitError;
-use servo::{Control, Steering};
 use crate::queue::{Full, Queue, Queued};
+use servo::{Control, Steering};
 
 /// The queue with what decides whether commands are taken.
 #[derive(Debug)]
