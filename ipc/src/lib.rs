@@ -6,7 +6,7 @@
 //! - [`Hello`] and [`HelloAck`] are the handshake that opens a session.
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
 //! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
-//!   report back.
+//!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
 //! - [`Observer`] sees the cyclic messages of an arm and takes part in nothing.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
@@ -15,6 +15,7 @@
 
 mod arm;
 mod client;
+mod control;
 mod domain;
 mod driver_link;
 mod engine_link;
@@ -30,6 +31,9 @@ mod tool;
 pub use arm::{Arm, model_hash};
 pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
+};
+pub use control::{
+    ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
 };
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
