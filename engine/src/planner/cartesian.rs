@@ -2,7 +2,7 @@
 
 use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
 use kinematics::{Chain, Obstacle};
-use nalgebra::SVector;
+use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
 use trajectory::{
     Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
@@ -31,8 +31,7 @@ impl<const N: usize> Planner<N> {
     ) -> Result<Trajectory<N>, MotionError> {
         let goal = motion.poses.first().copied().unwrap_or_default();
         let from = self.chain().forward(start);
-        let gap = from.inv_mul(&goal);
-        if gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9 {
+        if is_still(&[from, goal]) {
             return Ok(Trajectory::new(Vec::new()));
         }
         let line = Line::new(from, goal);
@@ -54,7 +53,7 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<(Trajectory<N>, Blend), MotionError> {
+    ) -> Result<Blended<N>, MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
@@ -71,6 +70,16 @@ impl<const N: usize> Planner<N> {
                 .max(plan.certificate().angular_jerk.ratio),
             fallbacks: plan.fallbacks(),
         };
+        let passed: Vec<f64> = plan.passes().iter().map(|pass| pass.time).collect();
+        if is_still(&poses) || plan.duration() <= 0.0 {
+            let trajectory = Trajectory::new(Vec::new());
+            let passes = vec![0.0; passed.len()];
+            return Ok(Blended {
+                trajectory,
+                blend,
+                passes,
+            });
+        }
         let towards = |u: f64| {
             1 + plan
                 .passes()
@@ -84,8 +93,13 @@ impl<const N: usize> Planner<N> {
         let direct = Trajectory::new(pieces(&points));
         let samples = certificate::tool_samples(self.chain(), &direct);
         let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
+        let blended = |trajectory, passes| Blended {
+            trajectory,
+            blend,
+            passes,
+        };
         if stretch <= 1.0 + 1e-4 {
-            return Ok((direct, blend));
+            return Ok(blended(direct, passed));
         }
         let slow = direct.stretched(stretch);
         let options = TimingOptions {
@@ -97,9 +111,13 @@ impl<const N: usize> Planner<N> {
         let path = joint_path(&plan, &points)?;
         match time_path(&path, &self.limits, &motion.limits, &options) {
             Ok(timed) if timed.trajectory.duration() < slow.duration() => {
-                Ok((timed.trajectory, blend))
+                let passes = passed.iter().map(|u| moment(&timed.law, *u)).collect();
+                Ok(blended(timed.trajectory, passes))
             }
-            _ => Ok((slow, blend)),
+            _ => {
+                let passes = passed.iter().map(|time| time * stretch).collect();
+                Ok(blended(slow, passes))
+            }
         }
     }
 
@@ -208,6 +226,41 @@ impl<const N: usize> Planner<N> {
             cause,
         }
     }
+}
+
+/// A smooth motion of the joints and when it passes each intermediate pose.
+pub(super) struct Blended<const N: usize> {
+    pub trajectory: Trajectory<N>,
+    pub blend: Blend,
+    /// Times after the start, s; never decreasing.
+    pub passes: Vec<f64>,
+}
+
+/// Whether all poses are where the first is, within 1e-9 m and rad.
+fn is_still(poses: &[Isometry3<f64>]) -> bool {
+    poses.iter().all(|pose| {
+        let gap = poses[0].inv_mul(pose);
+        gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9
+    })
+}
+
+/// When a time law that never goes back reaches `u`, s.
+fn moment(law: &Trajectory<1>, u: f64) -> f64 {
+    let pieces = law.pieces();
+    let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
+    let Some(piece) = pieces.get(next.saturating_sub(1)) else {
+        return 0.0;
+    };
+    let (mut low, mut high) = (0.0, piece.duration);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if piece.sample(middle).position[0] < u {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    law.times()[next.saturating_sub(1)] + high
 }
 
 /// A curve of the tool, whether it rests at both ends in its own parameter, and the

@@ -3,6 +3,7 @@
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector, Vector3};
 use serde::Serialize;
+use trajectory::smooth::angular_tolerance;
 use trajectory::{JointLimits, ToolLimits, Trajectory};
 
 use super::active::ActiveLimit;
@@ -17,6 +18,10 @@ pub struct PassReport {
     pub deviation_m: f64,
     /// Tolerance in force, m.
     pub tolerance_m: f64,
+    /// Angle of the tool from the orientation of the pose at the pass, rad.
+    pub angle_rad: f64,
+    /// Largest such angle: [`trajectory::smooth::angular_tolerance`] of the tolerance, rad.
+    pub angular_tolerance_rad: f64,
     /// Time of the pass after the start of the move, s.
     pub time_s: f64,
 }
@@ -87,7 +92,7 @@ pub struct MoveCertificate {
     pub active: Vec<ActiveLimit>,
     /// Every intermediate pose, in the order of the command.
     pub poses: Vec<PassReport>,
-    /// Whether the intermediate poses are passed in order, each within its tolerance.
+    /// Whether the intermediate poses are passed in order, each within its tolerances.
     pub in_order: bool,
     /// Peaks of limits as ratios; at most 1.
     pub peaks: Peaks,
@@ -188,14 +193,15 @@ pub(super) struct Way {
     pub end_angle_rad: f64,
 }
 
+/// `times` are those of the passes of a smooth move.
 pub(super) fn way<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
-    trajectory: &Trajectory<N>,
+    (trajectory, times): (&Trajectory<N>, &[f64]),
     samples: &[ToolSample],
 ) -> Way {
     let (poses, in_order) = match motion.shape {
-        Shape::Smooth => passes(motion, chain, trajectory, samples),
+        Shape::Smooth => passes(motion, chain, trajectory, times),
         Shape::Joint | Shape::Straight => (Vec::new(), true),
     };
     let straight = motion.shape == Shape::Straight;
@@ -234,38 +240,52 @@ fn straightness(samples: &[ToolSample]) -> f64 {
     samples.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Finds, in order, the first local closest approach to each intermediate
-/// pose that lies within the tolerance; a later approach never repairs a miss.
+/// How each intermediate pose is passed at the time known from the planned way, which is that of
+/// the closest approach. Where the joints leave the planned way by the last digits, and with them
+/// the ball, the closest moment near that time counts.
 fn passes<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
     trajectory: &Trajectory<N>,
-    samples: &[ToolSample],
+    times: &[f64],
 ) -> (Vec<PassReport>, bool) {
     let intermediate = &motion.poses[..motion.poses.len() - 1];
-    let (mut from, mut in_order) = (0, true);
+    let angular_tolerance_rad = angular_tolerance(motion.tolerance);
+    let (mut since, mut in_order) = (0.0, times.len() == intermediate.len());
     let mut reports = Vec::with_capacity(intermediate.len());
-    for (index, pose) in intermediate.iter().enumerate() {
-        let target = pose.translation.vector;
-        let distance = |i: usize| (samples[i].pose.translation.vector - target).norm();
-        let at = first_approach(from, samples.len(), motion.tolerance, distance);
-        let window = (
-            samples[at.saturating_sub(1)].time,
-            samples[(at + 1).min(samples.len() - 1)].time,
-        );
-        let near = |t: f64| {
-            let pose = chain.forward(&trajectory.sample(t).position);
-            (pose.translation.vector - target).norm()
+    for (index, (pose, time)) in intermediate.iter().zip(times).enumerate() {
+        let seen = |t: f64| {
+            let gap = pose.inv_mul(&chain.forward(&trajectory.sample(t).position));
+            (gap.translation.vector.norm(), gap.rotation.angle())
         };
-        let (time_s, deviation_m) = closest(window, near);
-        in_order &= deviation_m <= motion.tolerance.max(EXACT);
+        let mut time_s = time.clamp(since, trajectory.duration().max(since));
+        let (mut deviation_m, mut angle_rad) = seen(time_s);
+        if deviation_m > motion.tolerance {
+            let after = times
+                .get(index + 1)
+                .map_or(trajectory.duration(), |next| *next);
+            let window = (
+                since.max(time_s - NEAR),
+                (time_s + NEAR).min(after.max(time_s)),
+            );
+            let (closest_s, least) = closest(window, |t| seen(t).0);
+            if least < deviation_m {
+                time_s = closest_s;
+                (deviation_m, angle_rad) = seen(time_s);
+            }
+        }
+        in_order &= time_s >= since
+            && deviation_m <= motion.tolerance.max(EXACT)
+            && angle_rad <= angular_tolerance_rad.max(EXACT_ANGLE);
         reports.push(PassReport {
             index: index + 1,
             deviation_m,
             tolerance_m: motion.tolerance,
+            angle_rad,
+            angular_tolerance_rad,
             time_s,
         });
-        from = at;
+        since = time_s;
     }
     (reports, in_order)
 }
@@ -273,33 +293,10 @@ fn passes<const N: usize>(
 /// What counts as exact where the tolerance is zero, m: a hundredth of the
 /// repeatability of the best arms.
 const EXACT: f64 = 2e-7;
-
-fn first_approach(
-    from: usize,
-    count: usize,
-    tolerance: f64,
-    distance: impl Fn(usize) -> f64,
-) -> usize {
-    let mut best = from;
-    for i in from..count {
-        let here = distance(i);
-        let falls_before = i == from || here <= distance(i - 1);
-        let rises_after = i + 1 == count || here < distance(i + 1);
-        // Between samples the approach may be nearer than at them, hence the slack.
-        let reach = if i + 1 < count {
-            (distance(i + 1) - here).abs()
-        } else {
-            0.0
-        };
-        if falls_before && rises_after && here <= tolerance.max(EXACT) + reach {
-            return i;
-        }
-        if here < distance(best) {
-            best = i;
-        }
-    }
-    best
-}
+/// The same of an orientation, rad.
+const EXACT_ANGLE: f64 = 1e-6;
+/// How near to the planned time of a pass the joints pass the pose, s.
+const NEAR: f64 = 2e-3;
 
 /// Least value of a function with one valley between two times, by golden section.
 fn closest((mut low, mut high): (f64, f64), distance: impl Fn(f64) -> f64) -> (f64, f64) {

@@ -20,6 +20,8 @@ pub use certificate::{MoveCertificate, PassReport, Peaks};
 pub use jog::Direction;
 pub use motion_error::MotionError;
 
+use cartesian::Blended;
+
 use crate::task::{Move, Shape};
 
 /// Joint ratios may exceed 1 by rounding only.
@@ -110,8 +112,10 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         match motion.shape {
-            Shape::Joint => self.certify(motion, start, self.plan_joint(motion, start)?),
-            Shape::Straight => self.certify(motion, start, self.plan_straight(motion, start)?),
+            Shape::Joint => self.certify(motion, start, (self.plan_joint(motion, start)?, &[])),
+            Shape::Straight => {
+                self.certify(motion, start, (self.plan_straight(motion, start)?, &[]))
+            }
             Shape::Smooth => self.smooth_move(motion, start),
         }
     }
@@ -129,8 +133,12 @@ impl<const N: usize> Planner<N> {
                 tolerance,
                 ..motion.clone()
             };
-            let (trajectory, blend) = self.plan_smooth(&tighter, start)?;
-            let planned = self.certify(motion, start, trajectory)?;
+            let Blended {
+                trajectory,
+                blend,
+                passes,
+            } = self.plan_smooth(&tighter, start)?;
+            let planned = self.certify(motion, start, (trajectory, &passes))?;
             Ok(PlannedMove {
                 blend: Some(blend),
                 ..planned
@@ -155,27 +163,35 @@ impl<const N: usize> Planner<N> {
     }
 
     /// Slows the motion down, uniformly and by as little as needed, until every
-    /// limit holds, and proves what the command asked for.
+    /// limit holds, and proves what the command asked for. With the motion come the times at
+    /// which it passes the intermediate poses of a smooth move.
     fn certify(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        trajectory: Trajectory<N>,
+        (trajectory, passes): (Trajectory<N>, &[f64]),
     ) -> Result<PlannedMove<N>, MotionError> {
         if trajectory.pieces().is_empty() {
             // Nothing to do: the arm is there. What is proved is that standing still is right.
             let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
-            let standing = self.certify(motion, start, still)?;
+            let standing = self.certify(motion, start, (still, passes))?;
             return Ok(PlannedMove {
                 trajectory,
                 ..standing
             });
         }
         check_smooth(&trajectory, start)?;
+        let before = trajectory.duration();
         let trajectory = self.within_limits(trajectory, &motion.limits);
+        let slower = if before > 0.0 {
+            trajectory.duration() / before
+        } else {
+            1.0
+        };
+        let passes: Vec<f64> = passes.iter().map(|time| time * slower).collect();
         let samples = certificate::tool_samples(self.chain(), &trajectory);
         let peaks = certificate::peaks(&trajectory, &samples, &self.limits, &motion.limits);
-        let way = certificate::way(motion, self.chain(), &trajectory, &samples);
+        let way = certificate::way(motion, self.chain(), (&trajectory, &passes), &samples);
         let joint_margin = self.margin(&trajectory);
         let active = active::active(
             &trajectory,

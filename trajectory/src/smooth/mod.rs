@@ -31,7 +31,7 @@ mod windows;
 pub use certificate::{Certificate, Peak};
 pub use lower_bound::least_time;
 pub use measure::{Measure, measure};
-pub use options::{SmoothError, SmoothOptions};
+pub use options::{SmoothError, SmoothOptions, angular_tolerance};
 pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};
 pub use windows::Windows;
