@@ -9,7 +9,7 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{Blend, MotionError, Planner, certificate};
+use super::{Blend, Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest way of the tool between two solved points, m.
@@ -18,6 +18,9 @@ const STEP_M: f64 = 4e-3;
 const STEP_RAD: f64 = 0.02;
 /// Largest deviation of the fitted joint path between solved points, m and rad.
 const FIT: f64 = 5e-7;
+/// Share of the time by which a motion may be slowed down as a whole before another time law is
+/// looked for.
+const ENOUGH: f64 = 1e-3;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -28,11 +31,11 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
+    ) -> Result<Draft<N>, MotionError> {
         let goal = motion.poses.first().copied().unwrap_or_default();
         let from = self.chain().forward(start);
         if is_still(&[from, goal]) {
-            return Ok(Trajectory::new(Vec::new()));
+            return Ok(Draft::of(Trajectory::new(Vec::new())));
         }
         let line = Line::new(from, goal);
         let points = self
@@ -44,21 +47,28 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let path = joint_path(&line, &points)?;
-        time_path(&path, &self.limits, &motion.limits, &options)
-            .map(|timed| timed.trajectory)
-            .map_err(|error| MotionError::Timing(error.to_string()))
+        let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
+        let draft = Draft {
+            // The joints of a seven-joint arm may take another way along the same line.
+            least: if N > 6 {
+                0.0
+            } else {
+                timed.certificate.lower_bound
+            },
+            ..Draft::of(timed.trajectory)
+        };
+        Ok(self.slowed(draft, motion))
     }
 
     pub(super) fn plan_smooth(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Blended<N>, MotionError> {
+    ) -> Result<(Draft<N>, Blend), MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
-        let plan = smooth::plan(&poses, &options)
-            .map_err(|error| MotionError::Smooth(error.to_string()))?;
+        let plan = smooth::plan(&poses, &options)?;
         let blend = Blend {
             tolerance: motion.tolerance,
             exact_stop: plan.exact_stop(),
@@ -70,15 +80,14 @@ impl<const N: usize> Planner<N> {
                 .max(plan.certificate().angular_jerk.ratio),
             fallbacks: plan.fallbacks(),
         };
-        let passed: Vec<f64> = plan.passes().iter().map(|pass| pass.time).collect();
+        let passes: Vec<f64> = plan.passes().iter().map(|pass| pass.time).collect();
+        let draft = |trajectory, passes| Draft {
+            passes,
+            ..Draft::of(trajectory)
+        };
         if is_still(&poses) || plan.duration() <= 0.0 {
-            let trajectory = Trajectory::new(Vec::new());
-            let passes = vec![0.0; passed.len()];
-            return Ok(Blended {
-                trajectory,
-                blend,
-                passes,
-            });
+            let at_once = vec![0.0; passes.len()];
+            return Ok((draft(Trajectory::new(Vec::new()), at_once), blend));
         }
         let towards = |u: f64| {
             1 + plan
@@ -91,17 +100,11 @@ impl<const N: usize> Planner<N> {
             .followed((&plan, true), start, &towards)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
-        let samples = certificate::tool_samples(self.chain(), &direct);
-        let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
-        let blended = |trajectory, passes| Blended {
-            trajectory,
-            blend,
-            passes,
-        };
-        if stretch <= 1.0 + 1e-4 {
-            return Ok(blended(direct, passed));
+        let free = direct.duration();
+        let direct = self.slowed(draft(direct, passes.clone()), motion);
+        if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
+            return Ok((direct, blend));
         }
-        let slow = direct.stretched(stretch);
         let options = TimingOptions {
             start: Boundary::Free,
             end: Boundary::Free,
@@ -109,15 +112,16 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let path = joint_path(&plan, &points)?;
-        match time_path(&path, &self.limits, &motion.limits, &options) {
-            Ok(timed) if timed.trajectory.duration() < slow.duration() => {
-                let passes = passed.iter().map(|u| moment(&timed.law, *u)).collect();
-                Ok(blended(timed.trajectory, passes))
+        let timed = time_path(&path, &self.limits, &motion.limits, &options);
+        let timed = timed.map(|timed| {
+            let times = passes.iter().map(|u| moment(&timed.law, *u)).collect();
+            self.slowed(draft(timed.trajectory, times), motion)
+        });
+        match timed {
+            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => {
+                Ok((timed, blend))
             }
-            _ => {
-                let passes = passed.iter().map(|time| time * stretch).collect();
-                Ok(blended(slow, passes))
-            }
+            _ => Ok((direct, blend)),
         }
     }
 
@@ -228,14 +232,6 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// A smooth motion of the joints and when it passes each intermediate pose.
-pub(super) struct Blended<const N: usize> {
-    pub trajectory: Trajectory<N>,
-    pub blend: Blend,
-    /// Times after the start, s; never decreasing.
-    pub passes: Vec<f64>,
-}
-
 /// Whether all poses are where the first is, within 1e-9 m and rad.
 fn is_still(poses: &[Isometry3<f64>]) -> bool {
     poses.iter().all(|pose| {
@@ -301,8 +297,7 @@ fn joint_path<'a, const N: usize>(
         .iter()
         .map(|point| (point.u, JointPoint { q: point.q }))
         .collect();
-    HermitePath::new(points, curve)
-        .ok_or_else(|| MotionError::Timing("the way has fewer than two points".into()))
+    HermitePath::new(points, curve).ok_or(MotionError::NoWay)
 }
 
 /// Knots of the curve, with points between them so that no step is long.

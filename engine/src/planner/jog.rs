@@ -88,11 +88,7 @@ impl<const N: usize> Planner<N> {
             tolerance: 0.0,
             limits: *most,
         };
-        slow.certify(
-            &motion,
-            start,
-            (slow.joint_move(&motion, start, &goal)?, &[]),
-        )
+        slow.certify(&motion, start, slow.joint_move(&motion, start, &goal)?)
     }
 
     fn jog_tool(

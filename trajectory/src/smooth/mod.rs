@@ -12,7 +12,6 @@
 //! where joints need more time, the path timing stretches it, and stretching
 //! changes no geometry.
 
-mod active;
 mod approach;
 mod certificate;
 mod choose;
@@ -22,12 +21,13 @@ mod measure;
 mod options;
 mod pass;
 mod plan;
-mod poly;
+pub(crate) mod poly;
 mod ramp;
 mod span;
 mod spline;
 mod windows;
 
+pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use lower_bound::least_time;
 pub use measure::{Measure, measure};

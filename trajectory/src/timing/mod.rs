@@ -35,7 +35,9 @@ mod warp;
 
 pub use bench::{Row, bench};
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
+pub(crate) use certificate::{order as limit_order, root as limit_root};
 pub use law::{Law, LawProblem};
+pub use least::least_time;
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 pub use samples::RandomPaths;
