@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Event, Executor, Recorded, ToolOrder};
 use ipc::{Clock, GRIPPER, ToolAction};
+use servo::{Event, Executor, Recorded, ToolOrder};
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed, planned};
 
 /// What a run leaves.
@@ -17,9 +17,7 @@ struct Run {
 
 /// Commands 0 to `commands`, a gripper order after the first.
 fn run(name: &str, commands: u32) -> Run {
-    let arm: ipc::Arm = format!("servo-{}/{name}", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm(&format!("servo/{name}"));
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let _stop = crate::StopOnDrop(&stop);

@@ -4,14 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Control, Event, Executor, ExecutorError, Fault};
 use ipc::Clock;
+use servo::{Control, Event, Executor, ExecutorError, Fault};
 use system_tests::servo_arm::{driver_options, executor_config, feed, planned};
 
 fn arm(name: &str) -> ipc::Arm {
-    format!("wall-{}/{name}", std::process::id())
-        .parse()
-        .unwrap()
+    system_tests::domain::arm(&format!("wall/{name}"))
 }
 
 /// Programs run by the clock: the samples are the plan's, the periods add up.

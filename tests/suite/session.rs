@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use engine::dry_run::{PlanOptions, PlanSample, plan_program};
-use engine::robot::Robot;
 use engine::session::{Note, RunSample, Session, SessionConfig};
 use ipc::{Arm, Clock};
+use planner::dry_run::{PlanOptions, PlanSample, plan_program};
+use planner::robot::Robot;
 
 const PROGRAM: &str = r#"
 InitCanon()
@@ -59,9 +59,7 @@ impl Drop for Driver {
 
 /// Runs the program to its end and returns what was reported and recorded.
 fn run(robot: &Robot, name: &str) -> (Vec<Note>, Vec<RunSample>) {
-    let arm: Arm = format!("test-{}/{name}", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm(&format!("test/{name}"));
     let _driver = Driver::start(robot, &arm);
     let mut config = SessionConfig::new(arm);
     config.clock = Clock::LockStep;
@@ -139,7 +137,7 @@ fn names_done(notes: &[Note]) -> Vec<&'static str> {
 
 #[test]
 fn a_program_runs_in_step_with_the_driver() {
-    let robot = engine::robot::load("ur5e").unwrap();
+    let robot = planner::robot::load("ur5e").unwrap();
     let (notes, samples) = run(&robot, "step");
     assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
     let planned = planned(&robot);
