@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use engine::executor::{Control, Event, Runner, Tick};
-use ipc::{Arm, Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
+use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
 
 thread_local! {
@@ -76,7 +76,7 @@ fn the_counters_count() {
 /// setpoint; the driver's answer is sent from the same thread.
 #[test]
 fn a_hundred_thousand_periods_without_heap_or_wait() {
-    let arm: Arm = format!("alloc-{}/arm", std::process::id()).parse().unwrap();
+    let arm = system_tests::domain::arm("alloc/arm");
     let engine = EngineLink::open(&arm).unwrap();
     let driver = DriverLink::open(&arm).unwrap();
     let mut config = executor_config(arm, Clock::LockStep);

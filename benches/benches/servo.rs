@@ -17,7 +17,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use engine::executor::{Control, Event, Executor, ExecutorConfig, Feeder, Histogram, Remote};
-use ipc::{Arm, Clock, DriverLink, EngineLink, Probe, Setpoint, State};
+use ipc::{Arm, Clock, Domain, DriverLink, EngineLink, Probe, Setpoint, State};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Limits, Manner, Piece, Sample, Segment};
 
@@ -74,9 +74,13 @@ fn machine() {
 }
 
 fn arm(name: &str) -> Arm {
-    format!("bench-{}/{name}", std::process::id())
-        .parse()
-        .unwrap()
+    named(&format!("bench-{}/{name}", std::process::id()))
+}
+
+/// The arm of this name in the user's domain.
+fn named(arm: &str) -> Arm {
+    let domain = Domain::choose(None, |name| std::env::var_os(name)).unwrap();
+    domain.arm(arm).unwrap()
 }
 
 /// Another process of this bench, ended with the value.
@@ -129,7 +133,7 @@ fn command(index: u32) -> Segment<N> {
 }
 
 fn driver(arm: &str) {
-    let mut options = driver_sim::Options::new(arm.parse().unwrap(), N);
+    let mut options = driver_sim::Options::new(named(arm), N);
     options.velocity = vec![3.1; N];
     static STOP: AtomicBool = AtomicBool::new(false);
     driver_sim::run(options, &STOP).unwrap();
@@ -335,7 +339,7 @@ fn cyclictest(rate: f64) -> Option<(u64, u64)> {
 }
 
 fn echo_probe(arm: &str, look: fn(&Probe) -> Option<u64>) {
-    let probe = Probe::open(&arm.parse().unwrap(), false).unwrap();
+    let probe = Probe::open(&named(arm), false).unwrap();
     loop {
         if let Some(number) = look(&probe) {
             probe.send(number);
@@ -345,7 +349,7 @@ fn echo_probe(arm: &str, look: fn(&Probe) -> Option<u64>) {
 }
 
 fn echo_link(arm: &str) {
-    let link = DriverLink::open(&arm.parse().unwrap()).unwrap();
+    let link = DriverLink::open(&named(arm)).unwrap();
     loop {
         if let Some(setpoint) = link.next_setpoint()
             && setpoint.check(N).is_ok()

@@ -1,7 +1,8 @@
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, IpcError, Verb};
+use ipc::{Answer, Arm, Client, Domain, IpcError, Verb};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -9,22 +10,51 @@ use crate::failure::Failure;
 /// How long an engine may take to answer; it answers between two periods of its main loop.
 const PATIENCE: Duration = Duration::from_secs(3);
 
+/// In which domain engine, driver and clients find each other.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct DomainOption {
+    /// Directory in which engine, driver and clients find each other, for this user only [default:
+    /// $CANTER_DOMAIN, else canter in the user's runtime directory]
+    #[arg(long, value_name = "DIR")]
+    domain: Option<PathBuf>,
+}
+
+impl DomainOption {
+    /// The domain that was chosen.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] when its directory cannot be used.
+    pub(crate) fn open(&self) -> Result<Domain, Failure> {
+        Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name)).map_err(failure)
+    }
+}
+
 /// Which arm a command is about.
 #[derive(Args, Debug)]
 pub(crate) struct ArmOption {
     /// Name of the arm, as cell/arm; engine, driver and clients find each other by it
     #[arg(long, value_name = "CELL/ARM", default_value = "canter/arm")]
-    pub(crate) arm: Arm,
+    arm: String,
+    #[command(flatten)]
+    domain: DomainOption,
 }
 
 impl ArmOption {
+    /// The arm in its domain.
+    ///
+    /// # Errors
+    /// [`Exit::Usage`] for a wrong name, [`Exit::NoPeer`] when the domain cannot be used.
+    pub(crate) fn open(&self) -> Result<Arm, Failure> {
+        self.domain.open()?.arm(&self.arm).map_err(failure)
+    }
+
     /// Asks the arm's engine and waits for the answer.
     ///
     /// # Errors
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.arm, "canter").map_err(failure)?;
+        let client = Client::open(&self.open()?, "canter").map_err(failure)?;
         accepted(client.ask(verb, PATIENCE).map_err(failure)?)
     }
 

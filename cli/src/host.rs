@@ -7,7 +7,7 @@ use engine::dry_run::FailurePolicy;
 use engine::executor::{Control, ExecutorError};
 use engine::robot::Robot;
 use engine::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
-use ipc::{Answer, ClientServer, Clock, Identity, Ownership, Request, StatusWriter, Verb};
+use ipc::{Answer, Arm, ClientServer, Clock, Identity, Ownership, Request, StatusWriter, Verb};
 use serde_json::{Value, json};
 
 use crate::client::{self, ArmOption};
@@ -100,7 +100,7 @@ impl HostOptions {
         default_length: crcl::LengthUnit,
         on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
-        let arm = self.arm.arm.clone();
+        let arm = self.arm.open()?;
         // Before the driver: a second engine must not disturb the arm of the first.
         let clients = ClientServer::open(&arm).map_err(client::failure)?;
         let status = StatusWriter::open(&arm).map_err(client::failure)?;
@@ -114,7 +114,7 @@ impl HostOptions {
         let simulation = simulation
             .map(|kind| Simulation::start(kind, place, &arm))
             .transpose()?;
-        let mut config = SessionConfig::new(arm);
+        let mut config = SessionConfig::new(arm.clone());
         config.rate_hz = self.rate;
         config.clock = if self.lock_step {
             Clock::LockStep
@@ -129,6 +129,7 @@ impl HostOptions {
             tracing::warn!("{warning}");
         }
         Ok(Host {
+            arm,
             session,
             clients,
             status,
@@ -159,6 +160,8 @@ fn failure(error: SessionError) -> Failure {
 ///
 /// Fields are dropped in this order: the session stops the arm while the driver still lives.
 pub(crate) struct Host {
+    /// The arm.
+    pub(crate) arm: Arm,
     /// The session.
     pub(crate) session: Session,
     clients: ClientServer,

@@ -53,6 +53,8 @@ impl Simulation {
             command
                 .args(["--until-end-of-input", "--robot", robot, "--arm"])
                 .arg(arm.to_string())
+                .arg("--domain")
+                .arg(arm.domain().directory())
                 .stdin(Stdio::piped())
                 .stdout(Stdio::piped())
                 .process_group(0)

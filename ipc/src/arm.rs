@@ -2,37 +2,28 @@
 
 use core::fmt;
 
-use crate::IpcError;
+use crate::{Domain, IpcError};
 
-/// The name of an arm: `cell/arm`, both of lower or upper case letters, digits, `-` and `_`.
-/// Engine and driver find each other by it.
-///
-/// ```
-/// let arm: ipc::Arm = "kitting/left".parse()?;
-/// assert_eq!(arm.to_string(), "kitting/left");
-/// assert!("no spaces/please".parse::<ipc::Arm>().is_err());
-/// # Ok::<(), ipc::IpcError>(())
-/// ```
+/// An arm of a [`Domain`]; its name is `cell/arm`, both of lower or upper case letters, digits,
+/// `-` and `_`. Engine and driver find each other by it. [`Domain::arm`] makes one.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Arm(String);
+pub struct Arm {
+    name: String,
+    domain: Domain,
+}
 
 impl Arm {
     /// The name of one of the arm's services, such as `kitting/left/setpoint`.
     pub(crate) fn service(&self, kind: &str) -> String {
-        format!("{}/{kind}", self.0)
+        format!("{}/{kind}", self.name)
     }
-}
 
-impl fmt::Display for Arm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+    /// Where the arm is found.
+    pub fn domain(&self) -> &Domain {
+        &self.domain
     }
-}
 
-impl core::str::FromStr for Arm {
-    type Err = IpcError;
-
-    fn from_str(text: &str) -> Result<Self, IpcError> {
+    pub(crate) fn new(name: &str, domain: Domain) -> Result<Self, IpcError> {
         let word = |part: &str| {
             !part.is_empty()
                 && part.len() <= 60
@@ -40,12 +31,21 @@ impl core::str::FromStr for Arm {
                     .chars()
                     .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
         };
-        match text.split_once('/') {
-            Some((cell, arm)) if word(cell) && word(arm) => Ok(Self(text.to_owned())),
+        match name.split_once('/') {
+            Some((cell, arm)) if word(cell) && word(arm) => Ok(Self {
+                name: name.to_owned(),
+                domain,
+            }),
             _ => Err(IpcError::BadArmName {
-                name: text.chars().take(80).collect(),
+                name: name.chars().take(80).collect(),
             }),
         }
+    }
+}
+
+impl fmt::Display for Arm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
     }
 }
 

@@ -12,6 +12,16 @@ pub enum IpcError {
         /// The name that was given.
         name: String,
     },
+    /// The directory of the domain cannot be used.
+    #[error("{}: {cause}; {remedy}", directory.display())]
+    Domain {
+        /// The directory.
+        directory: std::path::PathBuf,
+        /// What is wrong with it.
+        cause: String,
+        /// The command or setting that repairs it.
+        remedy: String,
+    },
     /// Another living process already holds this end of the arm.
     #[error("{arm}: the {role} is already taken by {owner}")]
     Taken {

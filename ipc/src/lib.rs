@@ -9,12 +9,13 @@
 //!   report back.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
-//! in a signature. Nobody else names iceoryx2. All segments belong to one user and are readable by
-//! that user only.
+//! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
+//! readable by that user only.
 
 mod arm;
 mod client;
 mod clock;
+mod domain;
 mod driver_link;
 mod engine_link;
 mod error;
@@ -31,11 +32,12 @@ pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
 };
 pub use clock::{now_ns, sleep_until_ns};
+pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
-pub use node::{Leftovers, cleanup, survey};
+pub use node::{NodeCount, count_nodes, remove_dead_nodes};
 pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};

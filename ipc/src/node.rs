@@ -12,7 +12,7 @@ use iceoryx2::service::builder::request_response::{
 };
 use iceoryx2::service::port_factory::{publish_subscribe, request_response};
 
-use crate::{Arm, IpcError, PROTOCOL};
+use crate::{Arm, Domain, IpcError, PROTOCOL};
 
 /// The kind of service: shared memory between processes, ports that stay in their thread.
 pub(crate) type Shared = ipc::Service;
@@ -23,26 +23,28 @@ pub(crate) type TextExchange = request_response::PortFactory<Shared, [u8], (), [
 /// How many messages wait for a slow reader before the oldest is overwritten.
 const BUFFER: usize = 16;
 
-/// Where our files are: apart from every other user of iceoryx2, and from other users.
-fn configuration() -> Config {
+/// iceoryx2's configuration for a domain: its directory for what is found by name, its prefix for
+/// the segments.
+fn configuration(domain: &Domain) -> Result<Config, IpcError> {
+    let fail = |cause: String| IpcError::Failed {
+        service: domain.directory().display().to_string(),
+        operation: "naming the directory",
+        cause,
+    };
+    let directory = domain.directory().as_os_str().as_encoded_bytes();
+    let directory = Path::new(directory).map_err(|cause| fail(format!("{cause:?}")))?;
+    let prefix = FileName::new(domain.prefix().as_bytes());
     let mut config = Config::default();
-    // SAFETY: the call has no preconditions and cannot fail.
-    #[expect(
-        unsafe_code,
-        reason = "the standard library does not show the user's number"
-    )]
-    let user = unsafe { libc::geteuid() };
-    if let Ok(prefix) = FileName::new(format!("canter_{user}_").as_bytes()) {
-        config.global.prefix = prefix;
-    }
-    config
+    config.global.prefix = prefix.map_err(|cause| fail(format!("{cause:?}")))?;
+    config.global.set_root_path(&directory);
+    Ok(config)
 }
 
 /// Joins the others: cleans up after dead processes, then makes a node. `role` is shown to those
 /// who find the place taken.
 pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
     set_log_level(LogLevel::Fatal);
-    let config = configuration();
+    let config = configuration(arm.domain())?;
     Node::<Shared>::try_cleanup_dead_nodes(&config);
     let fail = |cause: String| IpcError::Failed {
         service: arm.to_string(),
@@ -59,36 +61,46 @@ pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
         .map_err(|cause| fail(format!("{cause:?}")))
 }
 
-/// What dead processes left behind.
+/// How many processes use a domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Leftovers {
-    /// Processes that live and use our shared memory.
+pub struct NodeCount {
+    /// Nodes of living processes; a process may have several.
     pub alive: usize,
-    /// Dead processes whose segments are still there.
+    /// Nodes of dead processes whose segments are still there.
     pub dead: usize,
 }
 
-/// Counts the living and the dead processes in our shared memory, and changes nothing.
-pub fn survey() -> Leftovers {
-    let mut found = Leftovers::default();
-    let config = configuration();
-    // A list that cannot be read counts as empty: there is nothing to clean up then.
-    let _ = Node::<Shared>::list(&config, |state| {
+/// Counts the nodes of living and of dead processes in `domain`, and changes nothing.
+///
+/// # Errors
+/// [`IpcError::Failed`] when the list cannot be read.
+pub fn count_nodes(domain: &Domain) -> Result<NodeCount, IpcError> {
+    let mut found = NodeCount::default();
+    let config = configuration(domain)?;
+    Node::<Shared>::list(&config, |state| {
         match state {
             NodeState::Alive(_) => found.alive += 1,
             NodeState::Dead(_) => found.dead += 1,
             _ => {}
         }
         CallbackProgression::Continue
-    });
-    found
+    })
+    .map_err(|cause| IpcError::Failed {
+        service: domain.directory().display().to_string(),
+        operation: "listing the processes",
+        cause: format!("{cause:?}"),
+    })?;
+    Ok(found)
 }
 
-/// Removes what dead processes left behind; returns how many were cleaned up and how many could
-/// not be.
-pub fn cleanup() -> (u64, u64) {
-    let result = Node::<Shared>::try_cleanup_dead_nodes(&configuration());
-    (result.cleanups, result.failed_cleanups)
+/// Removes what dead processes left behind in `domain`; returns how many were cleaned up and how
+/// many could not be.
+///
+/// # Errors
+/// [`IpcError::Failed`] when iceoryx2 does not take the domain's directory.
+pub fn remove_dead_nodes(domain: &Domain) -> Result<(u64, u64), IpcError> {
+    let result = Node::<Shared>::try_cleanup_dead_nodes(&configuration(domain)?);
+    Ok((result.cleanups, result.failed_cleanups))
 }
 
 /// The name of a service of `arm`, in iceoryx2's type.

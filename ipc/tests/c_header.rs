@@ -447,6 +447,45 @@ fn a_c_compiler_agrees() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Python and Rust choose the same directory and prefix, whatever is set.
+#[test]
+fn python_chooses_the_same_domain() {
+    const PROGRAM: &str = "import domain
+place = domain.directory()
+print(place, domain.prefix(place))";
+    let folder = tempfile::tempdir().unwrap();
+    let runtime = folder.path().join("runtime");
+    let named = folder.path().join("named");
+    ipc::Domain::open(&runtime).unwrap();
+    let cases = [
+        vec![],
+        vec![("XDG_RUNTIME_DIR", &runtime)],
+        vec![("XDG_RUNTIME_DIR", &runtime), ("CANTER_DOMAIN", &named)],
+    ];
+    for set in cases {
+        let mut python = Command::new("python3");
+        python.args(["-B", "-c", PROGRAM]);
+        python.current_dir(drivers().join("python/canter_driver"));
+        python
+            .env_remove("XDG_RUNTIME_DIR")
+            .env_remove("CANTER_DOMAIN");
+        python.envs(set.iter().copied());
+        let output = match python.output() {
+            Err(error) => return println!("ignored: no python3 ({error})"),
+            Ok(output) => output,
+        };
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        let domain = ipc::Domain::choose(None, |name| {
+            let found = set.iter().find(|(known, _)| *known == name);
+            found.map(|(_, value)| value.as_os_str().to_owned())
+        });
+        let domain = domain.unwrap();
+        let wanted = format!("{} {}\n", domain.directory().display(), domain.prefix());
+        assert_eq!(String::from_utf8(output.stdout).unwrap(), wanted);
+    }
+}
+
 /// The Python messages need nothing but Python itself.
 #[test]
 fn python_agrees() {

@@ -6,14 +6,15 @@ use std::thread;
 use std::time::Duration;
 
 use ipc::{
-    Answer, Arm, Client, ClientServer, Clock, DriverLink, EngineLink, Hello, HelloAck, Identity,
-    IpcError, Ownership, Request, Setpoint, State, StatusReader, StatusWriter, Verb, Verdict,
+    Answer, Arm, Client, ClientServer, Clock, Domain, DriverLink, EngineLink, Hello, HelloAck,
+    Identity, IpcError, Ownership, Request, Setpoint, State, StatusReader, StatusWriter, Verb,
+    Verdict,
 };
 
 fn arm(name: &str) -> Arm {
-    format!("test-{}/{name}", std::process::id())
-        .parse()
-        .unwrap()
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("domain");
+    let name = format!("test-{}/{name}", std::process::id());
+    Domain::open(&folder).unwrap().arm(&name).unwrap()
 }
 
 #[test]

@@ -5,11 +5,16 @@
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
-use ::ipc::{Arm, DriverLink, EngineLink, IpcError};
-use iceoryx2::prelude::{Config, FileName, NodeBuilder, SemanticString, ServiceName};
+use ::ipc::{Domain, DriverLink, EngineLink, IpcError};
+use iceoryx2::prelude::{Config, FileName, NodeBuilder, Path, SemanticString, ServiceName};
 
 /// Tells the child process which arm to spoil.
 const ARM: &str = "CANTER_TEST_MISMATCH";
+
+fn domain() -> Domain {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("domain");
+    Domain::open(&folder).unwrap()
+}
 
 /// Not a test of its own: the other process.
 #[test]
@@ -17,10 +22,10 @@ const ARM: &str = "CANTER_TEST_MISMATCH";
 fn another_layout() {
     let Ok(arm) = std::env::var(ARM) else { return };
     let mut config = Config::default();
-    #[expect(unsafe_code, reason = "the user's number")]
-    // SAFETY: the call has no preconditions and cannot fail.
-    let user = unsafe { libc::geteuid() };
-    config.global.prefix = FileName::new(format!("canter_{user}_").as_bytes()).unwrap();
+    let (domain, directory) = (domain(), domain().directory().to_owned());
+    config.global.prefix = FileName::new(domain.prefix().as_bytes()).unwrap();
+    let directory = Path::new(directory.as_os_str().as_encoded_bytes()).unwrap();
+    config.global.set_root_path(&directory);
     let node = NodeBuilder::new()
         .config(&config)
         .create::<iceoryx2::service::ipc::Service>()
@@ -53,7 +58,7 @@ fn another_layout_is_refused_in_words() {
             .map_while(Result::ok)
             .any(|line| line.contains("made"))
     );
-    let arm: Arm = name.parse().unwrap();
+    let arm = domain().arm(&name).unwrap();
     let engine = EngineLink::open(&arm).err().unwrap();
     let driver = DriverLink::open(&arm).err().unwrap();
     child.stdin.take().unwrap().write_all(b"\n").unwrap();

@@ -8,9 +8,7 @@ use system_tests::servo_arm::{JOINTS, driver_options};
 
 #[test]
 fn the_simulated_driver_conforms() {
-    let arm: ipc::Arm = format!("conform-{}/sim", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm("conform/sim");
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let _stop = crate::StopOnDrop(&stop);
@@ -36,9 +34,7 @@ fn the_simulated_driver_conforms() {
 /// A driver that is too slow to follow and has no gripper is seen.
 #[test]
 fn a_lazy_driver_is_seen() {
-    let arm: ipc::Arm = format!("conform-{}/lazy", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm("conform/lazy");
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let _stop = crate::StopOnDrop(&stop);

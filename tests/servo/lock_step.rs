@@ -17,9 +17,7 @@ struct Run {
 
 /// Commands 0 to `commands`, a gripper order after the first.
 fn run(name: &str, commands: u32) -> Run {
-    let arm: ipc::Arm = format!("servo-{}/{name}", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm(&format!("servo/{name}"));
     let stop = AtomicBool::new(false);
     thread::scope(|scope| {
         let _stop = crate::StopOnDrop(&stop);

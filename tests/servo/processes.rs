@@ -6,6 +6,8 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
+use system_tests::domain::domain;
+
 use crate::scene::{Line, PATIENCE, Scene, assert_within_limits, read, rest_error};
 
 #[test]
@@ -102,6 +104,11 @@ fn a_second_engine_is_refused_by_name() {
     assert_eq!(other.child.wait().unwrap().code(), Some(4));
 }
 
+/// Dead processes whose segments are still there, in the domain of this test alone.
+fn dead_nodes() -> usize {
+    ipc::count_nodes(&domain()).unwrap().dead
+}
+
 /// A hundred kills leave nothing behind but what the next start cleans up: each start cleans up
 /// after the one before, and the last is cleaned up here.
 #[test]
@@ -117,15 +124,15 @@ fn a_hundred_kills_leak_nothing() {
         driver.child.kill().unwrap();
         driver.child.wait().unwrap();
         std::fs::remove_file(scene.log(0)).unwrap();
-        most = most.max(ipc::survey().dead);
+        most = most.max(dead_nodes());
     }
     assert!(most < 20, "{most} dead processes at a time");
     let start = Instant::now();
-    while ipc::survey().dead > 0 && start.elapsed() < PATIENCE {
-        ipc::cleanup();
+    while dead_nodes() > 0 && start.elapsed() < PATIENCE {
+        ipc::remove_dead_nodes(&domain()).unwrap();
         thread::sleep(Duration::from_millis(10));
     }
-    assert_eq!(ipc::survey().dead, 0);
+    assert_eq!(dead_nodes(), 0);
 }
 
 /// A hog of the processors at a higher priority: either every period is made in time to go on, or
@@ -215,9 +222,9 @@ fn left_over_segments_are_cleaned_up() {
         assert!(assert_within_limits(&read(&scene.log(number))) > 50);
     }
     let start = Instant::now();
-    while ipc::survey().dead > 0 && start.elapsed() < PATIENCE {
-        ipc::cleanup();
+    while dead_nodes() > 0 && start.elapsed() < PATIENCE {
+        ipc::remove_dead_nodes(&domain()).unwrap();
         thread::sleep(Duration::from_millis(10));
     }
-    assert_eq!(ipc::survey().dead, 0);
+    assert_eq!(dead_nodes(), 0);
 }

@@ -29,7 +29,8 @@ impl Drop for Peer {
 
 impl Peer {
     pub(crate) fn start(words: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_servo-peer"))
+        let mut command = Command::new(env!("CARGO_BIN_EXE_servo-peer"));
+        let mut child = system_tests::domain::join(&mut command)
             .args(words)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

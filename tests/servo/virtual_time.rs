@@ -19,7 +19,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let mut config = executor_config("virtual/arm".parse().unwrap(), Clock::Wall);
+        let mut config = executor_config(system_tests::domain::arm("virtual/arm"), Clock::Wall);
         config.record = false;
         let (mut runner, feeder, remote, monitor) = Runner::new(config);
         let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
@@ -370,7 +370,8 @@ fn a_clock_that_jumps() {
 #[test]
 fn a_clock_that_jumps_at_the_driver() {
     const PERIOD: u64 = 1_000_000;
-    let mut options = system_tests::servo_arm::driver_options("virtual/jump".parse().unwrap());
+    let mut options =
+        system_tests::servo_arm::driver_options(system_tests::domain::arm("virtual/jump"));
     options.noise = 0.0;
     let limits = limits();
     let mut driver = driver_sim::driver(options).unwrap();

@@ -9,9 +9,7 @@ use ipc::Clock;
 use system_tests::servo_arm::{driver_options, executor_config, feed, planned};
 
 fn arm(name: &str) -> ipc::Arm {
-    format!("wall-{}/{name}", std::process::id())
-        .parse()
-        .unwrap()
+    system_tests::domain::arm(&format!("wall/{name}"))
 }
 
 /// Programs run by the clock: the samples are the plan's, the periods add up.

@@ -4,6 +4,7 @@
 //! rules. The laws of one crate are tested in that crate.
 
 pub mod arm;
+pub mod domain;
 pub mod motion;
 pub mod repository;
 pub mod servo_arm;

@@ -15,7 +15,7 @@ pub(crate) struct Ran {
 /// The command with these arguments, in the root folder of the repository, without colours.
 pub(crate) fn command<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_canter-under-test"));
-    command
+    system_tests::domain::join(&mut command)
         .args(arguments)
         .current_dir(system_tests::repository::root())
         .env("NO_COLOR", "1")

@@ -8,6 +8,7 @@ mod benchmarks;
 mod canter;
 mod command_line;
 mod documents;
+mod domains;
 mod drivers;
 mod killed_plans;
 mod made_kits;

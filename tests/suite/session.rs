@@ -59,9 +59,7 @@ impl Drop for Driver {
 
 /// Runs the program to its end and returns what was reported and recorded.
 fn run(robot: &Robot, name: &str) -> (Vec<Note>, Vec<RunSample>) {
-    let arm: Arm = format!("test-{}/{name}", std::process::id())
-        .parse()
-        .unwrap();
+    let arm = system_tests::domain::arm(&format!("test/{name}"));
     let _driver = Driver::start(robot, &arm);
     let mut config = SessionConfig::new(arm);
     config.clock = Clock::LockStep;

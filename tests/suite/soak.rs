@@ -18,7 +18,7 @@ impl Process {
     fn start(words: &[&str]) -> Self {
         let program = std::env::var("CANTER_SOAK_BIN")
             .unwrap_or_else(|_| env!("CARGO_BIN_EXE_canter-under-test").to_owned());
-        let child = Command::new(program)
+        let child = system_tests::domain::join(&mut Command::new(program))
             .args(words)
             .current_dir(system_tests::repository::root())
             .stdout(Stdio::piped())

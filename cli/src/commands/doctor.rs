@@ -3,9 +3,9 @@ use std::time::Duration;
 
 use clap::Args;
 use engine::doctor::{Check, DoctorOptions, Health, examine};
-use ipc::Arm;
 use serde_json::json;
 
+use crate::client::{self, DomainOption};
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host::rate;
@@ -21,7 +21,9 @@ use crate::output;
 pub(crate) struct Doctor {
     /// Greet the driver of this arm, which must have no engine
     #[arg(long, value_name = "CELL/ARM")]
-    arm: Option<Arm>,
+    arm: Option<String>,
+    #[command(flatten)]
+    domain: DomainOption,
     /// Look at the limits of this robot: shipped name or folder
     #[arg(short, long, value_name = "R")]
     robot: Option<String>,
@@ -39,12 +41,16 @@ pub(crate) struct Doctor {
 impl Doctor {
     /// Makes all checks.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
+        let domain = self.domain.open()?;
+        let driver = self.arm.as_deref().map(|arm| domain.arm(arm));
+        let driver = driver.transpose().map_err(client::failure)?;
         let robot = self.robot.as_deref().map(crate::robot::load).transpose()?;
         let checks = examine(&DoctorOptions {
             rate_hz: self.rate,
             wake_up: Duration::from_secs_f64(self.seconds),
-            driver: self.arm.clone(),
+            driver,
             robot,
+            ..DoctorOptions::new(domain)
         });
         let healthy = checks.iter().all(|check| check.health != Health::Fail);
         if self.json {

@@ -40,7 +40,7 @@ impl Engine {
                 .start(&robot, self.robot.place(), length, self.refusal.policy())?;
         output::note(&format!(
             "canter: engine of {} at {}, driver {}",
-            robot.name, self.host.arm.arm, host.session.driver
+            robot.name, host.arm, host.session.driver
         ));
         let mut stopping = false;
         while !host.is_shut_down() {

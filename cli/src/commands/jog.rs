@@ -56,7 +56,7 @@ impl Jog {
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let client = Client::open(&self.arm.arm, "canter jog").map_err(client::failure)?;
+        let client = Client::open(&self.arm.open()?, "canter jog").map_err(client::failure)?;
         let (space, speeds) = self.request(&client)?;
         let ask = |speeds: Vec<f64>| -> Result<(), Failure> {
             let verb = Verb::Jog {

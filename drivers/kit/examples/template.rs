@@ -46,9 +46,10 @@ impl Robot for MyRobot {
 
 fn main() -> Result<(), DriverError> {
     let arm = std::env::args().nth(1).unwrap_or("cell/arm".to_owned());
+    let domain = ipc::Domain::choose(None, |name| std::env::var_os(name))?;
     let home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0].map(|at| Reference::rest(at).into());
     let robot = MyRobot(home, ToolStatus::Open);
     let never = AtomicBool::new(false);
-    run(&arm.parse()?, robot, &RunOptions::default(), &never)?;
+    run(&domain.arm(&arm)?, robot, &RunOptions::default(), &never)?;
     Ok(())
 }

@@ -5,11 +5,11 @@ latch. The robot only measures and moves. Needs the `iceoryx2` wheel of version 
 """
 
 import math
-import os
 import time
 
 import iceoryx2 as iox2
 
+from . import domain
 from . import messages as m
 
 __all__ = ["Robot", "run"]
@@ -52,7 +52,9 @@ class Link:
     def __init__(self, arm):
         iox2.set_log_level(iox2.LogLevel.Fatal)
         config = iox2.config.default()
-        config.global_cfg.prefix = iox2.FileName.new(f"canter_{os.geteuid()}_")
+        place = domain.directory()
+        config.global_cfg.root_path = iox2.Path.new(place)
+        config.global_cfg.prefix = iox2.FileName.new(domain.prefix(place))
         self.node = (
             iox2.NodeBuilder.new()
             .name(iox2.NodeName.new(f"driver of {arm}"))

@@ -69,7 +69,12 @@ impl Pair {
 }
 
 fn options() -> Options {
-    let mut options = Options::new("test/virtual".parse().unwrap(), 2);
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("domain");
+    let arm = ipc::Domain::open(&folder)
+        .unwrap()
+        .arm("test/virtual")
+        .unwrap();
+    let mut options = Options::new(arm, 2);
     options.position = vec![0.3, -1.0];
     options
 }

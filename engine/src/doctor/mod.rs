@@ -6,7 +6,7 @@ use core::time::Duration;
 use std::fs;
 use std::thread;
 
-use ipc::{Arm, Probe, Urgency, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Domain, Probe, Urgency, now_ns, sleep_until_ns, urge};
 use serde::Serialize;
 
 use crate::robot::Robot;
@@ -55,6 +55,8 @@ impl Check {
 /// What to look at.
 #[derive(Clone, Debug)]
 pub struct DoctorOptions {
+    /// Where to look for segments, and to measure the round trip.
+    pub domain: Domain,
     /// Servo rate to measure wake-ups at (Hz).
     pub rate_hz: f64,
     /// How long to measure wake-ups.
@@ -65,9 +67,11 @@ pub struct DoctorOptions {
     pub robot: Option<Robot>,
 }
 
-impl Default for DoctorOptions {
-    fn default() -> Self {
+impl DoctorOptions {
+    /// The usual checks, in this domain.
+    pub fn new(domain: Domain) -> Self {
         Self {
+            domain,
             rate_hz: 1000.0,
             wake_up: Duration::from_secs(5),
             driver: None,
@@ -78,10 +82,15 @@ impl Default for DoctorOptions {
 
 /// Makes all checks, one after the other.
 pub fn examine(options: &DoctorOptions) -> Vec<Check> {
-    let mut checks = vec![kernel(), governor(), shared_memory(), leftovers()];
+    let mut checks = vec![
+        kernel(),
+        governor(),
+        shared_memory(),
+        leftovers(&options.domain),
+    ];
     checks.extend(rights());
     checks.push(wake_up(options));
-    checks.push(round_trip());
+    checks.push(round_trip(&options.domain));
     let ack = options
         .driver
         .as_ref()
@@ -145,21 +154,28 @@ fn shared_memory() -> Check {
 }
 
 /// Cleans up while it looks: what is left then cannot be cleaned up by this user.
-fn leftovers() -> Check {
-    let before = ipc::survey();
-    let (cleaned, failed) = ipc::cleanup();
-    let after = ipc::survey();
-    let seen = format!(
-        "{} processes alive, {} dead, {cleaned} cleaned up, {failed} could not be",
-        before.alive, before.dead
-    );
+fn leftovers(domain: &Domain) -> Check {
+    const NAME: &str = "left-over segments";
+    let directory = domain.directory().display();
+    let looked = ipc::count_nodes(domain).and_then(|before| {
+        let (cleaned, failed) = ipc::remove_dead_nodes(domain)?;
+        let seen = format!(
+            "{directory}: {} processes alive, {} dead, {cleaned} cleaned up, {failed} could not be",
+            before.alive, before.dead
+        );
+        Ok((seen, ipc::count_nodes(domain)?))
+    });
+    let remedy = format!("stop all engines and drivers, then rm -r {directory}");
+    let (seen, after) = match looked {
+        Ok(found) => found,
+        Err(error) => return Check::new(NAME, Health::Fail, error.to_string(), &remedy),
+    };
     let health = if after.dead == 0 {
         Health::Ok
     } else {
         Health::Warn
     };
-    let remedy = "stop all engines and drivers, then rm -r /tmp/iceoryx2/nodes";
-    Check::new("left-over segments", health, seen, remedy)
+    Check::new(NAME, health, seen, &remedy)
 }
 
 /// Asks for each right in a thread of its own, which ends at once.
@@ -253,11 +269,11 @@ fn wake_up(options: &DoctorOptions) -> Check {
 }
 
 /// Round trips of bare messages between two threads.
-fn round_trip() -> Check {
+fn round_trip(domain: &Domain) -> Check {
     const TRIPS: u64 = 2000;
     const NAME: &str = "shared-memory round trip";
     let result = (|| {
-        let arm: Arm = format!("doctor/{}", std::process::id()).parse()?;
+        let arm = domain.arm(&format!("doctor/{}", std::process::id()))?;
         let asks = Probe::open(&arm, true)?;
         let other = arm.clone();
         let echo = thread::spawn(move || -> Result<(), ipc::IpcError> {
@@ -307,7 +323,7 @@ fn round_trip() -> Check {
             NAME,
             Health::Fail,
             error.to_string(),
-            "check /dev/shm and /tmp",
+            "check /dev/shm and the directory of --domain",
         ),
     }
 }
@@ -318,11 +334,13 @@ mod tests {
 
     #[test]
     fn every_check_that_is_not_ok_has_a_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        let domain = Domain::open(folder.path()).unwrap();
         let options = DoctorOptions {
             wake_up: Duration::from_millis(100),
-            driver: Some("doctor/nobody-there".parse().unwrap()),
+            driver: Some(domain.arm("doctor/nobody-there").unwrap()),
             robot: Some(crate::robot::load("ur5e").unwrap()),
-            ..DoctorOptions::default()
+            ..DoctorOptions::new(domain)
         };
         let checks = examine(&options);
         assert_eq!(checks.len(), 11);

@@ -12,6 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use engine::executor::{Event, Executor, Feeder};
+use system_tests::domain::inherited;
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed};
 
 fn main() -> ExitCode {
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
 fn driver(arm: &str, log: &str) -> Outcome {
-    let mut options = driver_options(arm.parse()?);
+    let mut options = driver_options(inherited()?.arm(arm)?);
     options.log = Some(log.into());
     static STOP: AtomicBool = AtomicBool::new(false);
     driver_sim::run(options, &STOP)?;
@@ -45,7 +46,7 @@ fn driver(arm: &str, log: &str) -> Outcome {
 }
 
 fn engine(arm: &str) -> Outcome {
-    let mut config = executor_config(arm.parse()?, ipc::Clock::Wall);
+    let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::Wall);
     config.record = false;
     let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
     let remote = executor.remote();
@@ -112,7 +113,7 @@ fn half_a_command(feeder: &mut Feeder<JOINTS>, executor: &Executor<JOINTS>) {
 /// A driver that keeps the protocol until it has followed for a while, then goes wrong.
 fn hostile(arm: &str, log: &str, kind: &str) -> Outcome {
     const PERIOD: u64 = 1_000_000;
-    let arm: ipc::Arm = arm.parse()?;
+    let arm = inherited()?.arm(arm)?;
     let link = ipc::DriverLink::open(&arm)?;
     let mut driver = driver_sim::driver(driver_options(arm))?;
     let mut log = std::fs::File::create(log)?;
@@ -210,7 +211,7 @@ fn write(
 
 fn paced(arm: &str, commands: &str) -> Outcome {
     let last: u32 = commands.parse()?;
-    let mut config = executor_config(arm.parse()?, ipc::Clock::LockStep);
+    let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::LockStep);
     config.record = true;
     let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
     let start = Instant::now();

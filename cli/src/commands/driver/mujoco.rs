@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::robot::RobotOption;
 
 /// The Python side, as it is in `drivers/python`.
-const SOURCES: [(&str, &str); 3] = [
+const SOURCES: [(&str, &str); 4] = [
     (
         "mujoco_driver.py",
         include_str!("../../../../drivers/python/mujoco_driver.py"),
@@ -26,6 +26,10 @@ const SOURCES: [(&str, &str); 3] = [
     (
         "canter_driver/__init__.py",
         include_str!("../../../../drivers/python/canter_driver/__init__.py"),
+    ),
+    (
+        "canter_driver/domain.py",
+        include_str!("../../../../drivers/python/canter_driver/domain.py"),
     ),
     (
         "canter_driver/messages.py",
@@ -72,10 +76,12 @@ impl Mujoco {
     }
 
     fn spawn(&self, robot: &Robot, folder: &Path) -> Result<Child, Failure> {
+        let arm = self.arm.open()?;
         let mut command = Command::new(&self.python);
         command
+            .env(ipc::DOMAIN_VARIABLE, arm.domain().directory())
             .arg(folder.join("mujoco_driver.py"))
-            .arg(self.arm.arm.to_string())
+            .arg(arm.to_string())
             .arg(folder.join("robot.urdf"))
             .arg("--until-end-of-input")
             .arg(format!("--joints={}", robot.joint_names().join(",")));

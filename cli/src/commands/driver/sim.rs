@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use driver_sim::Options;
 use engine::robot::Robot;
-use ipc::{DriverLink, IpcError};
+use ipc::{Arm, DriverLink, IpcError};
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -51,13 +51,14 @@ impl Sim {
     /// Drives until a signal, or until its starter asks for the end.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
+        let arm = self.arm.open()?;
         let stop = super::asked_to_end(self.until_end_of_input)?;
         if self.until_end_of_input {
-            self.wait_for_arm()?;
+            wait_for_arm(&arm)?;
             // The starter waits for this line.
             writeln!(io::stdout(), "ready")?;
         }
-        let report = driver_sim::run(self.options(&robot), &stop).map_err(failure)?;
+        let report = driver_sim::run(self.options(&robot, arm), &stop).map_err(failure)?;
         if let Some(warning) = &report.warning {
             tracing::warn!("{warning}");
         }
@@ -70,19 +71,7 @@ impl Sim {
         Ok(Exit::Done)
     }
 
-    /// Waits until no other driver has the arm: one whose starter was killed takes a moment to end.
-    fn wait_for_arm(&self) -> Result<(), Failure> {
-        let end = Instant::now() + TAKEN;
-        loop {
-            match DriverLink::open(&self.arm.arm) {
-                Ok(_) => return Ok(()),
-                Err(IpcError::Taken { .. }) if Instant::now() < end => sleep(LOOK),
-                Err(error) => return Err(failure(error.into())),
-            }
-        }
-    }
-
-    fn options(&self, robot: &Robot) -> Options {
+    fn options(&self, robot: &Robot, arm: Arm) -> Options {
         let joints = &robot.joints;
         Options {
             model: ipc::model_hash(robot.urdf.as_bytes()),
@@ -97,7 +86,19 @@ impl Sim {
             delay: self.delay,
             noise: self.noise,
             seed: self.seed,
-            ..Options::new(self.arm.arm.clone(), robot.dof())
+            ..Options::new(arm, robot.dof())
+        }
+    }
+}
+
+/// Waits until no other driver has the arm: one whose starter was killed takes a moment to end.
+fn wait_for_arm(arm: &Arm) -> Result<(), Failure> {
+    let end = Instant::now() + TAKEN;
+    loop {
+        match DriverLink::open(arm) {
+            Ok(_) => return Ok(()),
+            Err(IpcError::Taken { .. }) if Instant::now() < end => sleep(LOOK),
+            Err(error) => return Err(failure(error.into())),
         }
     }
 }

@@ -27,7 +27,8 @@ pub(super) struct Test {
 impl Test {
     /// Tests all clauses.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
-        let report = test_driver(&self.arm.arm).map_err(failure)?;
+        let arm = self.arm.open()?;
+        let report = test_driver(&arm).map_err(failure)?;
         let count = |verdict| {
             let found = |clause: &&Clause| clause.verdict == verdict;
             report.clauses.iter().filter(found).count()
@@ -35,7 +36,7 @@ impl Test {
         let [passed, failed, skipped] = [Verdict::Pass, Verdict::Fail, Verdict::Skip].map(count);
         if self.json {
             output::json(&json!({
-                "arm": self.arm.arm.to_string(),
+                "arm": arm.to_string(),
                 "driver": report.driver,
                 "joints": report.joints,
                 "passed": passed,
