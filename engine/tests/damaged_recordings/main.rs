@@ -10,7 +10,7 @@ mod scene;
 mod times;
 mod ways;
 
-use std::collections::BTreeMap;
+use std::thread;
 
 use damage::{Damaged, Kind, Make};
 use engine::recorded::{Row, Rule};
@@ -58,55 +58,67 @@ fn damaged(scene: &Scene, kind: &Kind, good: &[Row]) -> Option<Damaged> {
     }
 }
 
+/// What became of the kinds on one robot.
+#[derive(Default)]
+struct Outcome {
+    done: Vec<&'static str>,
+    caught: Vec<&'static str>,
+    missed: Vec<String>,
+}
+
+fn outcome(robot: &str) -> Outcome {
+    let scene = Scene::new(robot);
+    let good = recorded(&scene.robot, &scene.program(), PERIOD)
+        .unwrap_or_else(|| panic!("{robot} cannot do the program"));
+    for rows in [&good, &runs::as_run(&good)] {
+        let holds = verdict(&scene.robot, &scene.program(), rows);
+        let broken: Vec<_> = holds.all_broken().map(ToString::to_string).collect();
+        assert!(holds.holds, "{robot}: {broken:#?}");
+    }
+    let mut outcome = Outcome::default();
+    for kind in kinds() {
+        let Some(damaged) = damaged(&scene, kind, &good) else {
+            continue;
+        };
+        outcome.done.push(kind.name);
+        let verdict = verdict(&scene.robot, &damaged.commands, &damaged.rows);
+        let rules: Vec<Rule> = verdict.all_broken().map(|found| found.rule).collect();
+        if rules.contains(&kind.rule) {
+            outcome.caught.push(kind.name);
+        } else {
+            let (name, rule) = (kind.name, kind.rule);
+            outcome
+                .missed
+                .push(format!("{robot}: {name}: {rules:?} without {rule}"));
+        }
+    }
+    outcome
+}
+
 #[test]
 fn every_damage_is_caught_by_the_rule_that_it_breaks() {
     assert!(kinds().len() >= 60, "{} kinds", kinds().len());
-    let mut caught: BTreeMap<&str, usize> = BTreeMap::new();
-    let (mut missed, mut done) = (Vec::new(), BTreeMap::new());
-    for robot in ROBOTS {
-        let scene = Scene::new(robot);
-        let good = recorded(&scene.robot, &scene.program(), PERIOD)
-            .unwrap_or_else(|| panic!("{robot} cannot do the program"));
-        let holds = verdict(&scene.robot, &scene.program(), &good);
-        assert!(
-            holds.holds,
-            "{robot}: {:#?}",
-            holds.all_broken().collect::<Vec<_>>()
-        );
-        let run = verdict(&scene.robot, &scene.program(), &runs::as_run(&good));
-        assert!(
-            run.holds,
-            "{robot}: {:#?}",
-            run.all_broken().collect::<Vec<_>>()
-        );
-        for kind in kinds() {
-            let Some(damaged) = damaged(&scene, kind, &good) else {
-                continue;
-            };
-            *done.entry(kind.name).or_insert(0_usize) += 1;
-            let verdict = verdict(&scene.robot, &damaged.commands, &damaged.rows);
-            let rules: Vec<Rule> = verdict.all_broken().map(|found| found.rule).collect();
-            if rules.contains(&kind.rule) {
-                *caught.entry(kind.name).or_default() += 1;
-            } else {
-                missed.push(format!(
-                    "{robot}: {}: {rules:?} without {}",
-                    kind.name, kind.rule
-                ));
-            }
-        }
-    }
+    let outcomes: Vec<Outcome> = thread::scope(|scope| {
+        let threads = ROBOTS.map(|robot| scope.spawn(move || outcome(robot)));
+        threads.map(|thread| thread.join().unwrap()).into()
+    });
     for kind in kinds() {
-        let of = |counts: &BTreeMap<&str, usize>| counts.get(kind.name).copied().unwrap_or(0);
-        println!(
-            "{:55} {:22} {} of {}",
-            kind.name,
-            kind.rule.name(),
-            of(&caught),
-            of(&done)
+        let count = |of: fn(&Outcome) -> &Vec<&'static str>| {
+            let all = outcomes.iter().flat_map(of);
+            all.filter(|name| **name == kind.name).count()
+        };
+        let (done, caught) = (
+            count(|outcome| &outcome.done),
+            count(|outcome| &outcome.caught),
         );
-        assert!(of(&done) >= 6, "{}: done on too few robots", kind.name);
+        let rule = kind.rule.name();
+        println!("{:55} {rule:22} caught {caught} of {done}", kind.name);
+        assert!(done >= 6, "{}: done on {done} robots only", kind.name);
     }
+    let missed: Vec<_> = outcomes
+        .iter()
+        .flat_map(|outcome| &outcome.missed)
+        .collect();
     assert!(missed.is_empty(), "missed: {missed:#?}");
 }
 

@@ -33,7 +33,7 @@ pub const KINDS: [Kind; 30] = [
         Rule::ToolAcceleration,
         |scene| {
             changed(scene, |doing, _| {
-                doing[ACCELERATION] = Command::SetRelativeAcceleration { percent: 6.0 };
+                doing[ACCELERATION] = Command::SetRelativeAcceleration { percent: 14.4 };
             })
         },
     ),
