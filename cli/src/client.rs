@@ -2,7 +2,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, Domain, IpcError, Verb};
+use ipc::{Answer, Arm, Client, Domain, Verb};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -25,7 +25,9 @@ impl DomainOption {
     /// # Errors
     /// [`Exit::NoPeer`] when its directory cannot be used.
     pub(crate) fn open(&self) -> Result<Domain, Failure> {
-        Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name)).map_err(failure)
+        Ok(Domain::choose(self.domain.as_deref(), |name| {
+            std::env::var_os(name)
+        })?)
     }
 }
 
@@ -45,7 +47,7 @@ impl ArmOption {
     /// # Errors
     /// [`Exit::Usage`] for a wrong name, [`Exit::NoPeer`] when the domain cannot be used.
     pub(crate) fn open(&self) -> Result<Arm, Failure> {
-        self.domain.open()?.arm(&self.arm).map_err(failure)
+        Ok(self.domain.open()?.arm(&self.arm)?)
     }
 
     /// Asks the arm's engine and waits for the answer.
@@ -54,8 +56,8 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.open()?, "canter").map_err(failure)?;
-        accepted(client.ask(verb, PATIENCE).map_err(failure)?)
+        let client = Client::open(&self.open()?, "canter")?;
+        accepted(client.ask(verb, PATIENCE)?)
     }
 
     /// Asks, prints the engine's words, if any, to standard error.
@@ -81,13 +83,4 @@ pub(crate) fn accepted(answer: Answer) -> Result<Answer, Failure> {
     } else {
         Err(Failure::new(Exit::Refused, anyhow::anyhow!(answer.message)))
     }
-}
-
-/// A fault of the border to other processes with its exit code.
-pub(crate) fn failure(error: IpcError) -> Failure {
-    let exit = match error {
-        IpcError::BadArmName { .. } => Exit::Usage,
-        _ => Exit::NoPeer,
-    };
-    Failure::new(exit, error)
 }

@@ -17,7 +17,7 @@ mod commands;
 mod equipment;
 mod exit;
 mod failure;
-mod host;
+mod host_options;
 mod logging;
 mod mobility;
 mod moving_arm;

@@ -14,7 +14,6 @@
 
 mod arm;
 mod client;
-mod clock;
 mod domain;
 mod driver_link;
 mod engine_link;
@@ -25,13 +24,11 @@ mod probe;
 mod setpoint;
 mod state;
 mod tool;
-mod urgency;
 
 pub use arm::{Arm, model_hash};
 pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
 };
-pub use clock::{now_ns, sleep_until_ns};
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
@@ -42,7 +39,6 @@ pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
 pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
-pub use urgency::{Granted, Urgency, urge};
 
 /// How many joints fit into a message.
 pub const MAX_JOINTS: usize = 16;

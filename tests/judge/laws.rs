@@ -1,7 +1,7 @@
 //! The laws that a planned program is judged by, from its samples alone.
 
-use engine::dry_run::{Plan, PlanSample, PlannedCommand};
 use k::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use planner::dry_run::{Plan, PlanSample, PlannedCommand};
 use system_tests::arm::Arm;
 
 use crate::kinematics::{State, state};

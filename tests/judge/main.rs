@@ -13,8 +13,8 @@ mod tally;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crcl::Program;
-use engine::dry_run::{FailurePolicy, Plan, PlanOptions, plan_program};
-use engine::robot::{Robot, load};
+use planner::dry_run::{FailurePolicy, Plan, PlanOptions, plan_program};
+use planner::robot::{Robot, load};
 use system_tests::arm::Arm;
 use tally::Tally;
 
@@ -96,5 +96,5 @@ robots! {
 
 #[test]
 fn every_shipped_robot_is_judged() {
-    assert_eq!(engine::robot::list(), NAMED);
+    assert_eq!(planner::robot::list(), NAMED);
 }

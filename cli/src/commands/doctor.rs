@@ -5,10 +5,10 @@ use clap::Args;
 use engine::doctor::{Check, DoctorOptions, Health, examine};
 use serde_json::json;
 
-use crate::client::{self, DomainOption};
+use crate::client::DomainOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::rate;
+use crate::host_options::rate;
 use crate::output;
 
 /// Look at what the servo loop needs of this machine, and say what would repair it
@@ -43,7 +43,7 @@ impl Doctor {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let domain = self.domain.open()?;
         let driver = self.arm.as_deref().map(|arm| domain.arm(arm));
-        let driver = driver.transpose().map_err(client::failure)?;
+        let driver = driver.transpose()?;
         let robot = self.robot.as_deref().map(crate::robot::load).transpose()?;
         let checks = examine(&DoctorOptions {
             rate_hz: self.rate,
