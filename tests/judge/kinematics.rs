@@ -21,44 +21,49 @@ pub fn state(
     pose: Isometry3<f64>,
 ) -> State {
     let zero = Vector3::zeros();
-    let (mut velocity, mut acceleration, mut spin, mut spin_rate) = (zero, zero, zero, zero);
-    let mut at = zero;
-    let mut to = |at: &mut Vector3<f64>,
-                  point: Vector3<f64>,
-                  motion: [&mut Vector3<f64>; 2],
-                  turn: [Vector3<f64>; 2]| {
-        let lever = point - *at;
-        let [velocity, acceleration] = motion;
-        *velocity += turn[0].cross(&lever);
-        *acceleration += turn[1].cross(&lever) + turn[0].cross(&turn[0].cross(&lever));
-        *at = point;
+    let mut at = Frame {
+        point: zero,
+        velocity: zero,
+        acceleration: zero,
+        spin: zero,
+        spin_rate: zero,
     };
     for (joint, (point, axis, slides)) in axes.iter().enumerate() {
-        to(
-            &mut at,
-            *point,
-            [&mut velocity, &mut acceleration],
-            [spin, spin_rate],
-        );
+        at.go_to(*point);
+        let spin = at.spin;
         if *slides {
-            velocity += axis * dq[joint];
-            acceleration += axis * ddq[joint] + spin.cross(axis) * (2.0 * dq[joint]);
+            at.velocity += axis * dq[joint];
+            at.acceleration += axis * ddq[joint] + spin.cross(axis) * (2.0 * dq[joint]);
         } else {
-            spin_rate += axis * ddq[joint] + spin.cross(axis) * dq[joint];
-            spin += axis * dq[joint];
+            at.spin_rate += axis * ddq[joint] + spin.cross(axis) * dq[joint];
+            at.spin += axis * dq[joint];
         }
     }
-    to(
-        &mut at,
-        pose.translation.vector,
-        [&mut velocity, &mut acceleration],
-        [spin, spin_rate],
-    );
+    at.go_to(pose.translation.vector);
     State {
         pose,
-        velocity,
-        acceleration,
-        spin,
-        spin_rate,
+        velocity: at.velocity,
+        acceleration: at.acceleration,
+        spin: at.spin,
+        spin_rate: at.spin_rate,
+    }
+}
+
+/// A point of a link, with how it and the link move.
+struct Frame {
+    point: Vector3<f64>,
+    velocity: Vector3<f64>,
+    acceleration: Vector3<f64>,
+    spin: Vector3<f64>,
+    spin_rate: Vector3<f64>,
+}
+
+impl Frame {
+    /// Another point of the same link.
+    fn go_to(&mut self, point: Vector3<f64>) {
+        let lever = point - self.point;
+        self.velocity += self.spin.cross(&lever);
+        self.acceleration += self.spin_rate.cross(&lever) + self.spin.cross(&self.spin.cross(&lever));
+        self.point = point;
     }
 }

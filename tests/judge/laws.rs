@@ -1,6 +1,6 @@
 //! The laws that a planned program is judged by, from its samples alone.
 
-use k::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use k::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use planner::dry_run::{Plan, PlanSample, PlannedCommand};
 use system_tests::arm::Arm;
 
@@ -34,8 +34,10 @@ pub fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
         let part = &samples[from..=to];
         match &meanings[command.index] {
             Meaning::Still(seconds) => {
+                let still = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+                let zero = vec![0.0; part[0].q.len()];
                 let rests = |sample: &PlanSample| {
-                    sample.q == part[0].q && sample.dq.iter().all(|v| *v == 0.0)
+                    still(&sample.q, &part[0].q) && still(&sample.dq, &zero)
                 };
                 tally.must("standstill", part.iter().all(rests));
                 tally.at_most("a wait is not short", seconds - command.duration_s, 1e-9);
@@ -64,7 +66,16 @@ fn row_at(time: f64) -> usize {
 
 fn tool_state(arm: &Arm, row: &PlanSample, tool: &Isometry3<f64>) -> State {
     let pose = arm.flange(&row.q) * tool;
-    state(&arm.axes(), [&row.dq, &row.ddq], pose)
+    state(&arm.axes(), [&row.dq[..], &row.ddq[..]], pose)
+}
+
+/// The recorded pose as `k` has poses.
+fn recorded(row: &PlanSample) -> Isometry3<f64> {
+    let (point, turn) = (row.workstation_from_tool.translation, row.workstation_from_tool.rotation);
+    Isometry3::from_parts(
+        Translation3::new(point.x, point.y, point.z),
+        UnitQuaternion::from_quaternion(Quaternion::new(turn.w, turn.i, turn.j, turn.k)),
+    )
 }
 
 /// Limits of the joints, and each column as the derivative of the one before.
@@ -131,7 +142,7 @@ struct Seen<'a> {
 impl Seen<'_> {
     fn judge(&self, tally: &mut Tally) {
         for (row, state) in self.samples.iter().zip(self.states) {
-            let gap = apart(&row.workstation_from_tool, &state.pose);
+            let gap = apart(&recorded(row), &state.pose);
             tally.at_most("recorded point is that of the joints", gap.0, 1e-9);
             tally.at_most("recorded orientation is that of the joints", gap.1, 1e-7);
         }
@@ -210,8 +221,7 @@ impl Seen<'_> {
         let length = way.norm();
         let direction = if length > 0.0 { way / length } else { way };
         let turn = self.start.rotation.rotation_to(&goal.rotation);
-        let Some((axis, angle)) = turn.axis_angle().or(Some((Vector3::x_axis(), 0.0))) else {
-            return;
+        let (axis, angle) = turn.axis_angle().unwrap_or((Vector3::x_axis(), 0.0));
         };
         let mut reached = 0.0;
         for state in self.states {
@@ -236,6 +246,13 @@ impl Seen<'_> {
     fn smooth(&self, tally: &mut Tally) {
         let poses = &self.motion.poses;
         let legs = poses.len();
+        if self.states.len() < 2 {
+            // No time passes: everything is where the arm stands.
+            let here = self.states[0].pose.translation.vector;
+            let off = poses.iter().map(|pose| (pose.translation.vector - here).norm());
+            tally.at_most("a move of no time goes nowhere", off.fold(0.0, f64::max), ARRIVED);
+            return;
+        }
         let mut on = vec![false; legs];
         on[0] = true;
         let tolerance = self.motion.tolerance.max(1e-6) + 1e-9;

@@ -142,7 +142,8 @@ impl Writer<'_> {
     }
 
     fn straight(&mut self) {
-        let pose = self.next(&self.at.clone());
+        let at = self.at;
+        let pose = self.next(&at);
         self.moved(Shape::Straight, vec![pose]);
     }
 

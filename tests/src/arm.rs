@@ -130,9 +130,9 @@ impl Arm {
         self.chain
             .iter()
             .filter_map(|node| {
-                let (axis, slides) = match node.joint().joint_type {
-                    k::JointType::Rotational { axis } => (axis, false),
-                    k::JointType::Linear { axis } => (axis, true),
+                let (axis, slides) = match &node.joint().joint_type {
+                    k::JointType::Rotational { axis } => (*axis, false),
+                    k::JointType::Linear { axis } => (*axis, true),
                     k::JointType::Fixed => return None,
                 };
                 let frame = base * node.world_transform()?;
