@@ -63,7 +63,8 @@ impl Frame {
     fn go_to(&mut self, point: Vector3<f64>) {
         let lever = point - self.point;
         self.velocity += self.spin.cross(&lever);
-        self.acceleration += self.spin_rate.cross(&lever) + self.spin.cross(&self.spin.cross(&lever));
+        self.acceleration +=
+            self.spin_rate.cross(&lever) + self.spin.cross(&self.spin.cross(&lever));
         self.point = point;
     }
 }

@@ -34,11 +34,11 @@ pub fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
         let part = &samples[from..=to];
         match &meanings[command.index] {
             Meaning::Still(seconds) => {
-                let still = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+                let still =
+                    |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
                 let zero = vec![0.0; part[0].q.len()];
-                let rests = |sample: &PlanSample| {
-                    still(&sample.q, &part[0].q) && still(&sample.dq, &zero)
-                };
+                let rests =
+                    |sample: &PlanSample| still(&sample.q, &part[0].q) && still(&sample.dq, &zero);
                 tally.must("standstill", part.iter().all(rests));
                 tally.at_most("a wait is not short", seconds - command.duration_s, 1e-9);
             }
@@ -71,7 +71,10 @@ fn tool_state(arm: &Arm, row: &PlanSample, tool: &Isometry3<f64>) -> State {
 
 /// The recorded pose as `k` has poses.
 fn recorded(row: &PlanSample) -> Isometry3<f64> {
-    let (point, turn) = (row.workstation_from_tool.translation, row.workstation_from_tool.rotation);
+    let (point, turn) = (
+        row.workstation_from_tool.translation,
+        row.workstation_from_tool.rotation,
+    );
     Isometry3::from_parts(
         Translation3::new(point.x, point.y, point.z),
         UnitQuaternion::from_quaternion(Quaternion::new(turn.w, turn.i, turn.j, turn.k)),
@@ -222,7 +225,6 @@ impl Seen<'_> {
         let direction = if length > 0.0 { way / length } else { way };
         let turn = self.start.rotation.rotation_to(&goal.rotation);
         let (axis, angle) = turn.axis_angle().unwrap_or((Vector3::x_axis(), 0.0));
-        };
         let mut reached = 0.0;
         for state in self.states {
             let here = state.pose.translation.vector - origin;
@@ -249,8 +251,14 @@ impl Seen<'_> {
         if self.states.len() < 2 {
             // No time passes: everything is where the arm stands.
             let here = self.states[0].pose.translation.vector;
-            let off = poses.iter().map(|pose| (pose.translation.vector - here).norm());
-            tally.at_most("a move of no time goes nowhere", off.fold(0.0, f64::max), ARRIVED);
+            let off = poses
+                .iter()
+                .map(|pose| (pose.translation.vector - here).norm());
+            tally.at_most(
+                "a move of no time goes nowhere",
+                off.fold(0.0, f64::max),
+                ARRIVED,
+            );
             return;
         }
         let mut on = vec![false; legs];
@@ -272,6 +280,42 @@ impl Seen<'_> {
             "poses passed in order, within tolerance and corridor",
             on[legs - 1],
         );
+    }
+
+    /// The passes that the certificate tells of are those of the samples.
+    fn certified_passes(&self, between: &[Isometry3<f64>], tally: &mut Tally) {
+        let Some(said) = &self.command.certificate else {
+            return;
+        };
+        let mut before = 0.0;
+        for (pass, pose) in said.poses.iter().zip(between) {
+            tally.at_most(
+                "certificate: passing times never fall",
+                before - pass.time_s,
+                0.0,
+            );
+            before = pass.time_s;
+            tally.at_most(
+                "certificate: passes end with the move",
+                before,
+                said.duration_s + 1e-9,
+            );
+            let most = self.motion.tolerance.max(1e-6);
+            tally.at_most("certificate: deviations", pass.deviation_m, most);
+            let index =
+                ((pass.time_s / PERIOD).floor() as usize).min(self.states.len().saturating_sub(2));
+            let pair = &self.states[index..(index + 2).min(self.states.len())];
+            let speed = pair
+                .iter()
+                .map(|state| state.velocity.norm())
+                .fold(0.0, f64::max);
+            let point = pose.translation.vector;
+            let off = (pair[0].pose.translation.vector - point).norm();
+            // In a period the controlled point goes no farther than this.
+            let most = 1.5 * speed * PERIOD + 1e-6;
+            let law = "certificate: the deviation is that of its time";
+            tally.at_most(law, (off - pass.deviation_m).abs(), most);
+        }
     }
 
     /// What the certificate says is true of the samples.
@@ -306,36 +350,8 @@ impl Seen<'_> {
             "certificate: a pass for every pose",
             said.poses.len() == between.len(),
         );
-        let mut before = 0.0;
-        for (pass, pose) in said.poses.iter().zip(between) {
-            tally.at_most(
-                "certificate: passing times never fall",
-                before - pass.time_s,
-                0.0,
-            );
-            before = pass.time_s;
-            tally.at_most(
-                "certificate: passes end with the move",
-                before,
-                said.duration_s + 1e-9,
-            );
-            let most = self.motion.tolerance.max(1e-6);
-            tally.at_most("certificate: deviations", pass.deviation_m, most);
-            let index =
-                ((pass.time_s / PERIOD).floor() as usize).min(self.states.len().saturating_sub(2));
-            let pair = &self.states[index..(index + 2).min(self.states.len())];
-            let speed = pair
-                .iter()
-                .map(|state| state.velocity.norm())
-                .fold(0.0, f64::max);
-            let point = pose.translation.vector;
-            let off = (pair[0].pose.translation.vector - point).norm();
-            // In a period the controlled point goes no farther than this.
-            let most = 1.5 * speed * PERIOD + 1e-6;
-            let law = "certificate: the deviation is that of its time";
-            tally.at_most(law, (off - pass.deviation_m).abs(), most);
-        }
         tally.must("certificate: in order", said.in_order);
+        self.certified_passes(between, tally);
     }
 }
 
