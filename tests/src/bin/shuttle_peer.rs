@@ -59,8 +59,8 @@ fn engine(arm: &str) -> Outcome {
     let remote = executor.remote();
     thread::spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
-            if line == "recover" {
-                remote.recover();
+            if line == "recover" && remote.recover().is_err() {
+                say("NoFault");
             }
         }
     });
