@@ -45,9 +45,9 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let path = joint_path(&line, &points)?;
-        time_path(&path, &self.limits, &motion.limits, &options)
-            .map(|timed| timed.trajectory)
-            .map_err(|error| MotionError::Timing(error.to_string()))
+        let timed = time_path(&path, &self.limits, &motion.limits, &options)
+            .map_err(|error| MotionError::Timing(error.to_string()))?;
+        self.finite(timed.trajectory, &points, &|_| 1)
     }
 
     pub(super) fn plan_smooth(
