@@ -22,8 +22,8 @@ use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::robot::{RobotOption, with_joints};
-use crate::world_file::Database;
-use crate::{output, world_file};
+use crate::world_file::{Database, refused};
+use crate::{input, output};
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -84,21 +84,11 @@ pub(crate) struct PlanRun {
     verbose: bool,
 }
 
-fn refused(error: PlanError) -> Failure {
-    let exit = match error {
-        PlanError::Database(_) | PlanError::Stored { .. } | PlanError::Schema { .. } => {
-            Exit::Unreadable
-        }
-        _ => Exit::Refused,
-    };
-    Failure::new(exit, error)
-}
-
 impl PlanRun {
     /// Executes the plan.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let mut robot = self.robot.load()?;
-        let source = self.plan.as_deref().map(world_file::read).transpose()?;
+        let source = self.plan.as_deref().map(input::text).transpose()?;
         let (parameters, limits) = (self.parameters()?, self.limits()?);
         let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
         let model = writer.model().map_err(refused)?;
