@@ -1,11 +1,9 @@
 //! The running engine as a plan uses it: a few commands at a time, with an operator who may stop.
 
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
 use crcl::Command;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
@@ -17,6 +15,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::Host;
 use crate::output;
+use crate::output_file::OutputFile;
 use crate::progress::Progress;
 use crate::recording::Recording;
 
@@ -30,7 +29,7 @@ const RECOVERY: Duration = Duration::from_secs(5);
 pub(crate) struct MovingArm {
     host: Host,
     signals: Signals,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
     signalled: usize,
     deadline: Option<Instant>,
@@ -49,12 +48,7 @@ impl MovingArm {
         samples: Option<&Path>,
     ) -> Result<Self, Failure> {
         host.own("canter plan-run");
-        let create = |path: &Path| {
-            File::create(path)
-                .with_context(|| format!("cannot write {}", path.display()))
-                .map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        };
-        let sink = samples.map(create).transpose()?.map(BufWriter::new);
+        let sink = samples.map(OutputFile::create).transpose()?;
         Ok(Self {
             host,
             signals: Signals::new([SIGINT, SIGTERM, SIGHUP])?,

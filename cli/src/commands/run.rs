@@ -1,9 +1,7 @@
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
 use clap::Args;
 use engine::session::{Blame, Note};
 use planner::dry_run::FailurePolicy;
@@ -17,6 +15,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::output;
+use crate::output_file::OutputFile;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
 use crate::recording::Recording;
@@ -43,7 +42,7 @@ pub(crate) struct Run {
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
-    /// Print one JSON object for everything that happens, one a line
+    /// Print one JSON object for everything that happens, one per line
     #[arg(long)]
     json: bool,
 }
@@ -78,12 +77,11 @@ impl Run {
         {
             return Ok(Exit::Refused);
         }
-        let sink = self.samples.as_ref().map(|path| {
-            let file =
-                File::create(path).with_context(|| format!("cannot write {}", path.display()));
-            file.map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        });
-        let sink = sink.transpose()?.map(BufWriter::new);
+        let sink = self
+            .samples
+            .as_deref()
+            .map(OutputFile::create)
+            .transpose()?;
         let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
         let progress = Progress::new(io::stderr().is_terminal() && !self.json);
         Running {
@@ -122,7 +120,7 @@ struct Running {
     json: bool,
     host: Host,
     signals: Signals,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
     signalled: usize,
     deadline: Option<Instant>,
