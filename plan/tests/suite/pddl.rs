@@ -73,6 +73,15 @@ fn bad_plans_fail_where_they_should() {
         messages.push_str(&format!("{failure}\n"));
     }
     expect_test::expect![[r#"
+        step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
+        step 1, (attach-eff robot_1 tray_gripper tray_gripper_holder): the precondition (bare robot_1) is false
+        step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the precondition (>= (left empty_kit_tray_supply) 1) with 0 and 1 is false
+        step 9, (take-part robot_1 part_b_1 part_b_tray part_gripper): take-part takes 6 objects, not 4
+        step 10, (put-part robot_1 tray_gripper kit_1 work_table_1): tray_gripper is a effector, ?p takes a part
+        step 10, (put-part robot_1 part_z_1 kit_1 work_table_1): the problem has no object part_z_1
+        step 1, (attach-eff robot_1 tray_gripper tray_gripper_holder): the effect (increase (steps) 1) has no result: (steps) has no value
+        step 18, (goal): (at kit_1 finished_kit_receiver) is false at the end
+        step 19, (goal): (= (steps) 17) with 18 and 17 is false at the end
     "#]]
     .assert_eq(&messages);
 }

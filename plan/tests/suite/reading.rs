@@ -96,7 +96,7 @@ fn oddities_are_found() {
         ("plan::unquoted_type", 3),
         ("plan::parentheses", 2),
         ("plan::quoted_name", 2),
-        ("plan::single_equal", 3),
+        ("plan::single_equal", 2),
         ("plan::object_and_text", 1),
     ];
     assert_eq!(codes, expected.into_iter().collect());
