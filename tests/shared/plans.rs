@@ -137,4 +137,11 @@ pub(crate) fn the_documents_plan_makes_three_kits_in_thought() {
     let counts = names.map(|name| report[name].as_u64().unwrap());
     assert_eq!(counts, [18, 18, 36, 3], "{report}");
     assert_eq!(report["outcome"], "stopped");
+    // The document puts each kit at the bottom of the box; the executor puts it on top and says so.
+    assert!(
+        report["warnings"]
+            .to_string()
+            .contains("on top of what is in"),
+        "{report}"
+    );
 }
