@@ -23,6 +23,27 @@ pub struct Step<const N: usize> {
     pub ticks: u64,
 }
 
+/// A step that was planned before its turn came, with what it stands on and what it leaves behind.
+#[derive(Clone, Debug)]
+pub struct PlannedStep<const N: usize> {
+    /// The step itself.
+    pub step: Step<N>,
+    /// Joints at its start, at rest.
+    start: SVector<f64, N>,
+    /// Modes before it.
+    before: Modal,
+    /// Modes after it.
+    after: Modal,
+}
+
+impl<const N: usize> PlannedStep<N> {
+    /// Joints at the start, at rest (rad, m).
+    #[must_use]
+    pub fn start(&self) -> &SVector<f64, N> {
+        &self.start
+    }
+}
+
 /// Resolves and plans commands one after the other, each from where the one
 /// before it ends. Nothing in here moves an arm.
 #[derive(Clone, Debug)]
@@ -34,6 +55,7 @@ pub struct Controller<const N: usize> {
     planner: Planner<N>,
     joints: SVector<f64, N>,
     rate_hz: f64,
+    plans: u64,
 }
 
 impl<const N: usize> Controller<N> {
@@ -67,6 +89,7 @@ impl<const N: usize> Controller<N> {
             planner,
             joints,
             rate_hz,
+            plans: 0,
         })
     }
 
@@ -125,6 +148,7 @@ impl<const N: usize> Controller<N> {
         let task = self.modal.resolve(command, &flange)?;
         let step = match task {
             Task::Move(motion) => {
+                self.plans += 1;
                 let planned = self.planner.plan(&motion, &self.joints).map_err(|error| {
                     CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
                 })?;
@@ -157,6 +181,43 @@ impl<const N: usize> Controller<N> {
             },
         };
         Ok(step)
+    }
+
+    /// As [`Self::step`]; the step can be executed later, by [`Self::follow`].
+    ///
+    /// # Errors
+    /// A [`CommandError`]; the controller is then as before.
+    pub fn step_ahead(&mut self, command: &crcl::Command) -> Result<PlannedStep<N>, CommandError> {
+        let (start, before) = (self.joints, self.modal.clone());
+        let step = self.step(command)?;
+        let after = self.modal.clone();
+        Ok(PlannedStep {
+            step,
+            start,
+            before,
+            after,
+        })
+    }
+
+    /// Takes a step that was planned before, without planning it again. Says whether that was
+    /// possible: only where joints and modes are exactly those that it was planned from. Otherwise
+    /// the controller is as before.
+    pub fn follow(&mut self, planned: &PlannedStep<N>) -> bool {
+        if self.joints != planned.start || self.modal != planned.before {
+            return false;
+        }
+        self.modal = planned.after.clone();
+        if let Some(motion) = &planned.step.planned {
+            self.joints = motion.end;
+        }
+        self.change_tool();
+        true
+    }
+
+    /// How many moves this controller has planned, refused ones included.
+    #[must_use]
+    pub fn plans(&self) -> u64 {
+        self.plans
     }
 
     /// Whole servo periods that hold a time, rounded up.

@@ -28,7 +28,7 @@ pub enum CanonState {
 }
 
 /// The modes of one program on one arm.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Modal {
     state: CanonState,
     length: LengthUnit,
