@@ -6,7 +6,7 @@
 //! - [`Hello`] and [`HelloAck`] are the handshake that opens a session.
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
 //! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
-//!   report back.
+//!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
 //! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
@@ -14,12 +14,14 @@
 
 mod arm;
 mod client;
+mod control;
 mod domain;
 mod driver_link;
 mod engine_link;
 mod error;
 mod hello;
 mod node;
+mod observer;
 mod probe;
 mod setpoint;
 mod state;
@@ -29,12 +31,16 @@ pub use arm::{Arm, model_hash};
 pub use client::{
     Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
 };
+pub use control::{
+    ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
+};
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
 pub use node::{NodeCount, count_nodes, remove_dead_nodes};
+pub use observer::Observer;
 pub use probe::Probe;
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
