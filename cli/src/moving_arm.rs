@@ -112,7 +112,7 @@ impl MovingArm {
                 Note::Aborted { .. } => return Err(MotionFailure::stopped()),
                 Note::Closed => return Err(MotionFailure::new(0, "the engine has ended")),
                 Note::Message { text } => {
-                                self.printer.note(&text);
+                    self.printer.note(&text);
                 }
                 _ => {}
             }

@@ -216,7 +216,8 @@ impl Stream {
             let written = match self.target {
                 Target::Out => {
                     let mut out = io::stdout().lock();
-                    out.write(text).and_then(|count| out.flush().map(|()| count))
+                    out.write(text)
+                        .and_then(|count| out.flush().map(|()| count))
                 }
                 Target::Err => io::stderr().write(text),
             };

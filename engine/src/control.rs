@@ -96,12 +96,7 @@ struct Waiting {
     until: Instant,
 }
 
-fn run(
-    arm: &Arm,
-    steering: &Steering,
-    ends: &AtomicBool,
-    tell: &SyncSender<Result<(), IpcError>>,
-) {
+fn run(arm: &Arm, steering: &Steering, ends: &AtomicBool, tell: &SyncSender<Result<(), IpcError>>) {
     let server = match ControlServer::open(arm) {
         Ok(server) => server,
         Err(error) => {

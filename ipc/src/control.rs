@@ -312,7 +312,11 @@ mod tests {
     fn any_bytes_are_a_request_that_is_refused() {
         let good = ControlRequest::new(ControlAsk::Pause);
         for share in [f64::NAN, -0.1, 1.1, f64::INFINITY] {
-            assert!(ControlRequest::new(ControlAsk::Override(share)).ask().is_err());
+            assert!(
+                ControlRequest::new(ControlAsk::Override(share))
+                    .ask()
+                    .is_err()
+            );
         }
         assert!(ControlRequest { kind: 99, ..good }.ask().is_err());
         let other = ControlRequest {

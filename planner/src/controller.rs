@@ -34,6 +34,8 @@ pub struct PlannedStep<const N: usize> {
     before: Modal,
     /// Modes after it.
     after: Modal,
+    /// Servo rate that its length is counted in (Hz).
+    rate_hz: f64,
 }
 
 impl<const N: usize> PlannedStep<N> {
@@ -196,14 +198,16 @@ impl<const N: usize> Controller<N> {
             start,
             before,
             after,
+            rate_hz: self.rate_hz,
         })
     }
 
     /// Takes a step that was planned before, without planning it again. Says whether that was
-    /// possible: only where joints and modes are exactly those that it was planned from. Otherwise
-    /// the controller is as before.
+    /// possible: only for a controller of the same robot whose joints, modes and servo rate are
+    /// exactly those that the step was planned for. Otherwise the controller is as before.
     pub fn follow(&mut self, planned: &PlannedStep<N>) -> bool {
-        if self.joints != planned.start || self.modal != planned.before {
+        let same = self.joints == planned.start && self.modal == planned.before;
+        if !same || self.rate_hz.to_bits() != planned.rate_hz.to_bits() {
             return false;
         }
         self.modal = planned.after.clone();

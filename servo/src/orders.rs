@@ -340,7 +340,10 @@ mod tests {
         let hand = steering();
         assert_eq!(hand.recover(), Err(NoFault));
         hand.orders.latch();
-        assert!(!hand.orders.wants_recovery(), "the refused order acts later");
+        assert!(
+            !hand.orders.wants_recovery(),
+            "the refused order acts later"
+        );
         assert_eq!(hand.recover(), Ok(1));
         assert!(hand.orders.wants_recovery());
         // Asked for twice, it is done once.
@@ -361,6 +364,9 @@ mod tests {
         assert_eq!(hand.orders.asked().order(), u32::MAX);
         assert_eq!(hand.control(Control::Abort), 0);
         let asked = hand.orders.asked();
-        assert_eq!((asked.order(), asked.aborts(), asked.holds()), (0, 0, false));
+        assert_eq!(
+            (asked.order(), asked.aborts(), asked.holds()),
+            (0, 0, false)
+        );
     }
 }

@@ -536,11 +536,7 @@ impl<const N: usize> Runner<N> {
 
     fn share_position(&self) {
         let resting = self.cycle.is_resting();
-        let path_rate = if resting {
-            0.0
-        } else {
-            self.cycle.path_rate()
-        };
+        let path_rate = if resting { 0.0 } else { self.cycle.path_rate() };
         let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
         self.shared.write(&Measured {
             position: self.measured(),

@@ -90,14 +90,18 @@ fn a_short_stall_of_the_engine_makes_no_jump() {
     let mut late = 0;
     for pair in lines.windows(2) {
         // What the driver was too late to read is not in its log.
-        let follows = pair[1].session == pair[0].session && pair[1].sequence == pair[0].sequence + 1;
+        let follows =
+            pair[1].session == pair[0].session && pair[1].sequence == pair[0].sequence + 1;
         if !follows {
             continue;
         }
         late += usize::from(pair[1].tick > pair[0].tick + 4);
         for joint in 0..velocity.len() {
             let step = (pair[1].setpoint[0][joint] - pair[0].setpoint[0][joint]).abs();
-            assert!(step <= velocity[joint] * 0.001 * 1.001, "{step} rad in one setpoint");
+            assert!(
+                step <= velocity[joint] * 0.001 * 1.001,
+                "{step} rad in one setpoint"
+            );
         }
     }
     assert!(late >= 5, "only {late} stalls were seen");

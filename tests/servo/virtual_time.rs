@@ -251,7 +251,10 @@ fn late_periods_are_left_out() {
         assert!((setpoint.path_time - before.path_time - 0.001).abs() < 1e-9);
         for joint in 0..JOINTS {
             let step = (setpoint.position[joint] - before.position[joint]).abs();
-            assert!(step <= limits().velocity[joint] * 0.001 * 1.001, "{step} rad");
+            assert!(
+                step <= limits().velocity[joint] * 0.001 * 1.001,
+                "{step} rad"
+            );
         }
     }
     let counters = bench.remote.counters();
@@ -445,7 +448,8 @@ fn a_recovery_without_a_fault_leaves_nothing_behind() {
     bench.run(1000);
     assert!(bench.remote.measured().resting);
     assert!(!bench.remote.measured().idle, "the plan was dropped");
-    let forgotten = |event: &Event| matches!(event, Event::Aborted { .. } | Event::Recovered { .. });
+    let forgotten =
+        |event: &Event| matches!(event, Event::Aborted { .. } | Event::Recovered { .. });
     assert!(!bench.events().iter().any(forgotten));
     bench.remote.control(Control::Resume);
     bench.run(8000);

@@ -130,7 +130,10 @@ fn stop_latency() {
     println!("| burden | way | stops | to the first slower setpoint, ms | mm | to rest, ms | mm |");
     println!("|---|---|---|---|---|---|---|");
     for burden in Burden::ALL {
-        if only.as_ref().is_some_and(|only| *only != format!("{burden:?}")) {
+        if only
+            .as_ref()
+            .is_some_and(|only| *only != format!("{burden:?}"))
+        {
             continue;
         }
         for way in [Way::Stop, Way::Pause, Way::Fast] {

@@ -146,9 +146,16 @@ fn a_stop_does_not_wait_for_the_planner() {
         let stopped = canter([word, "--arm", &arm]);
         let took = begun.elapsed();
         assert_eq!(stopped.code, 0, "{}", stopped.stderr);
-        assert!(stopped.stdout.starts_with("at rest, held"), "{}", stopped.stdout);
+        assert!(
+            stopped.stdout.starts_with("at rest, held"),
+            "{}",
+            stopped.stdout
+        );
         let now = status(&arm);
-        assert_eq!((&now["path_rate"], &now["held"]), (&0.0.into(), &true.into()));
+        assert_eq!(
+            (&now["path_rate"], &now["held"]),
+            (&0.0.into(), &true.into())
+        );
         // Far less than the planner needs, and than the move would take.
         assert!(took < Duration::from_secs(5), "{word} took {took:?}");
         assert_eq!(canter([again, "--arm", &arm]).code, 0);
@@ -170,12 +177,21 @@ fn a_stop_does_not_wait_for_the_planner() {
 fn ctrl_c_does_not_wait_for_the_planner() {
     let arm = arm("planning-run");
     let mut run = Peer(
-        command(["run", "-", "-r", "ur5e", "--arm", &arm, "--on-refusal", "skip"])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap(),
+        command([
+            "run",
+            "-",
+            "-r",
+            "ur5e",
+            "--arm",
+            &arm,
+            "--on-refusal",
+            "skip",
+        ])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap(),
     );
     let mut input = run.0.stdin.take().unwrap();
     input.write_all(slow_then_long(2000).as_bytes()).unwrap();
@@ -259,12 +275,18 @@ fn a_run_that_nobody_reads_is_no_success() {
 #[test]
 fn a_closed_output_is_no_success() {
     let arm = arm("closed");
-    let mut child = command(["run", "examples/pick_and_place.canon", "-r", "ur5e", "--json"])
-        .args(["--arm", &arm])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = command([
+        "run",
+        "examples/pick_and_place.canon",
+        "-r",
+        "ur5e",
+        "--json",
+    ])
+    .args(["--arm", &arm])
+    .stdout(Stdio::piped())
+    .stderr(Stdio::piped())
+    .spawn()
+    .unwrap();
     let mut reader = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
     reader.read_line(&mut line).unwrap();
@@ -335,7 +357,10 @@ fn a_recovery_without_a_fault_is_refused() {
     });
     std::thread::sleep(Duration::from_millis(300));
     let then = status(&arm);
-    assert_eq!((&then["queued"], &then["state"]), (&now["queued"], &now["state"]));
+    assert_eq!(
+        (&then["queued"], &then["state"]),
+        (&now["queued"], &now["state"])
+    );
     assert!(then["command"].is_string(), "{then}");
     assert_eq!(canter(["resume", "--arm", &arm]).code, 0);
     wait_for(&arm, "the end of the program", |now| {

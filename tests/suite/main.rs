@@ -15,6 +15,7 @@ mod killed_plans;
 mod made_kits;
 mod plan_costs;
 mod planned_motions;
+mod planned_once;
 mod plans;
 mod runs;
 mod session;

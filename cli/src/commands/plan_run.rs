@@ -23,8 +23,8 @@ use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::printer::Printer;
 use crate::robot::{RobotOption, with_joints};
-use crate::world_file::Database;
 use crate::world_file;
+use crate::world_file::Database;
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///

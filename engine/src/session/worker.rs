@@ -15,8 +15,9 @@ use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
 use super::{Begun, Live, Order, RunSample, SessionConfig, SessionError, Shared, Status};
+use crate::queue::Given;
 use planner::controller::{Controller, Step};
-use planner::dry_run::FailurePolicy;
+use planner::dry_run::{FailurePolicy, PlannedCommand};
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
@@ -243,10 +244,11 @@ impl<const N: usize> Worker<'_, N> {
         };
         // Read before the command is looked at: who resumes later has seen what it came to.
         let newest = self.steering.newest();
-        let command = &queued.located.command;
+        let Given { located, planned } = queued.given;
+        let command = &located.command;
         let mut flight = InFlight {
             id: queued.id,
-            line: queued.located.line,
+            line: located.line,
             name: command.name(),
             planned_s: 0.0,
             chain: *self.controller.chain(),
@@ -255,7 +257,14 @@ impl<const N: usize> Worker<'_, N> {
             says: None,
             refused: false,
         };
-        match self.controller.step(command) {
+        let planned = planned
+            .and_then(PlannedCommand::into_step::<N>)
+            .filter(|planned| self.controller.follow(planned));
+        let step = match planned {
+            Some(planned) => Ok(planned.step),
+            None => self.controller.step(command),
+        };
+        match step {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
                 self.enlist(&mut flight, step);
@@ -520,6 +529,7 @@ impl<const N: usize> Worker<'_, N> {
         status.command = self.flight.front().map(|flight| flight.name).or(jog);
         status.idle = self.flight.is_empty() && self.jogging.is_none();
         status.held = self.is_held();
+        status.plans = self.controller.plans();
         status.fault.clone_from(&self.fault);
         status.settings = Some(self.controller.modal().settings().clone());
     }
