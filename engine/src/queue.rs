@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crcl::Located;
-use planner::dry_run::PlannedCommand;
+use planner::controller::AnyStep;
 use thiserror::Error;
 
 /// A command that is to be executed, planned already or not.
@@ -12,7 +12,7 @@ pub struct Given {
     /// The command and where it stood.
     pub located: Located,
     /// How it is executed, if it was planned before.
-    pub planned: Option<PlannedCommand>,
+    pub planned: Option<AnyStep>,
 }
 
 impl From<Located> for Given {

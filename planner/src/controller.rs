@@ -1,5 +1,7 @@
 //! One arm on its way through a program: modes, planner and the pose reached so far.
 
+use std::any::Any;
+
 use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
@@ -36,6 +38,24 @@ pub struct PlannedStep<const N: usize> {
     after: Modal,
     /// Servo rate that its length is counted in (Hz).
     rate_hz: f64,
+}
+
+/// A planned step of a robot with any number of joints.
+#[derive(Debug)]
+pub struct AnyStep(Box<dyn Any + Send>);
+
+impl AnyStep {
+    /// The step, for a robot of `N` joints; none for one of a robot with another number.
+    #[must_use]
+    pub fn into_step<const N: usize>(self) -> Option<PlannedStep<N>> {
+        self.0.downcast().ok().map(|step| *step)
+    }
+}
+
+impl<const N: usize> From<PlannedStep<N>> for AnyStep {
+    fn from(step: PlannedStep<N>) -> Self {
+        Self(Box::new(step))
+    }
 }
 
 impl<const N: usize> PlannedStep<N> {
@@ -183,6 +203,22 @@ impl<const N: usize> Controller<N> {
             },
         };
         Ok(step)
+    }
+
+    /// What a command means here and now; nothing is planned and nothing changes.
+    ///
+    /// # Errors
+    /// A [`CommandError`] for a command that is out of order or out of range.
+    pub fn resolve(&self, command: &crcl::Command) -> Result<Task, CommandError> {
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        self.modal.clone().resolve(command, &flange)
+    }
+
+    /// A pose of the controlled point in the workstation (m) as the program would write it now.
+    #[must_use]
+    pub fn written(&self, workstation_from_tool: &Isometry3<f64>) -> crcl::Pose {
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        self.modal.written(workstation_from_tool, &flange)
     }
 
     /// As [`Self::step`]; the step can be executed later, by [`Self::follow`].

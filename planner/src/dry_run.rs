@@ -1,14 +1,12 @@
 //! The dry run: a whole program through the same planner, without an arm.
 
-use std::any::Any;
-
 use crcl::{LengthUnit, Program};
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
 
 use crate::command_error::CommandError;
-use crate::controller::{Controller, PlannedStep};
+use crate::controller::{AnyStep, Controller, PlannedStep};
 use crate::motion::MoveCertificate;
 use crate::robot::{Robot, RobotError, vector};
 use crate::with_dof;
@@ -98,11 +96,10 @@ pub struct PlannedCommand {
 }
 
 impl PlannedCommand {
-    /// The step itself, for a robot of `N` joints; none for a robot of another number.
+    /// The step itself, to be executed.
     #[must_use]
-    pub fn into_step<const N: usize>(self) -> Option<PlannedStep<N>> {
-        let motion = self.motion.into_any().downcast::<ArmMotion<N>>().ok()?;
-        Some(motion.planned)
+    pub fn into_step(self) -> AnyStep {
+        self.motion.into_step()
     }
 }
 
@@ -291,8 +288,8 @@ trait Motion: std::fmt::Debug + Send {
     /// State `t` s after the start; at rest after the end.
     fn sample(&self, t: f64) -> PlanSample;
 
-    /// The motion as what it is.
-    fn into_any(self: Box<Self>) -> Box<dyn Any>;
+    /// The step that moves so.
+    fn into_step(self: Box<Self>) -> AnyStep;
 }
 
 #[derive(Debug)]
@@ -322,8 +319,8 @@ impl<const N: usize> Motion for ArmMotion<N> {
         }
     }
 
-    fn into_any(self: Box<Self>) -> Box<dyn Any> {
-        self
+    fn into_step(self: Box<Self>) -> AnyStep {
+        self.planned.into()
     }
 }
 

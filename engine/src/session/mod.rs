@@ -28,7 +28,7 @@ pub use status::{Cycles, Status};
 
 use crate::queue::{Full, Given};
 use inbox::Inbox;
-use planner::dry_run::{FailurePolicy, Plan};
+use planner::dry_run::{FailurePolicy, Plan, PlannedCommand};
 use planner::robot::{Robot, RobotError};
 use planner::with_dof;
 use servo::{Control, ExecutorError, NoFault, Progress, Steering};
@@ -269,12 +269,18 @@ impl Session {
             .enumerate()
             .map(|(index, located)| Given {
                 located: located.clone(),
-                planned: planned.next_if(|planned| planned.index == index),
+                planned: planned
+                    .next_if(|planned| planned.index == index)
+                    .map(PlannedCommand::into_step),
             });
         self.give(given.collect())
     }
 
-    fn give(&self, commands: Vec<Given>) -> Result<Vec<u32>, SubmitError> {
+    /// Appends commands that are planned or not: all of them or none. See [`Session::execute`].
+    ///
+    /// # Errors
+    /// [`SubmitError`], and the queue is as before.
+    pub fn give(&self, commands: Vec<Given>) -> Result<Vec<u32>, SubmitError> {
         let ids = self.shared.inbox().submit(commands, &self.steering)?;
         if self.orders.send(Order::Look).is_err() {
             return Err(SubmitError::Closed);

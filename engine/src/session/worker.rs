@@ -16,8 +16,8 @@ use super::note::{Blame, Note};
 use super::status::state_name;
 use super::{Begun, Live, Order, RunSample, SessionConfig, SessionError, Shared, Status};
 use crate::queue::Given;
-use planner::controller::{Controller, Step};
-use planner::dry_run::{FailurePolicy, PlannedCommand};
+use planner::controller::{AnyStep, Controller, Step};
+use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
@@ -258,7 +258,7 @@ impl<const N: usize> Worker<'_, N> {
             refused: false,
         };
         let planned = planned
-            .and_then(PlannedCommand::into_step::<N>)
+            .and_then(AnyStep::into_step::<N>)
             .filter(|planned| self.controller.follow(planned));
         let step = match planned {
             Some(planned) => Ok(planned.step),
