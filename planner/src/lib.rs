@@ -14,6 +14,7 @@ pub mod command_error;
 pub mod controller;
 mod dof;
 pub mod dry_run;
+pub mod end_effector;
 pub mod modal;
 pub mod motion;
 pub mod recorded;

@@ -6,6 +6,7 @@ mod arrows;
 mod bad_inputs;
 mod benchmarks;
 mod canter;
+mod circles;
 mod command_line;
 mod control;
 mod documents;
