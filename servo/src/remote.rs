@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
+use super::control::Control;
 use super::histogram::Histogram;
 use super::orders::{NoFault, Orders, Steering};
 
