@@ -11,7 +11,6 @@
 //! It is a library with one function so that the system tests run the same code as a process of
 //! their own; the binary `canter` is three lines.
 
-mod arm_motion;
 mod client;
 mod commands;
 mod equipment;
@@ -31,7 +30,6 @@ mod plot;
 mod printer;
 mod program;
 mod progress;
-mod recent;
 mod recording;
 mod robot;
 mod samples;

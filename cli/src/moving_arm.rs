@@ -4,7 +4,8 @@ use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crcl::Command;
+use engine::arm_motion::Mover;
+use engine::queue::Given;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
 
@@ -56,16 +57,6 @@ impl MovingArm {
         })
     }
 
-    /// Joint positions of the last setpoint at the start, rad or m.
-    pub(crate) fn start(&self) -> &[f64] {
-        &self.host.session.start
-    }
-
-    /// Joint positions of the last setpoint, rad or m.
-    pub(crate) fn setpoint(&self) -> Vec<f64> {
-        self.host.session.status().setpoint
-    }
-
     /// How a process ends whose arm had a fault, if it had one.
     pub(crate) fn blame(&self) -> Option<Exit> {
         self.blame
@@ -75,19 +66,15 @@ impl MovingArm {
     ///
     /// # Errors
     /// [`MotionFailure`], with `stopped` when the operator wanted it.
-    pub(crate) fn execute(&mut self, commands: &[Command]) -> Result<(), MotionFailure> {
+    fn execute_all(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure> {
         if self.signals.count() > 0 {
             return Err(MotionFailure::stopped());
         }
-        let program: crcl::Program = commands.iter().cloned().collect();
-        let ids = self
-            .host
-            .session
-            .submit(program.commands)
-            .map_err(|error| {
-                self.read_blame();
-                MotionFailure::new(0, error.to_string())
-            })?;
+        let given = self.host.session.give(commands);
+        let ids = given.map_err(|error| {
+            self.read_blame();
+            MotionFailure::new(0, error.to_string())
+        })?;
         let Some(last) = ids.last().copied() else {
             return Ok(());
         };
@@ -123,7 +110,7 @@ impl MovingArm {
     }
 
     /// Clears a fault; whether that was possible.
-    pub(crate) fn recover(&mut self) -> bool {
+    fn clear_fault(&mut self) -> bool {
         if self.host.session.recover().is_err() {
             self.blame = None;
             return true;
@@ -178,5 +165,19 @@ fn exit_of(blame: Blame) -> Exit {
     match blame {
         Blame::Guard => Exit::Aborted,
         Blame::Driver => Exit::DriverFault,
+    }
+}
+
+impl Mover for MovingArm {
+    fn execute(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure> {
+        self.execute_all(commands)
+    }
+
+    fn setpoint(&self) -> Vec<f64> {
+        self.host.session.status().setpoint
+    }
+
+    fn recover(&mut self) -> bool {
+        self.clear_fault()
     }
 }

@@ -18,6 +18,7 @@ use kinematics::{Chain, Model, UrdfError};
 use nalgebra::{Isometry3, SVector};
 use std::path::Path;
 
+use crate::end_effector::{EndEffector, Gripper, ToolChanger};
 use crate::tooling::{Holder, Tooling};
 
 /// Limits of the joints, root first: rad for turning joints, m for sliding ones.
@@ -54,37 +55,6 @@ pub struct ToolLimits {
     pub angular_jerk: f64,
     /// Where these come from.
     pub source: String,
-}
-
-/// How long a gripper takes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gripper {
-    /// Time to open, s.
-    pub opening: f64,
-    /// Time to close, s.
-    pub closing: f64,
-}
-
-/// Something that the flange can carry.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EndEffector {
-    /// Name.
-    pub name: String,
-    /// Pose of the tool centre point in the flange.
-    pub flange_from_tcp: Isometry3<f64>,
-    /// Present when it opens and closes.
-    pub gripper: Option<Gripper>,
-    /// Where it is kept in the changing station, in the workstation.
-    pub workstation_from_holder: Option<Isometry3<f64>>,
-}
-
-/// The part of the flange that takes end effectors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToolChanger {
-    /// Time to let go, s.
-    pub opening: f64,
-    /// Time to take hold, s.
-    pub closing: f64,
 }
 
 /// A robot as the planner needs it. All vectors have one entry a joint.

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crcl::LengthUnit;
+use engine::arm_motion::ArmMotion;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
@@ -13,7 +14,6 @@ use plan::world::{Model, Reader, StoredRun, Writer};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 
-use crate::arm_motion::ArmMotion;
 use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -318,15 +318,17 @@ fn execute<const N: usize>(
     arm: Option<MovingArm>,
 ) -> Result<Exit, Failure> {
     let (command, printer) = (task.command, task.printer);
-    let mut motion = ArmMotion::<N>::new(robot, command.host.rate, arm)?;
+    let mut motion = ArmMotion::<N, _>::new(robot, command.host.rate, arm)
+        .map_err(|error| Failure::new(Exit::Unreadable, error))?;
     let report: PlanReport = if task.is_pddl() {
         task.pddl(robot, &mut motion)?
     } else {
         task.kitting(robot, &mut motion).map_err(refused)?
     }
     .into();
-    let blame = motion.blame();
-    let off_path = motion.finish()?;
+    let arm = motion.into_mover();
+    let blame = arm.as_ref().and_then(MovingArm::blame);
+    let off_path = arm.map(MovingArm::finish).transpose()?;
     let mut text = Vec::new();
     report.write(&mut text, command.json, off_path)?;
     printer.lines(text);
