@@ -4,11 +4,16 @@ use std::time::Duration;
 use clap::Args;
 use ipc::{Answer, Arm, Client, Domain, IpcError, Verb};
 
+use crate::damage;
 use crate::exit::Exit;
 use crate::failure::Failure;
 
 /// How long an engine may take to answer; it answers between two periods of its main loop.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// After this time an asking client is caught in damaged segments; longer than all that it waits
+/// for by itself.
+const HANG: Duration = Duration::from_secs(15);
 
 /// In which domain engine, driver and clients find each other.
 #[derive(Args, Clone, Debug)]
@@ -25,7 +30,10 @@ impl DomainOption {
     /// # Errors
     /// [`Exit::NoPeer`] when its directory cannot be used.
     pub(crate) fn open(&self) -> Result<Domain, Failure> {
-        Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name)).map_err(failure)
+        let domain = Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name));
+        let domain = domain.map_err(failure)?;
+        damage::watch(&domain);
+        Ok(domain)
     }
 }
 
@@ -54,8 +62,11 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.open()?, "canter").map_err(failure)?;
-        accepted(client.ask(verb, PATIENCE).map_err(failure)?)
+        let arm = self.open()?;
+        let answer = damage::bounded(HANG, || {
+            Client::open(&arm, "canter").and_then(|client| client.ask(verb, PATIENCE))
+        });
+        accepted(answer.map_err(failure)?)
     }
 
     /// Asks, prints the engine's words, if any, to standard error.

@@ -7,7 +7,7 @@ use engine::dry_run::FailurePolicy;
 use engine::executor::{Control, ExecutorError};
 use engine::robot::Robot;
 use engine::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
-use ipc::{Answer, Arm, ClientServer, Clock, Identity, Ownership, Request, StatusWriter, Verb};
+use ipc::{Answer, Arm, ClientServer, Clock, Identity, Ownership, StatusWriter, Verb};
 use serde_json::{Value, json};
 
 use crate::client::{self, ArmOption};
@@ -20,6 +20,9 @@ const REPORT: Duration = Duration::from_millis(100);
 
 /// How many notes are kept for clients that ask.
 const KEPT: usize = 512;
+
+/// How long the notes of one answer may be together (bytes).
+const NOTES: usize = ipc::LONGEST_ANSWER * 3 / 4;
 
 /// How an engine is started.
 #[derive(Args, Debug)]
@@ -181,14 +184,7 @@ impl Host {
             name: name.to_owned(),
             process: std::process::id(),
         };
-        // Nobody owns an arm that was just taken into service.
-        let _ = self.ownership.admit(
-            &Request {
-                client,
-                ask: Verb::Recover,
-            },
-            true,
-        );
+        self.ownership.give(client);
     }
 
     /// Whether a client has asked for the end.
@@ -201,7 +197,8 @@ impl Host {
     /// # Errors
     /// [`Exit::NoPeer`] when shared memory fails.
     pub(crate) fn turn(&mut self) -> Result<Option<Note>, Failure> {
-        while self.serve()? {}
+        // One batch in a turn: whoever floods us does not keep us from the signals.
+        self.serve()?;
         if self.reported.is_none_or(|at| at.elapsed() >= REPORT) {
             self.reported = Some(Instant::now());
             self.status
@@ -220,7 +217,7 @@ impl Host {
         Ok(note)
     }
 
-    fn serve(&mut self) -> Result<bool, Failure> {
+    fn serve(&mut self) -> Result<usize, Failure> {
         let Self {
             session,
             clients,
@@ -239,12 +236,7 @@ impl Host {
             }
             match request.ask {
                 Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
-                Verb::Notes { since } => {
-                    let later = notes
-                        .iter()
-                        .filter(|note| note["number"].as_u64() > Some(since));
-                    Answer::accept(json!({"notes": later.collect::<Vec<_>>()}))
-                }
+                Verb::Notes { since } => later(notes, since),
                 Verb::Shutdown => {
                     *shutdown = true;
                     Answer::accept(Value::Null)
@@ -266,6 +258,45 @@ impl Host {
     }
 }
 
+/// The notes after number `since`, as many as one answer holds; the client asks again for more.
+fn later(notes: &VecDeque<Value>, since: u64) -> Answer {
+    let mut room = NOTES;
+    let later = notes
+        .iter()
+        .filter(|note| note["number"].as_u64() > Some(since));
+    let page = later.map_while(|note| {
+        let length = note.to_string().len();
+        let first = room == NOTES;
+        let fits = room.checked_sub(length);
+        room = fits.unwrap_or(0);
+        match fits {
+            Some(_) => Some(note.clone()),
+            None if first => Some(cut(note)),
+            None => None,
+        }
+    });
+    Answer::accept(json!({"notes": page.collect::<Vec<_>>()}))
+}
+
+/// A note whose long texts are cut.
+fn cut(note: &Value) -> Value {
+    const LONGEST_TEXT: usize = 500;
+    let mut note = note.clone();
+    for value in note["note"]
+        .as_object_mut()
+        .into_iter()
+        .flat_map(serde_json::Map::values_mut)
+    {
+        if let Some(text) = value.as_str()
+            && text.chars().count() > LONGEST_TEXT
+        {
+            let kept: String = text.chars().take(LONGEST_TEXT).collect();
+            *value = Value::String(format!("{kept} (cut)"));
+        }
+    }
+    note
+}
+
 /// Takes a program of a client: all its commands or none.
 fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
     let read = match format {
@@ -285,7 +316,11 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
         return Answer::refuse(text.trim_end());
     }
     match session.submit(reading.program.commands) {
-        Ok(ids) => Answer::accept(json!({"ids": ids})),
+        Ok(ids) => Answer::accept(json!({
+            "first": ids.first(),
+            "last": ids.last(),
+            "commands": ids.len(),
+        })),
         Err(full) => Answer::refuse(full.to_string()),
     }
 }

@@ -14,6 +14,7 @@
 mod arm_motion;
 mod client;
 mod commands;
+mod damage;
 mod equipment;
 mod exit;
 mod failure;
@@ -77,7 +78,10 @@ pub fn main() -> ExitCode {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => failure.report(),
         // The panic hook has told where; a panic is our mistake, whatever the input was.
-        Err(_) => Exit::Internal,
+        Err(_) => {
+            damage::tell();
+            Exit::Internal
+        }
     };
     exit.into()
 }

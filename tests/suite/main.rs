@@ -17,6 +17,7 @@ mod planned_motions;
 mod plans;
 mod runs;
 mod session;
+mod shared_memory;
 mod soak;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
