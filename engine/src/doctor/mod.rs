@@ -63,6 +63,9 @@ pub struct DoctorOptions {
     pub wake_up: Duration,
     /// An arm whose driver to greet. The driver must have no engine.
     pub driver: Option<Arm>,
+    /// What is wrong with the segments of the domain, found out in another process: reading them
+    /// here could end this one.
+    pub damage: Option<String>,
     /// A robot whose limits to look at, beside those of the driver.
     pub robot: Option<Robot>,
 }
@@ -75,6 +78,7 @@ impl DoctorOptions {
             rate_hz: 1000.0,
             wake_up: Duration::from_secs(5),
             driver: None,
+            damage: None,
             robot: None,
         }
     }
