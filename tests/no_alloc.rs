@@ -8,8 +8,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::time::Duration;
 
-use engine::executor::{Control, Event, Runner, Tick};
 use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
+use servo::{Control, Event, Runner, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
 
 thread_local! {

@@ -7,9 +7,10 @@
 //! 1e5 mm/s3), computed once outside of this repository.
 #![allow(missing_docs, clippy::print_stdout, reason = "a benchmark prints")]
 
+use measure::smooth::measure;
 use nalgebra::Isometry3;
 use trajectory::ToolLimits;
-use trajectory::smooth::{SmoothOptions, Windows, measure};
+use trajectory::smooth::{SmoothOptions, Windows};
 
 #[path = "../../trajectory/tests/suite/mod.rs"]
 mod suite;

@@ -18,8 +18,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
+use measure::{Ends, Problems};
 use rsruckig::prelude as rust;
-use trajectory::otg::{Audit, Ends, Otg, Problem, Problems};
+use trajectory::otg::{Audit, Otg, Problem};
 
 const COUNT: usize = 20_000;
 const BLOCK: usize = 200;

@@ -16,10 +16,10 @@ use std::sync::atomic::AtomicBool;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Control, Event, Executor, ExecutorConfig, Feeder, Histogram, Remote};
 use ipc::{Arm, Clock, Domain, DriverLink, EngineLink, Probe, Setpoint, State};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Limits, Manner, Piece, Sample, Segment};
+use servo::{Control, Event, Executor, ExecutorConfig, Feeder, Histogram, Remote};
 
 const N: usize = 6;
 type Joints = SVector<f64, N>;
@@ -422,7 +422,7 @@ fn link_trips(arm: &Arm) -> Vec<u64> {
     trips(TRIPS, |sequence| {
         let mut next = setpoint;
         next.sequence = sequence;
-        next.published_ns = ipc::now_ns();
+        next.published_ns = scheduling::now_ns();
         link.send(next);
         let end = Instant::now() + Duration::from_secs(1);
         loop {

@@ -15,8 +15,9 @@ use copp::solver::topp2_ra::{
 use copp::solver::topp3_socp::{
     ClarabelOptionsBuilder, Topp3ProblemBuilder, s_to_t_topp3, topp3_socp,
 };
+use measure::RandomPaths;
 use nalgebra::DMatrix;
-use trajectory::timing::{LawProblem, RandomPaths, ReachGrid, reach_duration};
+use trajectory::timing::{LawProblem, ReachGrid, reach_duration};
 use trajectory::{Path, SplinePath, TimingOptions, ToolLimits, time_path};
 
 const JOINTS: usize = 7;

@@ -4,12 +4,12 @@
 use std::io;
 
 use crcl::{Command, LengthUnit, Pose};
-use engine::command_error::CommandError;
-use engine::controller::Controller;
-use engine::robot::Robot;
 use nalgebra::{Isometry3, SVector};
 use plan::run::{Batch, Motion, MotionFailure, Situation, canonical};
 use plan::world::{Change, from_axes};
+use planner::command_error::CommandError;
+use planner::controller::Controller;
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;

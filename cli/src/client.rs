@@ -2,7 +2,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, Domain, IpcError, Verb};
+use ipc::{Answer, Arm, Client, Domain, Verb};
 
 use crate::damage;
 use crate::exit::Exit;
@@ -30,8 +30,7 @@ impl DomainOption {
     /// # Errors
     /// [`Exit::NoPeer`] when its directory cannot be used.
     pub(crate) fn open(&self) -> Result<Domain, Failure> {
-        let domain = Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name));
-        let domain = domain.map_err(failure)?;
+        let domain = Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name))?;
         damage::watch(&domain);
         Ok(domain)
     }
@@ -53,7 +52,7 @@ impl ArmOption {
     /// # Errors
     /// [`Exit::Usage`] for a wrong name, [`Exit::NoPeer`] when the domain cannot be used.
     pub(crate) fn open(&self) -> Result<Arm, Failure> {
-        self.domain.open()?.arm(&self.arm).map_err(failure)
+        Ok(self.domain.open()?.arm(&self.arm)?)
     }
 
     /// Asks the arm's engine and waits for the answer.
@@ -66,7 +65,7 @@ impl ArmOption {
         let answer = damage::bounded(HANG, || {
             Client::open(&arm, "canter").and_then(|client| client.ask(verb, PATIENCE))
         });
-        accepted(answer.map_err(failure)?)
+        accepted(answer?)
     }
 
     /// Asks, prints the engine's words, if any, to standard error.
@@ -92,13 +91,4 @@ pub(crate) fn accepted(answer: Answer) -> Result<Answer, Failure> {
     } else {
         Err(Failure::new(Exit::Refused, anyhow::anyhow!(answer.message)))
     }
-}
-
-/// A fault of the border to other processes with its exit code.
-pub(crate) fn failure(error: IpcError) -> Failure {
-    let exit = match error {
-        IpcError::BadArmName { .. } => Exit::Usage,
-        _ => Exit::NoPeer,
-    };
-    Failure::new(exit, error)
 }

@@ -1,8 +1,8 @@
 //! What a world says about the tools of an arm, as the engine needs it.
 
-use engine::robot::{EndEffector, Gripper, Robot, ToolChanger};
 use nalgebra::Isometry3;
 use plan::world::{Class, Model, pointing_down};
+use planner::robot::{EndEffector, Gripper, Robot, ToolChanger};
 
 /// Opening and closing time of a gripper or tool changer that the world says nothing about (s).
 const NOMINAL_S: f64 = 0.2;

@@ -1,5 +1,7 @@
 use std::io::{self, Write};
 
+use ipc::IpcError;
+
 use crate::exit::Exit;
 
 /// Why a command could not do its work: the exit code and the chain of causes.
@@ -57,6 +59,17 @@ fn chain(cause: &anyhow::Error) -> String {
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         Self::new(Exit::Internal, error)
+    }
+}
+
+/// The border to other processes.
+impl From<IpcError> for Failure {
+    fn from(error: IpcError) -> Self {
+        let exit = match error {
+            IpcError::BadArmName { .. } => Exit::Usage,
+            _ => Exit::NoPeer,
+        };
+        Self::new(exit, error)
     }
 }
 

@@ -18,7 +18,7 @@ mod damage;
 mod equipment;
 mod exit;
 mod failure;
-mod host;
+mod host_options;
 mod logging;
 mod mobility;
 mod moving_arm;

@@ -1,9 +1,9 @@
 use std::io::{self, Write};
 
-use engine::robot::Robot;
 use kinematics::measure::{self, Dexterity};
 use kinematics::reach::{self, ReachMap};
 use nalgebra::{Isometry3, SVector};
+use planner::robot::Robot;
 use serde_json::{Value, json};
 
 use crate::exit::Exit;

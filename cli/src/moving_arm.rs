@@ -7,15 +7,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use crcl::Command;
-use engine::executor::Control;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
+use servo::Control;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::Host;
+use crate::host_options::Host;
 use crate::output;
 use crate::progress::Progress;
 use crate::recording::Recording;

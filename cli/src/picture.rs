@@ -1,5 +1,5 @@
-use engine::dry_run::{Plan, PlanSample, PlannedCommand};
-use engine::robot::Robot;
+use planner::dry_run::{Plan, PlanSample, PlannedCommand};
+use planner::robot::Robot;
 
 use crate::plot::{Drawing, Row, Span, Target};
 

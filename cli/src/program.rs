@@ -4,9 +4,9 @@ use std::io::{self, IsTerminal, Read, Write};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
-use engine::command_error::ErrorClass;
-use engine::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
-use engine::robot::Robot;
+use planner::command_error::ErrorClass;
+use planner::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -122,6 +122,11 @@ impl ProgramArgument {
     }
 }
 
+/// The time of a clock that never jumps (s).
+fn seconds() -> f64 {
+    scheduling::now_ns() as f64 * 1e-9
+}
+
 fn bytes(path: &str) -> io::Result<Vec<u8>> {
     if path == "-" {
         let mut bytes = Vec::new();
@@ -194,6 +199,7 @@ impl ProgramFile {
             default_length: self.default_length,
             on_refusal,
             start,
+            clock: seconds,
         };
         plan_program(robot, &self.reading.program, &options)
             .map_err(|error| Failure::new(Exit::Unreadable, error))

@@ -1,5 +1,5 @@
 use clap::Args;
-use engine::robot::Robot;
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -32,7 +32,7 @@ impl RobotOption {
 /// # Errors
 /// [`Exit::Unreadable`] with the fault of its files.
 pub(crate) fn load(name: &str) -> Result<Robot, Failure> {
-    engine::robot::load(name).map_err(|error| Failure::new(Exit::Unreadable, error))
+    planner::robot::load(name).map_err(|error| Failure::new(Exit::Unreadable, error))
 }
 
 /// Calls a function generic over the joint count, `name::<N>(arguments)`, with `N` chosen at run

@@ -1,28 +1,15 @@
-//! Queue, planner and real-time executor of canonical robot commands.
+//! A running arm: the queue of commands, the session that plans them ahead of the servo thread,
+//! and the host that serves clients.
 //!
-//! A command leaves the [`queue`], loses its modes in [`modal`], is planned
-//! whole by the [`planner`] and becomes setpoints in [`executor`]. The
-//! [`controller`] holds the first three together; the [`dry_run`] and the real
-//! run both stand on it.
+//! A command leaves the [`queue`] and is planned by the planner's thread of the [`session`], which
+//! hands the pieces to the servo thread. The [`host`] answers the requests of other processes.
+//! [`doctor`] looks at what all this needs of the machine.
 //!
-//! This crate never names iceoryx2, prints nothing and reads no environment
+//! This crate never plans by itself, never names iceoryx2, prints nothing and reads no environment
 //! variable.
+#![forbid(unsafe_code)]
 
-pub mod command_error;
-pub mod conformance;
-pub mod controller;
 pub mod doctor;
-mod dof;
-pub mod dry_run;
-pub mod executor;
-pub mod modal;
-pub mod planner;
+pub mod host;
 pub mod queue;
-pub mod recorded;
-pub mod robot;
 pub mod session;
-pub mod task;
-pub mod tooling;
-pub mod trial;
-
-use dof::with_dof;

@@ -9,7 +9,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, Node};
 
 use crate::node::{Shared, exchange, inhabitants, join, topic};
-use crate::{Arm, Hello, HelloAck, IpcError, Setpoint, State, Verdict, room, text_of};
+use crate::{Arm, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint, State, Verdict, room, text_of};
 
 /// The engine's end: sends setpoints, receives states, opens sessions. There is one for each arm
 /// among all processes. It stays in the thread that opened it.
@@ -66,6 +66,29 @@ impl EngineLink {
             states,
             hello,
             _node: node,
+        })
+    }
+
+    /// How many joints the driver has, from the states that it sends also without a session. Not
+    /// for the cycle.
+    ///
+    /// # Errors
+    /// [`IpcError::NoAnswer`] when no state comes within `timeout`.
+    pub fn joints(&self, timeout: Duration) -> Result<usize, IpcError> {
+        let start = Instant::now();
+        while start.elapsed() < timeout {
+            match self.next_state() {
+                Some(state) if (1..=MAX_JOINTS as u32).contains(&state.joints) => {
+                    return Ok(state.joints as usize);
+                }
+                Some(_) => {}
+                None => sleep(Duration::from_millis(1)),
+            }
+        }
+        Err(IpcError::NoAnswer {
+            arm: self.arm.to_string(),
+            role: "driver",
+            waited_ms: timeout.as_millis() as u64,
         })
     }
 

@@ -63,7 +63,10 @@ pub enum IpcError {
         operation: &'static str,
     },
     /// Anything else, with the name that iceoryx2 gives it.
-    #[error("{service}: {operation} failed ({cause})")]
+    #[error(
+        "{service}: {operation} failed ({cause}); if it stays so, end the engines and drivers \
+         there and run `canter doctor --repair`"
+    )]
     Failed {
         /// The service.
         service: String,
@@ -85,7 +88,8 @@ pub enum IpcError {
     /// There is too little room in shared memory.
     #[error(
         "{place} has {found} bytes left, {needed} are needed; remove what fills it \
-         (`ls -lS {place}`, `canter doctor`) or give it more (mount -o remount,size=256m {place})"
+         (`ls -lS {place}`, `canter doctor`) or give it more (mount -o remount,size=256m {place}); \
+         SIGINT to the engine stops the arm meanwhile"
     )]
     NoRoom {
         /// The file system.

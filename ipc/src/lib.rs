@@ -15,7 +15,6 @@
 mod arm;
 mod client;
 mod client_server;
-mod clock;
 mod damage;
 mod domain;
 mod driver_link;
@@ -33,12 +32,10 @@ mod state;
 mod status;
 mod ticket;
 mod tool;
-mod urgency;
 
 pub use arm::{Arm, model_hash};
 pub use client::Client;
 pub use client_server::ClientServer;
-pub use clock::{now_ns, sleep_until_ns};
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
@@ -55,7 +52,6 @@ pub use state::{DriverState, FaultCode, State};
 pub use status::{StatusReader, StatusWriter};
 pub use ticket::RequestId;
 pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
-pub use urgency::{Granted, Urgency, urge};
 
 /// How many joints fit into a message.
 pub const MAX_JOINTS: usize = 16;

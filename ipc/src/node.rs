@@ -109,8 +109,9 @@ pub fn remove_dead_nodes(domain: &Domain) -> Result<(u64, u64), IpcError> {
 /// segments may end the process: ask in one that may end.
 ///
 /// # Errors
-/// [`IpcError::Failed`] when the list cannot be read.
+/// [`IpcError::Damaged`], or [`IpcError::Failed`] when the list cannot be read.
 pub fn look_at_services(domain: &Domain) -> Result<usize, IpcError> {
+    damage::look(domain)?;
     let (config, mut count) = (configuration(domain)?, 0);
     Shared::list(&config, |_| {
         count += 1;

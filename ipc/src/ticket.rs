@@ -8,10 +8,10 @@ use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use crate::clock::now_ns;
 use crate::{Domain, IpcError};
 
 /// The folder of tickets in a domain's directory.
@@ -23,7 +23,7 @@ const FOLDER: &str = "requests";
 pub struct RequestId {
     /// The process that asks.
     pub process: u32,
-    /// When it asked (ns of `CLOCK_MONOTONIC`), later than any request of it before.
+    /// When it asked (ns since 1970), later than any request of it before.
     pub asked_ns: u64,
 }
 
@@ -32,7 +32,8 @@ impl RequestId {
     pub(crate) fn new() -> Self {
         use core::sync::atomic::{AtomicU64, Ordering};
         static LAST: AtomicU64 = AtomicU64::new(0);
-        let now = now_ns();
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        let now = since.unwrap_or_default().as_nanos() as u64;
         // Two threads of one process may ask in the same nanosecond.
         let last = LAST.fetch_max(now, Ordering::Relaxed);
         let asked_ns = if last < now {

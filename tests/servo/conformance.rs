@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use engine::conformance::{Verdict, test_driver};
+use driver_conformance::{Verdict, test_driver};
 use system_tests::servo_arm::{JOINTS, driver_options};
 
 #[test]

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Event, Executor, Recorded, ToolOrder};
 use ipc::{Clock, GRIPPER, ToolAction};
+use servo::{Event, Executor, Recorded, ToolOrder};
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed, planned};
 
 /// What a run leaves.

@@ -146,7 +146,7 @@ fn a_hog_of_the_processors() {
         for _ in 0..4 {
             scope.spawn(|| {
                 // Where the user may not, the hog has an ordinary priority.
-                ipc::urge(ipc::Urgency {
+                scheduling::urge(scheduling::Urgency {
                     priority: 90,
                     processor: None,
                     lock_memory: false,

@@ -1,9 +1,9 @@
 //! The real-time thread's work on a virtual clock, with an ideal driver: what happens when is
 //! exact.
 
-use engine::executor::{Control, Event, Fault, Feeder, Monitor, Remote, Runner, Tick};
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
 use realtime::{Piece, Sample, Segment};
+use servo::{Control, Event, Fault, Feeder, Monitor, Remote, Runner, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
 
 /// A runner, its ends, and a driver that is always exactly at the last setpoint.

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Control, Event, Executor, ExecutorError, Fault};
 use ipc::Clock;
+use servo::{Control, Event, Executor, ExecutorError, Fault};
 use system_tests::servo_arm::{driver_options, executor_config, feed, planned};
 
 fn arm(name: &str) -> ipc::Arm {

@@ -1,8 +1,8 @@
 //! Planned motions of a six-joint arm for the tests of the servo loop.
 
-use engine::executor::{ExecutorConfig, Feeder};
 use nalgebra::SVector;
 use realtime::{Limits, Piece, Sample, Segment};
+use servo::{ExecutorConfig, Feeder};
 
 /// Joints of the test arm.
 pub const JOINTS: usize = 6;

@@ -82,7 +82,7 @@ robots! { ur5e ur10e panda fr3 iiwa7 iiwa14 }
 #[test]
 fn every_other_robot() {
     let named = ["ur5e", "ur10e", "panda", "fr3", "iiwa7", "iiwa14"];
-    for robot in engine::robot::list() {
+    for robot in planner::robot::list() {
         if !named.contains(&robot) {
             check(robot);
         }

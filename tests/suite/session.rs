@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use engine::dry_run::{PlanOptions, PlanSample, plan_program};
-use engine::robot::Robot;
 use engine::session::{Note, RunSample, Session, SessionConfig};
 use ipc::{Arm, Clock};
+use planner::dry_run::{PlanOptions, PlanSample, plan_program};
+use planner::robot::Robot;
 
 const PROGRAM: &str = r#"
 InitCanon()
@@ -137,7 +137,7 @@ fn names_done(notes: &[Note]) -> Vec<&'static str> {
 
 #[test]
 fn a_program_runs_in_step_with_the_driver() {
-    let robot = engine::robot::load("ur5e").unwrap();
+    let robot = planner::robot::load("ur5e").unwrap();
     let (notes, samples) = run(&robot, "step");
     assert_eq!(names_done(&notes).len(), 12, "{notes:#?}");
     let planned = planned(&robot);

@@ -5,7 +5,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
 
-use trajectory::otg::{Ends, Interface, Otg, Problem, Problems, Running, Synchronisation};
+use measure::{Ends, Problems};
+use trajectory::otg::{Interface, Otg, Problem, Running, Synchronisation};
 
 struct Counting;
 

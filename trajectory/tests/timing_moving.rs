@@ -1,9 +1,9 @@
 //! Laws of path timing from a moving start.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
+use measure::RandomPaths;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use trajectory::timing::RandomPaths;
 use trajectory::{
     Boundary, JointLimits, Path, PathPoint, SplinePath, TimingOptions, ToolLimits, time_path,
 };

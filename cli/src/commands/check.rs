@@ -1,7 +1,7 @@
 use std::io::{self, IsTerminal, Write};
 
 use clap::Args;
-use engine::dry_run::FailurePolicy;
+use planner::dry_run::FailurePolicy;
 use serde_json::json;
 
 use crate::exit::Exit;

@@ -9,10 +9,10 @@ use engine::doctor::{Check, DoctorOptions, Health, examine};
 use ipc::{Domain, IpcError};
 use serde_json::json;
 
-use crate::client::{self, DomainOption};
+use crate::client::DomainOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::rate;
+use crate::host_options::rate;
 use crate::output;
 
 /// How long a look at the segments may take.
@@ -64,7 +64,7 @@ impl Doctor {
         }
         let damage = probe_apart(&domain)?;
         let driver = self.arm.as_deref().map(|arm| domain.arm(arm));
-        let driver = driver.transpose().map_err(client::failure)?;
+        let driver = driver.transpose()?;
         let robot = self.robot.as_deref().map(crate::robot::load).transpose()?;
         let checks = examine(&DoctorOptions {
             rate_hz: self.rate,
@@ -93,16 +93,15 @@ fn repair(domain: &Domain) -> Result<Exit, Failure> {
             Ok(Exit::Done)
         }
         Err(error @ IpcError::InUse { .. }) => Err(Failure::new(Exit::Refused, error)),
-        Err(error) => Err(client::failure(error)),
+        Err(error) => Err(error.into()),
     }
 }
 
 /// Reads all that is kept of processes and services.
 fn probe(domain: &Domain) -> Result<Exit, Failure> {
-    let looked = ipc::count_nodes(domain)
-        .and_then(|_| ipc::remove_dead_nodes(domain))
-        .and_then(|_| ipc::look_at_services(domain));
-    looked.map_err(client::failure)?;
+    ipc::look_at_services(domain)?;
+    ipc::count_nodes(domain)?;
+    ipc::remove_dead_nodes(domain)?;
     Ok(Exit::Done)
 }
 

@@ -1,14 +1,14 @@
 use std::io::{self, Write};
 
 use clap::Args;
-use engine::executor::Control;
 use engine::session::Note;
+use servo::Control;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{HostOptions, RefusalOption};
+use crate::host_options::{HostOptions, RefusalOption};
 use crate::output;
 use crate::robot::RobotOption;
 

@@ -1,8 +1,8 @@
 use std::io::{self, BufWriter, Write};
 
 use clap::Args;
-use engine::robot::Robot;
 use nalgebra::SVector;
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;

@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use engine::robot::Robot;
 use kinematics::{Obstacle, Report, Solution, Solver};
 use nalgebra::{Isometry3, Quaternion, SVector, Translation3, UnitQuaternion};
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;

@@ -56,7 +56,7 @@ impl Jog {
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, Arc::clone(&stop))?;
         }
-        let client = Client::open(&self.arm.open()?, "canter jog").map_err(client::failure)?;
+        let client = Client::open(&self.arm.open()?, "canter jog")?;
         let (space, speeds) = self.request(&client)?;
         let ask = |speeds: Vec<f64>| -> Result<(), Failure> {
             let verb = Verb::Jog {
@@ -64,7 +64,7 @@ impl Jog {
                 speeds,
                 timeout_ms: self.timeout,
             };
-            let answer = client.ask(verb, PATIENCE).map_err(client::failure)?;
+            let answer = client.ask(verb, PATIENCE)?;
             client::accepted(answer).map(|_| ())
         };
         let end = self
@@ -111,9 +111,7 @@ impl Jog {
 
 /// How many joints the arm has, by its engine's report.
 fn joint_count(client: &Client) -> Result<usize, Failure> {
-    let answer = client
-        .ask(Verb::Status, PATIENCE)
-        .map_err(client::failure)?;
+    let answer = client.ask(Verb::Status, PATIENCE)?;
     let answer = client::accepted(answer)?;
     let joints = answer.body["status"]["joints"].as_array();
     Ok(joints.map_or(0, Vec::len))

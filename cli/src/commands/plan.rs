@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use engine::dry_run::{FailurePolicy, Plan as Planned, PlannedCommand};
+use planner::dry_run::{FailurePolicy, Plan as Planned, PlannedCommand};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::rate;
+use crate::host_options::rate;
 use crate::output;
 use crate::picture;
 use crate::plot;

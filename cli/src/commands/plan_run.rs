@@ -3,8 +3,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crcl::LengthUnit;
-use engine::dry_run::FailurePolicy;
-use engine::robot::Robot;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
@@ -12,12 +10,14 @@ use plan::run::{
     SimulatedFactotum, Stock, parameters, prepare,
 };
 use plan::world::{Model, Reader, StoredRun, Writer};
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
 
 use crate::arm_motion::ArmMotion;
 use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::HostOptions;
+use crate::host_options::HostOptions;
 use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;

@@ -2,8 +2,8 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use engine::robot::{self, Robot};
 use nalgebra::Isometry3;
+use planner::robot::{self, Robot};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;

@@ -5,17 +5,17 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
-use engine::dry_run::FailurePolicy;
-use engine::executor::Control;
-use engine::robot::Robot;
 use engine::session::{Blame, Note};
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
 use serde_json::json;
+use servo::Control;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host::{DriverChoice, Host, HostOptions, RefusalOption};
+use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
 use crate::output;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;

@@ -3,8 +3,8 @@ use std::io::{self, BufReader, Read, Write};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use engine::recorded::{CommandVerdict, ProgramVerdict, Row, verify_program};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use planner::recorded::{CommandVerdict, ProgramVerdict, Row, verify_program};
 
 use crate::exit::Exit;
 use crate::failure::Failure;

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ipc::{Arm, Clock, DriverLink, Urgency, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Clock, DriverLink};
+use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
 
 use crate::log::Log;
 use crate::{Driver, DriverError, Robot};

@@ -67,7 +67,7 @@ pub struct Options {
     /// Where to write each setpoint received, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
-    pub urgency: ipc::Urgency,
+    pub urgency: scheduling::Urgency,
 }
 
 impl Options {
@@ -95,9 +95,9 @@ impl Options {
                 ..ToolOptions::default()
             }),
             log: None,
-            urgency: ipc::Urgency {
+            urgency: scheduling::Urgency {
                 priority: 50,
-                ..ipc::Urgency::default()
+                ..scheduling::Urgency::default()
             },
         }
     }

@@ -5,8 +5,7 @@ use core::time::Duration;
 use ipc::{Arm, Clock, EngineLink, Hello, HelloAck, IpcError, text_of};
 
 use super::{Check, Health};
-use crate::conformance::joints_of;
-use crate::robot::Robot;
+use planner::robot::Robot;
 
 /// How far a limit of the robot may be beyond the driver's: rounding of text, as a share.
 const ROUNDING: f64 = 1e-6;
@@ -16,7 +15,7 @@ pub(super) fn handshake(arm: &Arm, rate_hz: f64) -> (Check, Option<HelloAck>) {
     const NAME: &str = "driver handshake";
     let period = (1e9 / rate_hz) as u64;
     let greeted = EngineLink::open(arm).and_then(|link| {
-        let joints = joints_of(&link, Duration::from_secs(2))?;
+        let joints = link.joints(Duration::from_secs(2))?;
         let hello = Hello::new(joints, period, 100_000_000.max(period), Clock::Wall);
         link.greet(&hello, Duration::from_secs(2))
     });

@@ -6,10 +6,11 @@ use core::time::Duration;
 use std::fs;
 use std::thread;
 
-use ipc::{Arm, Domain, Probe, Urgency, now_ns, sleep_until_ns, urge};
+use ipc::{Arm, Domain, Probe};
+use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
 use serde::Serialize;
 
-use crate::robot::Robot;
+use planner::robot::Robot;
 
 /// How a check ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -375,7 +376,7 @@ mod tests {
         let options = DoctorOptions {
             wake_up: Duration::from_millis(100),
             driver: Some(domain.arm("doctor/nobody-there").unwrap()),
-            robot: Some(crate::robot::load("ur5e").unwrap()),
+            robot: Some(planner::robot::load("ur5e").unwrap()),
             ..DoctorOptions::new(domain)
         };
         let checks = examine(&options);

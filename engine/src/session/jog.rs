@@ -8,8 +8,8 @@ use thiserror::Error;
 
 use super::note::Note;
 use super::worker::{Work, Worker};
-use crate::executor::Control;
-use crate::planner::Direction;
+use planner::motion::Direction;
+use servo::Control;
 
 /// Number of the command that a jog is to the executor.
 const COMMAND: u32 = u32::MAX;

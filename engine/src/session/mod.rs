@@ -22,11 +22,11 @@ pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
 pub use status::{Cycles, Status};
 
-use crate::dry_run::FailurePolicy;
-use crate::executor::{Control, ExecutorError};
 use crate::queue::Full;
-use crate::robot::{Robot, RobotError};
-use crate::with_dof;
+use planner::dry_run::FailurePolicy;
+use planner::robot::{Robot, RobotError};
+use planner::with_dof;
+use servo::{Control, ExecutorError};
 
 /// How a session runs.
 #[derive(Clone, Debug)]

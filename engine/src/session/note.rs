@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::command_error::CommandError;
+use planner::command_error::CommandError;
 
 /// Who is to blame for a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use serde::Serialize;
 
-use crate::executor::Counters;
-use crate::modal::{CanonState, Settings};
+use planner::modal::{CanonState, Settings};
+use servo::Counters;
 
 /// A picture of a running session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

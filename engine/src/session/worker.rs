@@ -15,14 +15,14 @@ use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
 use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared, SubmitError};
-use crate::controller::{Controller, Step};
-use crate::dry_run::FailurePolicy;
-use crate::executor::{
+use crate::queue::{Full, Queue};
+use planner::controller::{Controller, Step};
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
+use planner::task::{Task, ToolAction};
+use servo::{
     Control, Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, ToolOrder,
 };
-use crate::queue::{Full, Queue};
-use crate::robot::Robot;
-use crate::task::{Task, ToolAction};
 
 /// How many commands are planned ahead of the one that moves.
 const AHEAD: usize = 8;

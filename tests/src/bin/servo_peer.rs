@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::executor::{Event, Executor, Feeder};
+use servo::{Event, Executor, Feeder};
 use system_tests::domain::inherited;
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed};
 
@@ -118,10 +118,10 @@ fn hostile(arm: &str, log: &str, kind: &str) -> Outcome {
     let mut driver = driver_sim::driver(driver_options(arm))?;
     let mut log = std::fs::File::create(log)?;
     let mut random = 0x9e37_79b9_7f4a_7c15_u64;
-    let (mut next, mut active) = (ipc::now_ns(), 0_u64);
+    let (mut next, mut active) = (scheduling::now_ns(), 0_u64);
     loop {
-        next = (next + PERIOD).max(ipc::now_ns());
-        ipc::sleep_until_ns(next);
+        next = (next + PERIOD).max(scheduling::now_ns());
+        scheduling::sleep_until_ns(next);
         if let Some(greeting) = link.greeting() {
             let ack = driver.greet(&greeting.hello, next);
             greeting.answer(old(ack, kind));

@@ -38,7 +38,6 @@
 
 mod audit;
 mod axis;
-mod bench;
 mod brake;
 mod check;
 mod direct;
@@ -51,19 +50,18 @@ mod motion;
 mod options;
 mod pace;
 mod plan;
-mod problems;
+mod problem;
 mod running;
 mod side;
 mod state;
 mod strand;
 
 pub use audit::Audit;
-pub use bench::{Row, bench};
 pub use error::OtgError;
 pub use limits::Limits;
 pub use motion::Motion;
 pub use options::{Interface, Options, Synchronisation};
-pub use problems::{Ends, Problem, Problems};
+pub use problem::Problem;
 pub use running::Running;
 pub use state::State;
 
@@ -98,6 +96,3 @@ impl Otg {
         plan::plan(start, target, limits, options)
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -5,7 +5,7 @@ use realtime::Sample;
 use super::error::OtgError;
 use super::motion::Motion;
 use super::plan::plan;
-use super::problems::Problem;
+use super::problem::Problem;
 
 /// A move under way: advanced in time and planned anew from its own state, as often as wanted.
 ///

@@ -18,7 +18,6 @@ mod certificate;
 mod choose;
 mod exact_stop;
 mod lower_bound;
-mod measure;
 mod options;
 mod pass;
 mod plan;
@@ -30,7 +29,6 @@ mod windows;
 
 pub use certificate::{Certificate, Peak};
 pub use lower_bound::least_time;
-pub use measure::{Measure, measure};
 pub use options::{SmoothError, SmoothOptions};
 pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};

@@ -7,7 +7,6 @@
 
 mod audit;
 mod band;
-mod bench;
 mod bound;
 mod certificate;
 mod grid;
@@ -24,7 +23,6 @@ mod pieces;
 mod problem;
 mod reach;
 mod rows;
-mod samples;
 mod share;
 mod state;
 mod stations;
@@ -33,12 +31,10 @@ mod survey;
 mod tighten;
 mod warp;
 
-pub use bench::{Row, bench};
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub use law::{Law, LawProblem};
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
-pub use samples::RandomPaths;
 
 use grid::{Bounded, Grid};
 use stations::Stations;

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use engine::robot::Robot;
+use measure::smooth::{self, Measure};
+use planner::robot::Robot;
 use serde::Serialize;
-use trajectory::smooth::{self, Measure, SmoothOptions};
+use trajectory::smooth::SmoothOptions;
 
 use super::suite::{self, Suite};
 use crate::exit::Exit;

@@ -1,8 +1,8 @@
 use std::io::{self, Write};
 
 use clap::Args;
+use measure::{Ends, otg};
 use serde::Serialize;
-use trajectory::otg::{self, Ends};
 
 use super::Problems;
 use crate::exit::Exit;

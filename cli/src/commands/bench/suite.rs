@@ -1,6 +1,6 @@
 use std::fmt;
 
-use engine::trial::Trial;
+use measure::Trial;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;

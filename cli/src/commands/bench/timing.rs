@@ -1,8 +1,8 @@
 use std::io::{self, Write};
 
 use clap::Args;
+use measure::timing;
 use serde::Serialize;
-use trajectory::timing;
 
 use super::Problems;
 use crate::exit::Exit;

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use engine::robot::Robot;
+use planner::robot::Robot;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;

@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use driver_sim::Options;
-use engine::robot::Robot;
 use ipc::{Arm, DriverLink, IpcError};
+use planner::robot::Robot;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;

@@ -1,11 +1,11 @@
 use std::io::{self, Write};
 
 use clap::Args;
-use engine::conformance::{Clause, Verdict, test_driver};
+use driver_conformance::{Clause, Verdict, test_driver};
 use ipc::IpcError;
 use serde_json::json;
 
-use crate::client::{self, ArmOption};
+use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
@@ -72,6 +72,6 @@ impl Test {
 fn failure(error: IpcError) -> Failure {
     match error {
         IpcError::Refused { .. } => Failure::new(Exit::Refused, error),
-        other => client::failure(other),
+        other => other.into(),
     }
 }

@@ -1,0 +1,146 @@
+use clap::{Args, ValueEnum};
+use engine::host::ClientChannels;
+use engine::session::{SessionConfig, SessionError};
+use ipc::Clock;
+use planner::dry_run::FailurePolicy;
+use planner::robot::Robot;
+use servo::ExecutorError;
+
+use crate::client::ArmOption;
+use crate::exit::Exit;
+use crate::failure::Failure;
+use crate::simulation::{Kind, Simulation};
+
+/// An engine that ends its simulated driver, if it has one.
+pub(crate) type Host = engine::host::Host<Option<Simulation>>;
+
+/// How an engine is started.
+#[derive(Args, Debug)]
+pub(crate) struct HostOptions {
+    #[command(flatten)]
+    pub(crate) arm: ArmOption,
+    /// Servo rate
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
+    pub(crate) rate: f64,
+    /// Which driver moves the arm
+    #[arg(long, value_enum, default_value_t = DriverChoice::Sim)]
+    pub(crate) driver: DriverChoice,
+    /// Python that runs the MuJoCo driver
+    #[arg(long, value_name = "PYTHON", default_value = "python3")]
+    python: String,
+    /// Go in step with the driver instead of by the clock: faster, and the same every time
+    #[arg(long)]
+    lock_step: bool,
+}
+
+/// What an engine does with a command that it refuses.
+#[derive(Args, Debug)]
+pub(crate) struct RefusalOption {
+    /// What happens when a command cannot be executed
+    #[arg(long, value_enum, default_value_t = OnRefusal::Abort)]
+    on_refusal: OnRefusal,
+}
+
+impl RefusalOption {
+    /// The policy that was chosen.
+    pub(crate) fn policy(&self) -> FailurePolicy {
+        self.on_refusal.into()
+    }
+}
+
+/// Which driver moves the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DriverChoice {
+    /// The built-in simulated servo, started and ended with the engine.
+    Sim,
+    /// A MuJoCo simulation of the robot's URDF, started and ended with the engine.
+    Mujoco,
+    /// One that runs already.
+    External,
+}
+
+/// What happens when a command cannot be executed.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OnRefusal {
+    /// Stop and forget the rest of the program.
+    Abort,
+    /// The command has no effect; go on with the next.
+    Skip,
+    /// Stop and wait for the operator.
+    Hold,
+}
+
+impl From<OnRefusal> for FailurePolicy {
+    fn from(choice: OnRefusal) -> Self {
+        match choice {
+            OnRefusal::Abort => Self::Abort,
+            OnRefusal::Skip => Self::Skip,
+            OnRefusal::Hold => Self::Hold,
+        }
+    }
+}
+
+impl HostOptions {
+    /// Starts driver (if it is ours) and session, opens the channels for clients.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] without a driver or with another engine on the arm; the driver that was
+    /// started is ended again.
+    pub(crate) fn start(
+        &self,
+        robot: &Robot,
+        place: &str,
+        default_length: crcl::LengthUnit,
+        on_refusal: FailurePolicy,
+    ) -> Result<Host, Failure> {
+        let arm = self.arm.open()?;
+        // Before the driver: a second engine must not disturb the arm of the first.
+        let channels = ClientChannels::open(&arm)?;
+        let simulation = match self.driver {
+            DriverChoice::Sim => Some(Kind::Servos),
+            DriverChoice::Mujoco => Some(Kind::Mujoco {
+                python: &self.python,
+            }),
+            DriverChoice::External => None,
+        };
+        let simulation = simulation
+            .map(|kind| Simulation::start(kind, place, &arm))
+            .transpose()?;
+        let mut config = SessionConfig::new(arm);
+        config.rate_hz = self.rate;
+        config.clock = if self.lock_step {
+            Clock::LockStep
+        } else {
+            Clock::Wall
+        };
+        config.record = true;
+        config.on_refusal = on_refusal;
+        config.default_length = default_length;
+        let host = Host::start(channels, robot, &config, simulation).map_err(failure)?;
+        if let Some(warning) = &host.session.warning {
+            tracing::warn!("{warning}");
+        }
+        Ok(host)
+    }
+}
+
+/// A fault of the session's start with its exit code.
+fn failure(error: SessionError) -> Failure {
+    let exit = match &error {
+        SessionError::Robot(_) => Exit::Unreadable,
+        SessionError::Executor(ExecutorError::Rate { .. } | ExecutorError::Limit { .. }) => {
+            Exit::Usage
+        }
+        SessionError::Executor(_) => Exit::NoPeer,
+        _ => Exit::Internal,
+    };
+    Failure::new(exit, error)
+}
+
+/// A servo rate in Hz.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (100.0..=4000.0).contains(&value) => Ok(value),
+        _ => Err("expected Hz from 100 to 4000".to_owned()),
+    }
+}

@@ -1,0 +1,268 @@
+//! A session that serves clients: other processes that command, watch or stop the arm.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use crcl::ReadOptions;
+use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
+use planner::robot::Robot;
+use serde_json::{Value, json};
+use servo::Control;
+
+use crate::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
+
+/// How often the report for everybody is written.
+const REPORT: Duration = Duration::from_millis(100);
+
+/// How many notes are kept for clients that ask.
+const KEPT: usize = 512;
+
+/// How long the notes of one answer may be together (bytes).
+const NOTES: usize = ipc::LONGEST_ANSWER * 3 / 4;
+
+/// The channels of an arm's clients: who holds them is the only engine of the arm.
+#[derive(Debug)]
+pub struct ClientChannels {
+    requests: ClientServer,
+    status: StatusWriter,
+}
+
+impl ClientChannels {
+    /// Takes the channels of `arm`. Do so before the driver is disturbed.
+    ///
+    /// # Errors
+    /// [`IpcError::Taken`] when another engine has the arm, and what shared memory refuses.
+    pub fn open(arm: &Arm) -> Result<Self, IpcError> {
+        let (requests, status) = (ClientServer::open(arm)?, StatusWriter::open(arm)?);
+        Ok(Self { requests, status })
+    }
+}
+
+/// A running session with its clients, and what keeps its driver alive: a `D` that ends the driver
+/// when it is dropped.
+///
+/// Fields are dropped in this order: the session stops the arm while the driver still lives.
+#[derive(Debug)]
+pub struct Host<D> {
+    /// The arm.
+    pub arm: Arm,
+    /// The session.
+    pub session: Session,
+    channels: ClientChannels,
+    reported: Option<Instant>,
+    ownership: Ownership,
+    notes: VecDeque<Value>,
+    count: u64,
+    shutdown: bool,
+    _driver: D,
+}
+
+impl<D> Host<D> {
+    /// Starts a session on the arm of the channels.
+    ///
+    /// # Errors
+    /// As [`Session::start`]; the driver is ended again.
+    pub fn start(
+        channels: ClientChannels,
+        robot: &Robot,
+        config: &SessionConfig,
+        driver: D,
+    ) -> Result<Self, SessionError> {
+        Ok(Self {
+            arm: config.arm.clone(),
+            session: Session::start(robot, config)?,
+            channels,
+            reported: None,
+            ownership: Ownership::default(),
+            notes: VecDeque::new(),
+            count: 0,
+            shutdown: false,
+            _driver: driver,
+        })
+    }
+
+    /// Takes the arm for this process: other clients may stop it, not command it.
+    pub fn own(&mut self, name: &str) {
+        let client = Identity {
+            name: name.to_owned(),
+            process: std::process::id(),
+        };
+        self.ownership.give(client);
+    }
+
+    /// Whether a client has asked for the end.
+    pub fn is_shut_down(&self) -> bool {
+        self.shutdown
+    }
+
+    /// Serves clients, reports, and waits a little for the next thing that happens.
+    ///
+    /// # Errors
+    /// [`IpcError`] when shared memory fails.
+    pub fn turn(&mut self) -> Result<Option<Note>, IpcError> {
+        // One batch in a turn: whoever floods us does not keep us from the signals. A client that
+        // cannot be reached, or a report that cannot be sent, is no reason to leave a moving arm.
+        if let Err(error) = self.serve() {
+            tracing::debug!("{error}");
+        }
+        if self.reported.is_none_or(|at| at.elapsed() >= REPORT) {
+            self.reported = Some(Instant::now());
+            if let Err(error) = self.channels.status.write(&self.session.status()) {
+                tracing::debug!("{error}");
+            }
+        }
+        let note = self.session.note(Duration::from_millis(5));
+        if let Some(note) = &note {
+            self.count += 1;
+            self.notes
+                .push_back(json!({"number": self.count, "note": note}));
+            if self.notes.len() > KEPT {
+                self.notes.pop_front();
+            }
+        }
+        Ok(note)
+    }
+
+    fn serve(&mut self) -> Result<usize, IpcError> {
+        let Self {
+            session,
+            channels,
+            ownership,
+            notes,
+            count,
+            shutdown,
+            ..
+        } = self;
+        channels.requests.serve(|request| {
+            let status = session.status();
+            // Whoever may stop a motion may let it go on; what is executed stays the owner's.
+            let free = matches!(request.ask, Verb::Resume | Verb::Override { .. });
+            if !free && let Err(refusal) = ownership.admit(&request, !status.idle) {
+                return refusal;
+            }
+            match request.ask {
+                Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
+                Verb::Notes { since } => later(notes, since),
+                Verb::Shutdown => {
+                    *shutdown = true;
+                    Answer::accept(Value::Null)
+                }
+                Verb::Submit {
+                    format,
+                    name,
+                    program,
+                } => submit(session, &format, &name, &program),
+                Verb::Jog {
+                    space,
+                    speeds,
+                    timeout_ms,
+                } => jog(session, &space, speeds, timeout_ms),
+                ask => control(session, &ask),
+            }
+        })
+    }
+}
+
+/// The notes after number `since`, as many as one answer holds; the client asks again for more.
+fn later(notes: &VecDeque<Value>, since: u64) -> Answer {
+    let mut room = NOTES;
+    let later = notes
+        .iter()
+        .filter(|note| note["number"].as_u64() > Some(since));
+    let page = later.map_while(|note| {
+        let length = note.to_string().len();
+        let first = room == NOTES;
+        let fits = room.checked_sub(length);
+        room = fits.unwrap_or(0);
+        match fits {
+            Some(_) => Some(note.clone()),
+            None if first => Some(cut(note)),
+            None => None,
+        }
+    });
+    Answer::accept(json!({"notes": page.collect::<Vec<_>>()}))
+}
+
+/// A note whose long texts are cut.
+fn cut(note: &Value) -> Value {
+    const LONGEST_TEXT: usize = 500;
+    let mut note = note.clone();
+    for value in note["note"]
+        .as_object_mut()
+        .into_iter()
+        .flat_map(serde_json::Map::values_mut)
+    {
+        if let Some(text) = value.as_str()
+            && text.chars().count() > LONGEST_TEXT
+        {
+            let kept: String = text.chars().take(LONGEST_TEXT).collect();
+            *value = Value::String(format!("{kept} (cut)"));
+        }
+    }
+    note
+}
+
+/// Takes a program of a client: all its commands or none.
+fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    let read = match format {
+        "text" => crcl::text::read,
+        "json" => crcl::json::read,
+        other => return Answer::refuse(format!("a program is text or json, not {other:?}")),
+    };
+    let reading = read(program, &ReadOptions::default());
+    if reading.has_errors() {
+        let source = crcl::Source::new(name, program);
+        let text = crcl::render(
+            &reading.findings,
+            reading.omitted,
+            &source,
+            (crcl::Look::Plain, 100),
+        );
+        return Answer::refuse(text.trim_end());
+    }
+    match session.submit(reading.program.commands) {
+        Ok(ids) => Answer::accept(json!({
+            "first": ids.first(),
+            "last": ids.last(),
+            "commands": ids.len(),
+        })),
+        Err(full) => Answer::refuse(full.to_string()),
+    }
+}
+
+/// Moves by hand for as long as the client goes on asking.
+fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Answer {
+    let space = match space {
+        "joint" => JogSpace::Joint,
+        "tool" => JogSpace::Tool,
+        other => return Answer::refuse(format!("a jog is in joint or tool space, not {other:?}")),
+    };
+    let timeout = Duration::from_millis(timeout_ms);
+    match session.jog(Jog {
+        space,
+        speeds,
+        timeout,
+    }) {
+        Ok(()) => Answer::accept(Value::Null),
+        Err(error) => Answer::refuse(error.to_string()),
+    }
+}
+
+/// Passes on what acts on the motion that is under way.
+fn control(session: &Session, ask: &Verb) -> Answer {
+    match ask {
+        Verb::Pause => session.control(Control::Pause),
+        Verb::Resume => session.control(Control::Resume),
+        Verb::Override { share } if (0.0..=1.0).contains(share) => {
+            session.control(Control::Override(*share));
+        }
+        Verb::Override { share } => {
+            return Answer::refuse(format!("an override is 0 to 1, got {share}"));
+        }
+        Verb::Stop { fast } => session.control(Control::Stop { fast: *fast }),
+        Verb::Abort => session.control(Control::Abort),
+        Verb::Recover => session.recover(),
+        _ => return Answer::refuse("this engine cannot do that"),
+    }
+    Answer::accept(Value::Null)
+}

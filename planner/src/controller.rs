@@ -1,0 +1,179 @@
+//! One arm on its way through a program: modes, planner and the pose reached so far.
+
+use crcl::LengthUnit;
+use kinematics::Chain;
+use nalgebra::{Isometry3, SVector};
+use trajectory::JointLimits;
+
+use crate::command_error::{CommandError, ErrorClass};
+use crate::modal::Modal;
+use crate::motion::{PlannedMove, Planner};
+use crate::robot::{Robot, RobotError, vector};
+use crate::task::Task;
+
+/// A command that has left the queue: what it means and, for a move, the
+/// trajectory that does it.
+#[derive(Clone, Debug)]
+pub struct Step<const N: usize> {
+    /// What the command means.
+    pub task: Task,
+    /// The trajectory, for a move.
+    pub planned: Option<PlannedMove<N>>,
+    /// Nominal length in servo ticks; what a driver answers is waited for besides.
+    pub ticks: u64,
+}
+
+/// Resolves and plans commands one after the other, each from where the one
+/// before it ends. Nothing in here moves an arm.
+#[derive(Clone, Debug)]
+pub struct Controller<const N: usize> {
+    workstation_from_flange: Chain<N>,
+    limits: JointLimits<N>,
+    joint_names: Vec<String>,
+    modal: Modal,
+    planner: Planner<N>,
+    joints: SVector<f64, N>,
+    rate_hz: f64,
+}
+
+impl<const N: usize> Controller<N> {
+    /// A controller for `robot`, unready, at its home position.
+    ///
+    /// # Errors
+    /// [`RobotError`] when the robot has not `N` joints or its description is at fault.
+    pub fn new(robot: &Robot, rate_hz: f64, length: LengthUnit) -> Result<Self, RobotError> {
+        let workstation_from_flange = robot.chain::<N>()?;
+        let limits = robot.joint_limits::<N>();
+        let tooling = robot.tooling();
+        let planner = Planner::new(
+            &workstation_from_flange,
+            tooling.flange_from_tool(),
+            limits,
+            robot.joint_names(),
+        );
+        let modal = Modal::new(
+            robot.motion_limits(),
+            robot.workstation_from_base,
+            tooling,
+            length,
+        );
+        let joints = vector(&robot.home);
+        let joint_names = robot.joint_names();
+        Ok(Self {
+            workstation_from_flange,
+            limits,
+            joint_names,
+            modal,
+            planner,
+            joints,
+            rate_hz,
+        })
+    }
+
+    /// Joints at the end of the last step.
+    #[must_use]
+    pub fn joints(&self) -> &SVector<f64, N> {
+        &self.joints
+    }
+
+    /// Takes over where the arm was found, at rest.
+    pub fn set_joints(&mut self, joints: SVector<f64, N>) {
+        self.joints = joints;
+    }
+
+    /// Modes of the program.
+    #[must_use]
+    pub fn modal(&self) -> &Modal {
+        &self.modal
+    }
+
+    /// Plans moves with the tool in force.
+    #[must_use]
+    pub fn planner(&self) -> &Planner<N> {
+        &self.planner
+    }
+
+    /// Refuses everything but InitCanon from now on.
+    pub fn abort(&mut self) {
+        self.modal.abort();
+    }
+
+    /// Limits of the joints.
+    #[must_use]
+    pub fn limits(&self) -> &JointLimits<N> {
+        &self.limits
+    }
+
+    /// From the workstation to the controlled point.
+    #[must_use]
+    pub fn chain(&self) -> &Chain<N> {
+        self.planner.chain()
+    }
+
+    /// Pose of the controlled point in the workstation, at the end of the last step.
+    #[must_use]
+    pub fn pose(&self) -> Isometry3<f64> {
+        self.chain().forward(&self.joints)
+    }
+
+    /// Resolves a command with the settings in force and plans it whole.
+    ///
+    /// # Errors
+    /// A [`CommandError`]; the controller is then as before.
+    pub fn step(&mut self, command: &crcl::Command) -> Result<Step<N>, CommandError> {
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        let task = self.modal.resolve(command, &flange)?;
+        let step = match task {
+            Task::Move(motion) => {
+                let planned = self.planner.plan(&motion, &self.joints).map_err(|error| {
+                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
+                })?;
+                self.joints = planned.end;
+                let ticks = self.ticks(planned.trajectory.duration());
+                Step {
+                    task: Task::Move(motion),
+                    planned: Some(planned),
+                    ticks,
+                }
+            }
+            Task::Dwell { seconds } => Step {
+                ticks: self.ticks(seconds),
+                planned: None,
+                task,
+            },
+            Task::Tool(action) => {
+                let time = self.modal.tooling().nominal_time(action);
+                self.change_tool();
+                Step {
+                    ticks: self.ticks(time),
+                    planned: None,
+                    task,
+                }
+            }
+            _ => Step {
+                ticks: 0,
+                planned: None,
+                task,
+            },
+        };
+        Ok(step)
+    }
+
+    /// Whole servo periods that hold a time, rounded up.
+    fn ticks(&self, seconds: f64) -> u64 {
+        // A duration that is whole but for rounding is not given another tick.
+        (seconds * self.rate_hz - 1e-6).ceil().max(0.0) as u64
+    }
+
+    fn change_tool(&mut self) {
+        let flange_from_tool = self.modal.tooling().flange_from_tool();
+        if flange_from_tool != *self.planner.flange_from_tool() {
+            self.planner = Planner::new(
+                &self.workstation_from_flange,
+                flange_from_tool,
+                self.limits,
+                self.joint_names.clone(),
+            );
+        }
+    }
+}

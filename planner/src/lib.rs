@@ -1,0 +1,21 @@
+//! From a canonical command to a trajectory that is certified to keep all limits.
+//!
+//! A command loses its modes in [`modal`] and is planned whole in [`motion`]. The [`controller`]
+//! holds both together and knows where the arm is after each command; the [`dry_run`] and a real
+//! run both stand on it. [`recorded`] judges a recorded motion by the program that was to be done.
+//!
+//! This crate is a pure function of robot, program and start: it never starts a thread, reads a
+//! clock, touches shared memory, prints, or reads an environment variable. Only [`robot`] reads
+//! files: the folder of a robot.
+#![forbid(unsafe_code)]
+
+pub mod command_error;
+pub mod controller;
+mod dof;
+pub mod dry_run;
+pub mod modal;
+pub mod motion;
+pub mod recorded;
+pub mod robot;
+pub mod task;
+pub mod tooling;

@@ -1,0 +1,308 @@
+//! The robot: a folder with `robot.urdf` (shape, joint limits) and `robot.toml`
+//! (what a URDF cannot say: acceleration and jerk, tool limits, where it stands,
+//! what it carries, its home position).
+//!
+//! Robots that come with Canter are part of the binary; [`load`] finds them by
+//! name, and any other by its folder.
+
+mod error;
+mod file;
+mod import;
+mod shipped;
+
+pub use error::RobotError;
+pub use import::import;
+pub use shipped::list;
+
+use kinematics::{Chain, Model, UrdfError};
+use nalgebra::{Isometry3, SVector};
+use std::path::Path;
+
+use crate::tooling::{Holder, Tooling};
+
+/// Limits of the joints, root first: rad for turning joints, m for sliding ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointLimits {
+    /// Lower position limit; minus infinity for continuous joints.
+    pub lower: Vec<f64>,
+    /// Upper position limit; infinity for continuous joints.
+    pub upper: Vec<f64>,
+    /// Largest speed, per s.
+    pub velocity: Vec<f64>,
+    /// Largest acceleration, per s2.
+    pub acceleration: Vec<f64>,
+    /// Largest jerk, per s3.
+    pub jerk: Vec<f64>,
+    /// Where the acceleration and jerk limits come from.
+    pub source: String,
+}
+
+/// Limits of the controlled point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolLimits {
+    /// Largest speed, m/s.
+    pub speed: f64,
+    /// Largest acceleration, m/s2.
+    pub acceleration: f64,
+    /// Largest jerk, m/s3.
+    pub jerk: f64,
+    /// Largest angular speed, rad/s.
+    pub angular_speed: f64,
+    /// Largest angular acceleration, rad/s2.
+    pub angular_acceleration: f64,
+    /// Largest angular jerk, rad/s3.
+    pub angular_jerk: f64,
+    /// Where these come from.
+    pub source: String,
+}
+
+/// How long a gripper takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gripper {
+    /// Time to open, s.
+    pub opening: f64,
+    /// Time to close, s.
+    pub closing: f64,
+}
+
+/// Something that the flange can carry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EndEffector {
+    /// Name.
+    pub name: String,
+    /// Pose of the tool centre point in the flange.
+    pub flange_from_tcp: Isometry3<f64>,
+    /// Present when it opens and closes.
+    pub gripper: Option<Gripper>,
+    /// Where it is kept in the changing station, in the workstation.
+    pub workstation_from_holder: Option<Isometry3<f64>>,
+}
+
+/// The part of the flange that takes end effectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolChanger {
+    /// Time to let go, s.
+    pub opening: f64,
+    /// Time to take hold, s.
+    pub closing: f64,
+}
+
+/// A robot as the planner needs it. All vectors have one entry a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// Short name: the shipped name, or that of the folder.
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// Text of the URDF, for viewers and drivers.
+    pub urdf: String,
+    /// Chain of joints as read from the URDF.
+    pub model: Model,
+    /// Limits of the joints.
+    pub joints: JointLimits,
+    /// Limits of the controlled point.
+    pub tool: ToolLimits,
+    /// Where the robot's base stands in the workstation.
+    pub workstation_from_base: Isometry3<f64>,
+    /// A ready position: well inside the limits and away from singular poses.
+    pub home: Vec<f64>,
+    /// What the flange can carry.
+    pub end_effectors: Vec<EndEffector>,
+    /// Index of the end effector carried at the start.
+    pub mounted: Option<usize>,
+    /// Present when the flange can change its end effector.
+    pub tool_changer: Option<ToolChanger>,
+}
+
+/// Loads a robot: a shipped name such as `ur5e`, or a folder with `robot.urdf` and
+/// `robot.toml`.
+///
+/// Text with a path separator, or the name of a folder that has a `robot.toml`, is
+/// taken for a folder; all else is a shipped name.
+///
+/// # Errors
+/// [`RobotError`]; faults of files name file, line and column.
+///
+/// ```
+/// let robot = planner::robot::load("ur5e")?;
+/// assert_eq!(robot.dof(), 6);
+/// let arm: kinematics::Chain<6> = robot.chain()?;
+/// # Ok::<(), planner::robot::RobotError>(())
+/// ```
+pub fn load(name_or_folder: &str) -> Result<Robot, RobotError> {
+    let folder = Path::new(name_or_folder);
+    let shipped = shipped::texts(name_or_folder);
+    let is_path = name_or_folder.contains(['/', '\\']) || name_or_folder == ".";
+    match shipped {
+        Some((urdf, toml)) if !is_path => {
+            let place = format!("robots/{name_or_folder}");
+            file::Files {
+                name: name_or_folder,
+                place: Path::new(&place),
+                urdf,
+                toml,
+            }
+            .read()
+        }
+        _ if is_path || folder.join("robot.toml").is_file() => load_folder(folder),
+        _ => Err(RobotError::Unknown {
+            name: name_or_folder.to_owned(),
+            known: list().join(", "),
+        }),
+    }
+}
+
+/// Reads a robot from the texts of its two files, without touching the disk.
+///
+/// # Errors
+/// [`RobotError`]; faults name file, line and column.
+pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
+    file::Files {
+        name,
+        place: Path::new(name),
+        urdf,
+        toml,
+    }
+    .read()
+}
+
+fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
+    let read = |file: &str| {
+        let path = folder.join(file);
+        std::fs::read_to_string(&path).map_err(|error| RobotError::Read {
+            file: path.display().to_string(),
+            message: error.to_string(),
+        })
+    };
+    let (toml, urdf) = (read("robot.toml")?, read("robot.urdf")?);
+    let name = folder.canonicalize().ok();
+    let name = name
+        .as_deref()
+        .unwrap_or(folder)
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
+    file::Files {
+        name: &name,
+        place: folder,
+        urdf: &urdf,
+        toml: &toml,
+    }
+    .read()
+}
+
+impl Robot {
+    /// Number of joints.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.model.dof()
+    }
+
+    /// The arm with its base placed in the workstation; poses are those of the flange.
+    ///
+    /// # Errors
+    /// [`RobotError::Urdf`] when the robot does not have `N` joints.
+    pub fn chain<const N: usize>(&self) -> Result<Chain<N>, RobotError> {
+        let chain = self
+            .model
+            .chain::<N>()
+            .map_err(|source| self.urdf_error(source))?;
+        Ok(chain.with_base(&self.workstation_from_base))
+    }
+
+    /// The arm as [`Robot::chain`], ending in the controlled point: the tool centre
+    /// point of the end effector with that index, or the flange.
+    ///
+    /// # Errors
+    /// [`RobotError::Urdf`] when the robot does not have `N` joints.
+    pub fn chain_with<const N: usize>(
+        &self,
+        end_effector: Option<usize>,
+    ) -> Result<Chain<N>, RobotError> {
+        let tool = end_effector.and_then(|index| self.end_effectors.get(index));
+        let chain = self.chain()?;
+        Ok(tool.map_or(chain, |tool| chain.with_tool(&tool.flange_from_tcp)))
+    }
+
+    fn urdf_error(&self, source: UrdfError) -> RobotError {
+        RobotError::Urdf {
+            file: format!("{}/robot.urdf", self.name),
+            source,
+        }
+    }
+}
+
+/// One value a joint as a vector; joints that are missing get zero.
+#[must_use]
+pub fn vector<const N: usize>(values: &[f64]) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| values.get(i).copied().unwrap_or(0.0))
+}
+
+/// What the planner takes from a robot.
+impl Robot {
+    /// Limits of the joints; their count must be `N`, which [`Robot::chain`] checks.
+    #[must_use]
+    pub fn joint_limits<const N: usize>(&self) -> trajectory::JointLimits<N> {
+        let joints = &self.joints;
+        trajectory::JointLimits {
+            lower: vector(&joints.lower),
+            upper: vector(&joints.upper),
+            velocity: vector(&joints.velocity),
+            acceleration: vector(&joints.acceleration),
+            jerk: vector(&joints.jerk),
+        }
+    }
+
+    /// The largest speeds, accelerations and jerks of the controlled point.
+    #[must_use]
+    pub fn motion_limits(&self) -> trajectory::ToolLimits {
+        let tool = &self.tool;
+        trajectory::ToolLimits {
+            speed: tool.speed,
+            acceleration: tool.acceleration,
+            jerk: tool.jerk,
+            angular_speed: tool.angular_speed,
+            angular_acceleration: tool.angular_acceleration,
+            angular_jerk: tool.angular_jerk,
+        }
+    }
+
+    /// Names of the joints, root first.
+    #[must_use]
+    pub fn joint_names(&self) -> Vec<String> {
+        self.model
+            .joints
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect()
+    }
+
+    /// End effectors and holders as they are at the start: the gripper of
+    /// the mounted end effector is open, all others are in their holders.
+    #[must_use]
+    pub fn tooling(&self) -> Tooling {
+        let holders = self
+            .end_effectors
+            .iter()
+            .enumerate()
+            .filter_map(|(index, tool)| {
+                Some(Holder {
+                    name: tool.name.clone(),
+                    workstation_from_flange: tool.workstation_from_holder?,
+                    holds: (self.mounted != Some(index)).then_some(index),
+                })
+            });
+        Tooling {
+            holders: if self.tool_changer.is_some() {
+                holders.collect()
+            } else {
+                Vec::new()
+            },
+            end_effectors: self.end_effectors.clone(),
+            mounted: self.mounted,
+            gripper_open: self.mounted.map(|_| true),
+            changer_open: false,
+            changer: self.tool_changer,
+        }
+    }
+}

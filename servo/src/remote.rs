@@ -1,0 +1,300 @@
+//! Everybody's grip on the real-time thread: atomics that it reads and writes each period.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::Arc;
+
+use nalgebra::SVector;
+
+use super::histogram::Histogram;
+
+/// What an operator may ask while the arm moves. It acts in the next period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// Stop on the path and wait for [`Control::Resume`].
+    Pause,
+    /// Go on along the path.
+    Resume,
+    /// Share of the planned speed, 0..=1; what is outside is brought inside, what is not a number
+    /// is ignored.
+    Override(f64),
+    /// Stop on the path and wait for [`Control::Resume`].
+    Stop {
+        /// As fast as the joints can.
+        fast: bool,
+    },
+    /// Stop on the path, then forget all that was pushed.
+    Abort,
+}
+
+/// Where the arm is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured<const N: usize> {
+    /// Measured positions (rad).
+    pub position: SVector<f64, N>,
+    /// Measured velocities (rad/s).
+    pub velocity: SVector<f64, N>,
+    /// Positions of the last setpoint (rad).
+    pub setpoint: SVector<f64, N>,
+    /// Share of the planned speed.
+    pub path_rate: f64,
+    /// Whether the last setpoint rests.
+    pub resting: bool,
+    /// Whether nothing is left to execute.
+    pub idle: bool,
+    /// Whether a fault is latched.
+    pub faulted: bool,
+    /// Whether a pause or stop holds the arm.
+    pub held: bool,
+    /// Statuses of gripper and tool changer, as [`ipc::ToolStatus`] numbers.
+    pub tools: [u32; 2],
+}
+
+/// How many periods there were.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Setpoints published.
+    pub published: u64,
+    /// Periods that came too late and were left out.
+    pub skipped: u64,
+    /// Periods in all: published and skipped.
+    pub ticks: u64,
+    /// Setpoints that iceoryx2 did not take.
+    pub unsent: u64,
+    /// Events and samples that nobody fetched in time.
+    pub lost_reports: u64,
+    /// Setpoints that the driver missed, by its own count.
+    pub driver_missed: u64,
+}
+
+/// How the thread shall behave, as a number in an atomic.
+const RUN: u32 = 0;
+const GENTLE: u32 = 1;
+const FAST: u32 = 2;
+
+/// The numbers that both sides see.
+#[derive(Debug)]
+pub(super) struct Shared<const N: usize> {
+    demand: AtomicU32,
+    share: AtomicU64,
+    pub(super) abort: AtomicBool,
+    pub(super) recover: AtomicBool,
+    pub(super) shutdown: AtomicBool,
+    age: AtomicU32,
+    /// Events reported, and how many of them the planner had seen when it had no more to do.
+    reported: AtomicU64,
+    answered: AtomicU64,
+    version: AtomicU32,
+    position: [AtomicU64; N],
+    velocity: [AtomicU64; N],
+    setpoint: [AtomicU64; N],
+    path_rate: AtomicU64,
+    flags: AtomicU32,
+    tools: [AtomicU32; 2],
+    pub(super) published: AtomicU64,
+    pub(super) skipped: AtomicU64,
+    pub(super) unsent: AtomicU64,
+    pub(super) lost_reports: AtomicU64,
+    pub(super) driver_missed: AtomicU64,
+    pub(super) latency: Histogram,
+    pub(super) work: Histogram,
+    pub(super) state_age: Histogram,
+}
+
+impl<const N: usize> Shared<N> {
+    pub(super) fn new() -> Self {
+        let zeros = || core::array::from_fn(|_| AtomicU64::new(0));
+        Self {
+            demand: AtomicU32::new(RUN),
+            share: AtomicU64::new(1.0_f64.to_bits()),
+            abort: AtomicBool::new(false),
+            recover: AtomicBool::new(false),
+            shutdown: AtomicBool::new(false),
+            age: AtomicU32::new(0),
+            reported: AtomicU64::new(0),
+            answered: AtomicU64::new(0),
+            version: AtomicU32::new(0),
+            position: zeros(),
+            velocity: zeros(),
+            setpoint: zeros(),
+            path_rate: AtomicU64::new(0),
+            flags: AtomicU32::new(0),
+            tools: [AtomicU32::new(0), AtomicU32::new(0)],
+            published: AtomicU64::new(0),
+            skipped: AtomicU64::new(0),
+            unsent: AtomicU64::new(0),
+            lost_reports: AtomicU64::new(0),
+            driver_missed: AtomicU64::new(0),
+            latency: Histogram::new(),
+            work: Histogram::new(),
+            state_age: Histogram::new(),
+        }
+    }
+
+    pub(super) fn age(&self) -> u32 {
+        self.age.load(Ordering::Acquire)
+    }
+
+    /// Begins a new age: what belongs to the old one is dropped.
+    pub(super) fn new_age(&self) -> u32 {
+        self.age.fetch_add(1, Ordering::AcqRel).wrapping_add(1)
+    }
+
+    /// Counts an event that the planner shall see.
+    pub(super) fn count_report(&self) {
+        self.reported.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// The planner has nothing more to do, having seen `events`; `None` when it has.
+    pub(super) fn answer(&self, events: Option<u64>) {
+        self.answered
+            .store(events.unwrap_or(u64::MAX), Ordering::Release);
+    }
+
+    /// Whether the planner has seen all events and has nothing more to do.
+    pub(super) fn is_settled(&self) -> bool {
+        self.answered.load(Ordering::Acquire) == self.reported.load(Ordering::Acquire)
+    }
+
+    /// What the operator wants now.
+    pub(super) fn demand(&self) -> realtime::Demand {
+        match self.demand.load(Ordering::Acquire) {
+            RUN => realtime::Demand::Run(f64::from_bits(self.share.load(Ordering::Acquire))),
+            GENTLE => realtime::Demand::Stop(realtime::Manner::Gentle),
+            _ => realtime::Demand::Stop(realtime::Manner::Fast),
+        }
+    }
+
+    pub(super) fn control(&self, control: Control) {
+        let set = |demand| self.demand.store(demand, Ordering::Release);
+        match control {
+            Control::Pause | Control::Stop { fast: false } => set(GENTLE),
+            Control::Stop { fast: true } => set(FAST),
+            Control::Resume => set(RUN),
+            Control::Override(share) if share.is_finite() => {
+                self.share
+                    .store(share.clamp(0.0, 1.0).to_bits(), Ordering::Release);
+            }
+            Control::Override(_) => {}
+            Control::Abort => self.abort.store(true, Ordering::Release),
+        }
+    }
+
+    /// Writes where the arm is; only the real-time thread does.
+    pub(super) fn write(&self, now: &Measured<N>) {
+        let version = self.version.load(Ordering::Relaxed);
+        self.version
+            .store(version.wrapping_add(1), Ordering::Relaxed);
+        core::sync::atomic::fence(Ordering::Release);
+        let store = |to: &[AtomicU64; N], from: &SVector<f64, N>| {
+            for (to, from) in to.iter().zip(from.iter()) {
+                to.store(from.to_bits(), Ordering::Relaxed);
+            }
+        };
+        store(&self.position, &now.position);
+        store(&self.velocity, &now.velocity);
+        store(&self.setpoint, &now.setpoint);
+        self.path_rate
+            .store(now.path_rate.to_bits(), Ordering::Relaxed);
+        let flags = [now.resting, now.idle, now.faulted];
+        let bits = flags
+            .iter()
+            .enumerate()
+            .fold(0, |bits, (at, flag)| bits | u32::from(*flag) << at);
+        self.flags.store(bits, Ordering::Relaxed);
+        for (to, from) in self.tools.iter().zip(now.tools) {
+            to.store(from, Ordering::Relaxed);
+        }
+        self.version
+            .store(version.wrapping_add(2), Ordering::Release);
+    }
+
+    /// Reads where the arm is; a reader that collides with the writer tries again.
+    pub(super) fn read(&self) -> Measured<N> {
+        let load = |from: &[AtomicU64; N]| {
+            SVector::from_fn(|joint, _| {
+                let bits = from
+                    .get(joint)
+                    .map_or(0, |from| from.load(Ordering::Relaxed));
+                f64::from_bits(bits)
+            })
+        };
+        loop {
+            let before = self.version.load(Ordering::Acquire);
+            let flags = self.flags.load(Ordering::Relaxed);
+            let now = Measured {
+                position: load(&self.position),
+                velocity: load(&self.velocity),
+                setpoint: load(&self.setpoint),
+                path_rate: f64::from_bits(self.path_rate.load(Ordering::Relaxed)),
+                resting: flags & 1 != 0,
+                idle: flags & 2 != 0,
+                faulted: flags & 4 != 0,
+                held: self.demand.load(Ordering::Relaxed) != RUN,
+                tools: self
+                    .tools
+                    .each_ref()
+                    .map(|tool| tool.load(Ordering::Relaxed)),
+            };
+            core::sync::atomic::fence(Ordering::Acquire);
+            if before.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == before {
+                return now;
+            }
+            std::thread::yield_now();
+        }
+    }
+}
+
+/// Everybody's end: control, and where the arm is. Cheap to clone, usable from any thread.
+#[derive(Clone, Debug)]
+pub struct Remote<const N: usize> {
+    pub(super) shared: Arc<Shared<N>>,
+}
+
+impl<const N: usize> Remote<N> {
+    /// Asks for something; it acts in the next period.
+    pub fn control(&self, control: Control) {
+        self.shared.control(control);
+    }
+
+    /// Asks for a new session with the driver, which clears a latched fault and forgets all that
+    /// was pushed. The answer is an event: [`super::Event::Recovered`], or
+    /// [`super::Event::Faulted`] again.
+    pub fn recover(&self) {
+        self.shared.recover.store(true, Ordering::Release);
+    }
+
+    /// Where the arm is.
+    pub fn measured(&self) -> Measured<N> {
+        self.shared.read()
+    }
+
+    /// How many periods there were.
+    pub fn counters(&self) -> Counters {
+        let load = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let shared = &self.shared;
+        let (published, skipped) = (load(&shared.published), load(&shared.skipped));
+        Counters {
+            published,
+            skipped,
+            ticks: published + skipped,
+            unsent: load(&shared.unsent),
+            lost_reports: load(&shared.lost_reports),
+            driver_missed: load(&shared.driver_missed),
+        }
+    }
+
+    /// How late the thread woke up (ns).
+    pub fn latency(&self) -> &Histogram {
+        &self.shared.latency
+    }
+
+    /// How long the work of a period took (ns).
+    pub fn work(&self) -> &Histogram {
+        &self.shared.work
+    }
+
+    /// How old the newest state was when a setpoint was made (ns).
+    pub fn state_age(&self) -> &Histogram {
+        &self.shared.state_age
+    }
+}

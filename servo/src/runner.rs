@@ -1,0 +1,564 @@
+//! One period of the real-time thread, without a clock and without a channel.
+
+use core::sync::atomic::Ordering;
+use std::sync::Arc;
+
+use ipc::{
+    DriverState, HelloAck, MAX_JOINTS, MAX_TOOLS, Setpoint, SetpointFlags, State, ToolCommand,
+    ToolStatus,
+};
+use nalgebra::SVector;
+use realtime::{Cycle, Demand, Manner, Pushed, Sample, Step, check_following};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::config::ExecutorConfig;
+use super::event::{Event, Fault, Recorded};
+use super::feed::{Feeder, Item, ToolOrder, Work};
+use super::handle::Monitor;
+use super::remote::{Measured, Remote, Shared};
+
+/// Planned segments that the cycle has at hand.
+const AT_HAND: usize = 512;
+
+/// Items on their way from the planner.
+const RING: usize = 4096;
+
+/// Events and samples that wait for their reader.
+const REPORTS: usize = 1 << 14;
+
+/// Items taken from the ring in a period at most.
+const A_PERIOD: usize = 64;
+
+/// When a period runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tick {
+    /// Its number since the start.
+    pub number: u64,
+    /// When it should have begun (ns).
+    pub begin_ns: u64,
+    /// When it began (ns).
+    pub now_ns: u64,
+    /// Periods before it that were left out.
+    pub skipped: u64,
+}
+
+/// A tool order under way.
+#[derive(Clone, Copy, Debug)]
+struct Working {
+    order: ToolOrder,
+    number: u32,
+    left: u64,
+}
+
+/// What the real-time thread does in a period: states and planned work go in, setpoints and
+/// events come out. After [`Runner::open`] nothing allocates or waits.
+#[derive(Debug)]
+pub struct Runner<const N: usize> {
+    config: ExecutorConfig<N>,
+    period: f64,
+    cycle: Box<Cycle<N, AT_HAND>>,
+    items: Consumer<Item<N>>,
+    events: Producer<Event>,
+    samples: Option<Producer<Recorded<N>>>,
+    shared: Arc<Shared<N>>,
+    age: u32,
+    session: u64,
+    sequence: u64,
+    state: State,
+    quiet: u64,
+    ready: bool,
+    aborting: bool,
+    stopped: bool,
+    fault: Option<Fault>,
+    tool: Option<Working>,
+    orders: u32,
+    tools: [ToolCommand; MAX_TOOLS],
+    published: Sample<N>,
+    pending: Option<Recorded<N>>,
+    tick: u64,
+}
+
+impl<const N: usize> Runner<N> {
+    /// A runner with its three ends. It needs a session before it moves: [`Runner::open`].
+    pub fn new(config: ExecutorConfig<N>) -> (Self, Feeder<N>, Remote<N>, Monitor<N>) {
+        let shared = Arc::new(Shared::new());
+        let (ring, items) = RingBuffer::new(RING);
+        let (events, event_reader) = RingBuffer::new(REPORTS);
+        let (samples, sample_reader) = RingBuffer::new(if config.record { REPORTS } else { 1 });
+        let rest = SVector::zeros();
+        let runner = Self {
+            period: config.period(),
+            cycle: Box::new(Cycle::new(rest, config.limits, config.period())),
+            items,
+            events,
+            samples: config.record.then_some(samples),
+            shared: Arc::clone(&shared),
+            age: 0,
+            session: 0,
+            sequence: 0,
+            state: State::default(),
+            quiet: 0,
+            ready: false,
+            aborting: false,
+            stopped: false,
+            fault: None,
+            tool: None,
+            orders: 0,
+            tools: [ToolCommand::default(); MAX_TOOLS],
+            published: Sample::rest(rest),
+            pending: None,
+            tick: 0,
+            config,
+        };
+        let feeder = Feeder {
+            ring,
+            shared: Arc::clone(&shared),
+            age: 0,
+        };
+        let monitor = Monitor {
+            events: event_reader,
+            samples: sample_reader,
+            seen: 0,
+        };
+        (runner, feeder, Remote { shared }, monitor)
+    }
+
+    /// Begins a session at the position that the driver measured; what was planned is forgotten
+    /// and a fault is cleared.
+    pub fn open(&mut self, ack: &HelloAck) {
+        let position = first(&ack.position);
+        self.cycle.reset(position);
+        self.published = Sample::rest(position);
+        self.session = ack.session;
+        self.sequence = 0;
+        self.state = State {
+            position: ack.position,
+            ..State::default()
+        };
+        self.quiet = 0;
+        self.ready = false;
+        self.fault = None;
+        self.tool = None;
+        self.orders = 0;
+        self.tools = [ToolCommand::default(); MAX_TOOLS];
+        self.pending = None;
+        self.share_position();
+    }
+
+    /// Drops the age, tells that the session is new.
+    pub(super) fn recovered(&mut self) {
+        self.age = self.shared.new_age();
+        self.report(Event::Recovered { tick: self.tick });
+    }
+
+    /// The numbers that both sides see.
+    pub(super) fn shared(&self) -> Arc<Shared<N>> {
+        Arc::clone(&self.shared)
+    }
+
+    /// Latches a fault, also where another is latched already.
+    pub(super) fn fail(&mut self, fault: Fault) {
+        self.fault = None;
+        self.latch(fault);
+    }
+
+    /// The session under way.
+    pub(super) fn session(&self) -> u64 {
+        self.session
+    }
+
+    /// Whether the operator asked for a new session, and the arm rests so that there may be one.
+    pub(super) fn wants_session(&self) -> bool {
+        self.shared.recover.load(Ordering::Acquire) && self.cycle.is_resting()
+    }
+
+    /// Whether the driver follows and the arm rests: the time to leave.
+    pub(super) fn may_leave(&self) -> bool {
+        self.cycle.is_resting()
+    }
+
+    /// Whether the reader of samples must catch up before the next period; only lock-step waits.
+    pub(super) fn samples_wait(&self) -> bool {
+        self.samples
+            .as_ref()
+            .is_some_and(|samples| samples.slots() == 0 && !samples.is_abandoned())
+    }
+
+    /// Whether virtual time may stand: the planner thinks, or there is nothing to do.
+    pub(super) fn may_stand(&self) -> bool {
+        if self.aborting || self.shared.abort.load(Ordering::Acquire) {
+            return false;
+        }
+        let held = matches!(self.shared.demand(), Demand::Stop(_));
+        let begun = self.ready || self.fault.is_some();
+        let at_rest = self.cycle.is_resting() && self.tool.is_none();
+        let nothing_to_do = if held {
+            self.stopped
+        } else {
+            self.cycle.is_idle() && self.items.is_empty()
+        };
+        (begun && at_rest && nothing_to_do) || !self.shared.is_settled()
+    }
+
+    /// The last setpoint once more, as a sign of life.
+    pub(super) fn again(&mut self, last: Setpoint) -> Setpoint {
+        self.sequence += 1;
+        Setpoint {
+            sequence: self.sequence,
+            ..last
+        }
+    }
+
+    /// Latches a fault, unless one is latched already.
+    pub(super) fn latch(&mut self, fault: Fault) {
+        if self.fault.is_none() {
+            self.fault = Some(fault);
+            self.age = self.shared.new_age();
+            self.report(Event::Faulted {
+                fault,
+                tick: self.tick,
+            });
+        }
+    }
+
+    /// One period: `state` is the newest state that came since the last one, unchecked.
+    pub fn tick(&mut self, state: Option<State>, tick: Tick) -> Setpoint {
+        self.tick = tick.number;
+        self.take_state(state, tick);
+        self.record();
+        self.obey();
+        self.feed();
+        self.move_on(tick.skipped);
+        self.watch_tool();
+        self.tell_stopped();
+        self.shared.published.fetch_add(1, Ordering::Relaxed);
+        self.shared
+            .skipped
+            .fetch_add(tick.skipped, Ordering::Relaxed);
+        self.share_position();
+        self.setpoint(tick)
+    }
+
+    /// Looks at what the driver says.
+    fn take_state(&mut self, state: Option<State>, tick: Tick) {
+        let fresh = state
+            .filter(|state| state.session == self.session && state.sequence > self.state.sequence);
+        let Some(state) = fresh else {
+            self.quiet += 1;
+            let silent = self.quiet as f64 * self.period;
+            if silent > self.config.patience.as_secs_f64() {
+                self.latch(Fault::DriverLost {
+                    silent_ms: (silent * 1e3) as u64,
+                });
+            }
+            return;
+        };
+        if let Err(cause) = state.check(N) {
+            self.latch(Fault::BadState(cause));
+            return;
+        }
+        self.quiet = 0;
+        self.state = state;
+        self.shared
+            .driver_missed
+            .store(state.missed, Ordering::Relaxed);
+        if tick.now_ns >= state.published_ns {
+            self.shared
+                .state_age
+                .count(tick.now_ns - state.published_ns);
+        }
+        match state.driver() {
+            DriverState::Stopping | DriverState::Fault => {
+                let joint = (state.fault_joint < N as u32).then_some(state.fault_joint);
+                self.latch(Fault::DriverFault {
+                    code: state.fault_code(),
+                    joint,
+                });
+            }
+            DriverState::Active => self.ready = true,
+            _ => {}
+        }
+        let measured = self.measured();
+        if self.ready
+            && self.fault.is_none()
+            && let Some(trip) = check_following(&self.published, &measured, self.config.following)
+        {
+            self.latch(Fault::Limit(trip));
+        }
+    }
+
+    /// Takes what the operator asked for.
+    fn obey(&mut self) {
+        if self.shared.abort.swap(false, Ordering::AcqRel) {
+            self.aborting = true;
+            self.shared.control(super::Control::Resume);
+        }
+        if !self.cycle.is_resting() {
+            return;
+        }
+        if self.fault.is_some() {
+            self.cycle.flush();
+            self.tool = None;
+        }
+        if self.aborting {
+            self.cycle.flush();
+            self.tool = None;
+            self.aborting = false;
+            self.age = self.shared.new_age();
+            self.report(Event::Aborted { tick: self.tick });
+        }
+    }
+
+    /// Takes planned work from the ring.
+    fn feed(&mut self) {
+        for _ in 0..A_PERIOD {
+            let Ok(item) = self.items.peek() else { return };
+            let item = *item;
+            let done = if item.age != self.age || self.fault.is_some() {
+                true
+            } else {
+                match item.work {
+                    Work::Motion(segment) if self.tool.is_none() => {
+                        match self.cycle.push(&segment) {
+                            Pushed::Taken => true,
+                            Pushed::Full => false,
+                            Pushed::Broken => {
+                                self.latch(Fault::BrokenSegment);
+                                true
+                            }
+                        }
+                    }
+                    Work::Tool(order) if self.tool.is_none() && self.cycle.is_idle() => {
+                        self.start_tool(order)
+                    }
+                    _ => false,
+                }
+            };
+            if !done || self.items.pop().is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Sends a tool order; says whether it may begin now.
+    fn start_tool(&mut self, order: ToolOrder) -> bool {
+        let Some(command) = self.tools.get_mut(order.tool) else {
+            self.latch(Fault::Tool {
+                tool: order.tool,
+                timeout: false,
+            });
+            return true;
+        };
+        let moving = matches!(self.shared.demand(), Demand::Run(share) if share > 0.0);
+        if !self.ready || !moving || self.aborting {
+            return false;
+        }
+        self.orders += 1;
+        command.order = self.orders;
+        command.action = order.action as u32;
+        let left = (order.timeout.max(0.0) / self.period) as u64;
+        self.tool = Some(Working {
+            order,
+            number: self.orders,
+            left,
+        });
+        self.report(Event::Started {
+            command: order.command,
+            tick: self.tick,
+        });
+        true
+    }
+
+    /// Whether the tool has done what it should.
+    fn watch_tool(&mut self) {
+        let Some(mut working) = self.tool else { return };
+        let tool = working.order.tool;
+        let Some(feedback) = self.state.tools.get(tool) else {
+            return;
+        };
+        let status = ToolStatus::from_number(feedback.status).unwrap_or(ToolStatus::Failed);
+        let answered = feedback.order == working.number;
+        match status {
+            ToolStatus::Open | ToolStatus::Closed if answered => {
+                self.tool = None;
+                let command = working.order.command;
+                self.report(Event::Finished {
+                    command,
+                    tick: self.tick,
+                });
+            }
+            ToolStatus::Failed | ToolStatus::Unknown if answered => {
+                self.latch(Fault::Tool {
+                    tool,
+                    timeout: false,
+                });
+            }
+            _ if working.left == 0 => self.latch(Fault::Tool {
+                tool,
+                timeout: true,
+            }),
+            _ => {
+                working.left -= 1;
+                self.tool = Some(working);
+            }
+        }
+    }
+
+    /// What the cycle shall do now.
+    fn demand(&self) -> Demand {
+        if self.fault.is_some() {
+            return Demand::Stop(Manner::Fast);
+        }
+        match self.shared.demand() {
+            Demand::Run(_) if self.aborting || !self.ready => Demand::Stop(Manner::Gentle),
+            demand => demand,
+        }
+    }
+
+    /// Moves along the path: one step, and one more for each period that was left out.
+    fn move_on(&mut self, skipped: u64) {
+        let late = skipped as f64 * self.period;
+        let mut steps = skipped + 1;
+        if late > self.config.watchdog.as_secs_f64() {
+            self.latch(Fault::Stalled {
+                late_ms: (late * 1e3) as u64,
+            });
+            steps = 1;
+        }
+        let demand = self.demand();
+        for step in 0..steps {
+            let made = self.cycle.step(demand);
+            let tick = self.tick + step + 1 - steps;
+            self.tell(&made, tick);
+            self.published = made.setpoint;
+            self.pending = self.samples.is_some().then_some(Recorded {
+                tick: self.tick,
+                command: made.command,
+                path_time: made.path_time,
+                path_rate: made.path_rate,
+                setpoint: made.setpoint,
+                measured: [0.0; N],
+            });
+        }
+    }
+
+    /// Reports what a step brought.
+    fn tell(&mut self, made: &Step<N>, tick: u64) {
+        if let Some(command) = made.finished {
+            self.report(Event::Finished { command, tick });
+        }
+        if let Some(command) = made.started {
+            self.report(Event::Started { command, tick });
+        }
+        if let Some(trip) = made.trip {
+            self.latch(Fault::Limit(trip));
+        }
+    }
+
+    /// Reports once that a pause or stop has brought the arm to rest.
+    fn tell_stopped(&mut self) {
+        let held = matches!(self.shared.demand(), Demand::Stop(_));
+        let resting = self.cycle.is_resting();
+        if held && resting && !self.stopped {
+            self.report(Event::Stopped { tick: self.tick });
+        }
+        self.stopped = held && resting;
+    }
+
+    /// Hands the last period's sample to its reader.
+    fn record(&mut self) {
+        let (Some(samples), Some(mut pending)) = (&mut self.samples, self.pending.take()) else {
+            return;
+        };
+        for (to, from) in pending.measured.iter_mut().zip(self.state.position) {
+            *to = from;
+        }
+        if samples.push(pending).is_err() {
+            self.shared.lost_reports.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn report(&mut self, event: Event) {
+        if self.events.push(event).is_ok() {
+            self.shared.count_report();
+        } else {
+            self.shared.lost_reports.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Hands over the last sample and says goodbye.
+    pub(super) fn end(&mut self) {
+        self.record();
+        self.report(Event::Ended { tick: self.tick });
+    }
+
+    fn measured(&self) -> SVector<f64, N> {
+        first(&self.state.position)
+    }
+
+    fn share_position(&self) {
+        self.shared.write(&Measured {
+            position: self.measured(),
+            velocity: first(&self.state.velocity),
+            setpoint: self.published.position,
+            path_rate: if self.cycle.is_resting() {
+                0.0
+            } else {
+                self.cycle.path_rate()
+            },
+            resting: self.cycle.is_resting(),
+            idle: self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none(),
+            faulted: self.fault.is_some(),
+            held: false,
+            tools: self.state.tools.map(|tool| tool.status),
+        });
+    }
+
+    /// The message of the period.
+    fn setpoint(&mut self, tick: Tick) -> Setpoint {
+        self.sequence += 1;
+        let resting = self.cycle.is_resting();
+        let stopping = !resting && matches!(self.demand(), Demand::Stop(_));
+        let mut setpoint = Setpoint {
+            joints: N as u32,
+            session: self.session,
+            sequence: self.sequence,
+            tick: tick.number,
+            published_ns: tick.now_ns,
+            tick_ns: tick.begin_ns,
+            period_ns: self.config.period_ns(),
+            watchdog_ns: self.config.watchdog.as_nanos() as u64,
+            state_sequence: self.state.sequence,
+            command: self.cycle.command(),
+            flags: if resting {
+                SetpointFlags::HOLD
+            } else if stopping {
+                SetpointFlags::STOPPING
+            } else {
+                0
+            },
+            valid: (1_u32 << N) - 1,
+            path_time: self.cycle.path_time(),
+            path_rate: self.cycle.path_rate(),
+            tools: self.tools,
+            ..Setpoint::default()
+        };
+        let published = &self.published;
+        put(&mut setpoint.position, &published.position);
+        put(&mut setpoint.velocity, &published.velocity);
+        put(&mut setpoint.acceleration, &published.acceleration);
+        setpoint
+    }
+}
+
+/// The numbers of the arm's joints out of a message.
+fn first<const N: usize>(all: &[f64; MAX_JOINTS]) -> SVector<f64, N> {
+    SVector::from_fn(|joint, _| all.get(joint).copied().unwrap_or(0.0))
+}
+
+/// Writes the numbers of the arm's joints into a message.
+fn put<const N: usize>(all: &mut [f64; MAX_JOINTS], joints: &SVector<f64, N>) {
+    for (to, from) in all.iter_mut().zip(joints.iter()) {
+        *to = *from;
+    }
+}

@@ -1,0 +1,345 @@
+//! The real-time thread: a clock, the link to the driver, and the runner between them.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+use std::sync::mpsc::SyncSender;
+use std::thread;
+use std::time::Instant;
+
+use ipc::{Clock, DriverState, EngineLink, Hello, Setpoint, SetpointFlags, State, text_of};
+use scheduling::{Granted, now_ns, sleep_until_ns, urge};
+
+use super::config::{ExecutorConfig, ExecutorError};
+use super::event::Fault;
+use super::remote::{Control, Shared};
+use super::runner::{Runner, Tick};
+
+/// How long a driver of a lock-step session may think about a period.
+const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How many times lock-step looks for a state before it sleeps between looks.
+const SPINS: u32 = 4000;
+
+/// How often a driver gets a sign of life while virtual time stands.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
+
+/// How long the thread tries to come to rest before it leaves anyway.
+const LEAVE: Duration = Duration::from_secs(5);
+
+/// What the thread tells when it has begun.
+#[derive(Debug)]
+pub(super) struct Begun {
+    pub(super) warning: Option<String>,
+    pub(super) driver: String,
+}
+
+/// The link, and when the last period was.
+struct Loop<'a, const N: usize> {
+    config: &'a ExecutorConfig<N>,
+    link: EngineLink,
+    runner: Runner<N>,
+    shared: std::sync::Arc<Shared<N>>,
+    tick: u64,
+    /// When period 0 began (ns).
+    origin: u64,
+    leaving: Option<Instant>,
+}
+
+/// The thread. Says first whether it begins.
+pub(super) fn main<const N: usize>(
+    config: &ExecutorConfig<N>,
+    runner: Runner<N>,
+    tell: &SyncSender<Result<Begun, ExecutorError>>,
+) {
+    let shared = runner.shared();
+    let begun = EngineLink::open(&config.arm)
+        .map_err(ExecutorError::from)
+        .and_then(|link| {
+            let mut all = Loop {
+                config,
+                link,
+                runner,
+                shared,
+                tick: 0,
+                origin: 0,
+                leaving: None,
+            };
+            all.greet(config.connect).map(|driver| (all, driver))
+        });
+    let (mut all, driver) = match begun {
+        Ok(begun) => begun,
+        Err(error) => {
+            // Whoever asked has gone; the thread goes too.
+            let _ = tell.send(Err(error));
+            return;
+        }
+    };
+    // A thread that waits awake, as in lock-step, must not be a real-time thread.
+    let granted = match config.clock {
+        Clock::Wall => urge(config.urgency),
+        Clock::LockStep => Granted::default(),
+    };
+    // Whoever asked may have gone; then the drop of its handle ends the thread.
+    let _ = tell.send(Ok(Begun {
+        warning: granted.warning(),
+        driver,
+    }));
+    match config.clock {
+        Clock::Wall => all.by_the_clock(),
+        Clock::LockStep => all.in_step(),
+    }
+    all.runner.end();
+}
+
+impl<const N: usize> Loop<'_, N> {
+    /// Opens a session; returns the driver's name.
+    fn greet(&mut self, timeout: Duration) -> Result<String, ExecutorError> {
+        let config = self.config;
+        let watchdog = config.watchdog.as_nanos() as u64;
+        let hello = Hello {
+            model: config.model,
+            ..Hello::new(N, config.period_ns(), watchdog, config.clock)
+        };
+        let ack = self.link.greet(&hello, timeout)?;
+        self.runner.open(&ack);
+        Ok(text_of(&ack.name))
+    }
+
+    /// Opens a new session if the operator asked for one.
+    fn recover(&mut self) {
+        if !self.runner.wants_session() {
+            return;
+        }
+        self.shared.recover.store(false, Ordering::Release);
+        if self
+            .greet(self.config.connect.min(Duration::from_secs(1)))
+            .is_ok()
+        {
+            self.runner.recovered();
+        } else {
+            self.runner.fail(Fault::NoSession);
+        }
+        // The handshake took its time; the periods begin anew instead of being late.
+        self.origin = now_ns().saturating_sub(self.tick * self.config.period_ns());
+    }
+
+    /// Whether the thread shall end now: it was asked to before this period, and the arm rests.
+    fn leaves(&mut self) -> bool {
+        if !self.shared.shutdown.load(Ordering::Acquire) {
+            return false;
+        }
+        self.shared.control(Control::Pause);
+        let Some(since) = self.leaving else {
+            // One more period, so that a lock-step run ends with the same one each time.
+            self.leaving = Some(Instant::now());
+            return false;
+        };
+        self.runner.may_leave() || since.elapsed() > LEAVE
+    }
+
+    /// Tells the driver that the session ends, if the arm rests.
+    fn say_goodbye(&self, last: Setpoint) {
+        if last.flags & SetpointFlags::HOLD != 0 && last.session == self.runner.session() {
+            let flags = last.flags | SetpointFlags::GOODBYE;
+            self.link.send(Setpoint {
+                flags,
+                sequence: last.sequence + 1,
+                ..last
+            });
+        }
+    }
+
+    fn send(&self, setpoint: Setpoint) {
+        if !self.link.send(setpoint) {
+            self.shared.unsent.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Periods by the clock: absolute deadlines; late periods are left out, never made up for.
+    fn by_the_clock(&mut self) {
+        let period = self.config.period_ns();
+        self.origin = now_ns() + period;
+        let mut alarm = Alarm::new(period);
+        loop {
+            let begin = self.origin + self.tick * period;
+            let now_ns = alarm.wait(begin);
+            let late = now_ns.saturating_sub(begin);
+            self.shared.latency.count(late);
+            let skipped = late / period;
+            self.tick += skipped;
+            let tick = Tick {
+                number: self.tick,
+                begin_ns: begin + skipped * period,
+                now_ns,
+                skipped,
+            };
+            let setpoint = self.runner.tick(self.link.last_state(), tick);
+            self.send(setpoint);
+            let work = scheduling::now_ns().saturating_sub(now_ns);
+            self.shared.work.count(work);
+            self.tick += 1;
+            if self.leaves() {
+                return self.say_goodbye(setpoint);
+            }
+            self.recover();
+        }
+    }
+
+    /// Periods in step with the driver: each state releases the next setpoint.
+    fn in_step(&mut self) {
+        let period = self.config.period_ns();
+        let mut last = Setpoint::default();
+        loop {
+            let state = self.wait_for_state();
+            match state.and_then(|state| self.stand(state, &mut last)) {
+                Some(state) => {
+                    let begin_ns = self.tick * period;
+                    let tick = Tick {
+                        number: self.tick,
+                        begin_ns,
+                        now_ns: begin_ns,
+                        skipped: 0,
+                    };
+                    last = self.runner.tick(Some(state), tick);
+                    self.send(last);
+                    self.tick += 1;
+                }
+                None if self.shared.shutdown.load(Ordering::Acquire) => return,
+                None => {
+                    let silent_ms = LOCK_STEP_PATIENCE.as_millis() as u64;
+                    self.runner.latch(Fault::DriverLost { silent_ms });
+                    self.stop_alone(period);
+                }
+            }
+            if self.leaves() {
+                return self.say_goodbye(last);
+            }
+            self.recover();
+            while self.runner.samples_wait() && !self.shared.shutdown.load(Ordering::Acquire) {
+                thread::yield_now();
+            }
+        }
+    }
+
+    /// Lets virtual time stand while the runner may; returns the newest state, or `None` when the
+    /// driver is gone.
+    fn stand(&mut self, mut state: State, last: &mut Setpoint) -> Option<State> {
+        let mut since = Instant::now();
+        let mut turns = 0_u32;
+        // The first period of a session is what a sign of life repeats.
+        let mine = last.session == self.runner.session();
+        while self.config.wait_for_planner && mine && self.runner.may_stand() {
+            if self.shared.shutdown.load(Ordering::Acquire) {
+                self.leaving.get_or_insert_with(Instant::now);
+                break;
+            }
+            if self.runner.wants_session() {
+                break;
+            }
+            turns = turns.saturating_add(1);
+            if turns < 200 {
+                thread::yield_now();
+            } else {
+                thread::sleep(Duration::from_micros(20));
+            }
+            if since.elapsed() > SIGN_OF_LIFE {
+                since = Instant::now();
+                *last = self.runner.again(*last);
+                self.send(*last);
+                state = self.wait_for_state()?;
+                if matches!(state.driver(), DriverState::Stopping | DriverState::Fault) {
+                    break;
+                }
+            }
+        }
+        Some(state)
+    }
+
+    /// The driver of a lock-step session is gone: the motion comes to rest in virtual time.
+    fn stop_alone(&mut self, period: u64) {
+        for _ in 0..100_000 {
+            if self.runner.may_leave() {
+                return;
+            }
+            let begin_ns = self.tick * period;
+            let tick = Tick {
+                number: self.tick,
+                begin_ns,
+                now_ns: begin_ns,
+                skipped: 0,
+            };
+            let setpoint = self.runner.tick(None, tick);
+            self.send(setpoint);
+            self.tick += 1;
+        }
+    }
+
+    /// The next state of the session, first awake, then asleep; `None` when none came for long,
+    /// when the thread shall end, or when a new session is wanted.
+    fn wait_for_state(&self) -> Option<State> {
+        let start = Instant::now();
+        let mut turns = 0_u32;
+        loop {
+            if let Some(state) = self.link.next_state() {
+                if state.session == self.runner.session() {
+                    return Some(state);
+                }
+                continue;
+            }
+            turns = turns.saturating_add(1);
+            // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
+            if turns < SPINS {
+                core::hint::spin_loop();
+            } else {
+                thread::sleep(Duration::from_micros(20));
+                let ends = self.shared.shutdown.load(Ordering::Acquire)
+                    && start.elapsed() > Duration::from_millis(200);
+                if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {
+                    return None;
+                }
+            }
+        }
+    }
+}
+
+/// Wakes up at a time by going to bed for a little less: about as long as waking up usually takes,
+/// which is then waited awake.
+struct Alarm {
+    /// How much less (ns): the middle of what waking up took.
+    early: u64,
+    /// The most of it (ns).
+    most: u64,
+}
+
+impl Alarm {
+    /// Part of a period that may be waited awake, at most.
+    const AWAKE: u64 = 50;
+
+    /// How fast the middle is followed (ns a period).
+    const STEP: u64 = 50;
+
+    fn new(period: u64) -> Self {
+        Self {
+            early: 0,
+            most: period / Self::AWAKE,
+        }
+    }
+
+    /// Waits until `begin` (ns); says what time it is then.
+    fn wait(&mut self, begin: u64) -> u64 {
+        let bed = begin.saturating_sub(self.early);
+        sleep_until_ns(bed);
+        let mut now = now_ns();
+        // Half of the times later, half earlier: the middle.
+        self.early = if now.saturating_sub(bed) > self.early {
+            (self.early + Self::STEP).min(self.most)
+        } else {
+            self.early.saturating_sub(Self::STEP)
+        };
+        while now < begin {
+            core::hint::spin_loop();
+            now = now_ns();
+        }
+        now
+    }
+}
