@@ -1,8 +1,10 @@
+use std::io::{self, Write};
 use std::path::PathBuf;
-use std::time::Duration;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use ipc::{Answer, Arm, Client, Domain, Verb};
+use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, Domain, Verb};
 
 use crate::damage;
 use crate::exit::Exit;
@@ -14,6 +16,13 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// After this time an asking client is caught in damaged segments; longer than all that it waits
 /// for by itself.
 const HANG: Duration = Duration::from_secs(15);
+
+/// How long a stop is waited for: a gentle one takes about a third of a second where the joints
+/// can.
+const REST: Duration = Duration::from_secs(3);
+
+/// How often the engine is asked whether the arm rests.
+const LOOK: Duration = Duration::from_millis(2);
 
 /// In which domain engine, driver and clients find each other.
 #[derive(Args, Clone, Debug)]
@@ -68,6 +77,33 @@ impl ArmOption {
         accepted(answer?)
     }
 
+    /// Asks something of the motion under way and waits until it acts; with `rest`, also until the
+    /// arm rests, but no longer than a stop takes. Says on standard output what was reached.
+    ///
+    /// # Errors
+    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
+    /// refuses.
+    pub(crate) fn control(&self, ask: ControlAsk, rest: bool) -> Result<Exit, Failure> {
+        let arm = self.open()?;
+        let asked = Instant::now();
+        let (client, mut answer) = damage::bounded(HANG, || {
+            let client = ControlClient::open(&arm)?;
+            client.ask(ask, PATIENCE).map(|answer| (client, answer))
+        })?;
+        if answer.accepted == 0 {
+            let reason = anyhow::anyhow!(answer.reason());
+            return Err(Failure::new(Exit::Refused, reason));
+        }
+        let first = answer.tick;
+        while rest && answer.resting == 0 && asked.elapsed() < REST {
+            sleep(LOOK);
+            answer = client.ask(ControlAsk::Look, PATIENCE)?;
+        }
+        let text = reached(&answer, first, asked.elapsed());
+        writeln!(io::stdout().lock(), "{text}")?;
+        Ok(Exit::Done)
+    }
+
     /// Asks, prints the engine's words, if any, to standard error.
     ///
     /// # Errors
@@ -79,6 +115,27 @@ impl ArmOption {
         }
         Ok(Exit::Done)
     }
+}
+
+/// Where the motion is, in one line.
+fn reached(answer: &ControlAnswer, first: u64, took: Duration) -> String {
+    let held = if answer.held == 0 { "" } else { ", held" };
+    let fault = if answer.fault == 0 {
+        ""
+    } else {
+        ", a fault is latched"
+    };
+    let at = if answer.resting == 1 {
+        "at rest".to_owned()
+    } else if answer.held == 1 {
+        format!("slowing, at {:.0} % speed", answer.path_rate * 100.0)
+    } else {
+        format!("moving at {:.0} % speed", answer.path_rate * 100.0)
+    };
+    format!(
+        "{at}{held}{fault}; acts from period {first} on, after {} ms",
+        took.as_millis()
+    )
 }
 
 /// The answer, or the engine's refusal as a failure.

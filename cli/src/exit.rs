@@ -22,6 +22,8 @@ pub(crate) enum Exit {
     Aborted = 6,
     /// The driver reported a fault or was lost.
     DriverFault = 7,
+    /// Everything asked for was done, but lines of standard output could not be written.
+    OutputLost = 8,
     /// A mistake of Canter itself.
     Internal = 70,
 }

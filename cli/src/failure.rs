@@ -1,8 +1,9 @@
-use std::io::{self, Write};
+use std::io;
 
 use ipc::IpcError;
 
 use crate::exit::Exit;
+use crate::printer::Printer;
 
 /// Why a command could not do its work: the exit code and the chain of causes.
 #[derive(Debug)]
@@ -23,14 +24,13 @@ impl Failure {
     /// Writes `canter: error: cause: cause of the cause` to standard error and gives the exit code.
     ///
     /// A reader of our answer that has gone away (`canter robots list | head -1`) is no failure.
-    pub(crate) fn report(&self) -> Exit {
+    pub(crate) fn report(&self, printer: &Printer) -> Exit {
         if let Some(error) = self.cause.downcast_ref::<io::Error>()
             && error.kind() == io::ErrorKind::BrokenPipe
         {
             return Exit::Done;
         }
-        // Nobody is left to be told when standard error is closed.
-        let _ = writeln!(io::stderr(), "canter: error: {}", chain(&self.cause));
+        printer.note(&format!("canter: error: {}", chain(&self.cause)));
         self.exit
     }
 }

@@ -27,28 +27,31 @@ mod pddl_file;
 mod picture;
 mod plan_report;
 mod plot;
+mod printer;
 mod program;
 mod progress;
 mod recent;
 mod recording;
 mod robot;
 mod samples;
+mod signals;
 mod simulation;
 mod table;
 mod world_file;
 
-use std::panic::catch_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::Parser;
 
 use crate::exit::Exit;
+use crate::printer::Printer;
 
 /// Executes canonical robot commands: check, plan, run.
 ///
 /// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read or
 /// parse; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
-/// 7 driver fault or lost; 70 internal error.
+/// 7 driver fault or lost; 8 done, but nobody read the output; 70 internal error.
 #[derive(Debug, Parser)]
 #[command(name = "canter", version, max_term_width = 100)]
 struct Arguments {
@@ -60,7 +63,8 @@ struct Arguments {
 ///
 /// The exit codes are part of the command line's contract, see `exit.rs`.
 pub fn main() -> ExitCode {
-    logging::start();
+    let printer = Printer::new();
+    logging::start(&printer);
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => {
@@ -74,14 +78,19 @@ pub fn main() -> ExitCode {
             return exit.into();
         }
     };
-    let exit = match catch_unwind(|| arguments.command.run()) {
+    let ran = catch_unwind(AssertUnwindSafe(|| arguments.command.run(&printer)));
+    let exit = match ran {
         Ok(Ok(exit)) => exit,
-        Ok(Err(failure)) => failure.report(),
+        Ok(Err(failure)) => failure.report(&printer),
         // The panic hook has told where; a panic is our mistake, whatever the input was.
         Err(_) => {
             damage::tell();
             Exit::Internal
         }
+    };
+    let exit = match (printer.finish(), exit) {
+        (1.., Exit::Done) => Exit::OutputLost,
+        (_, exit) => exit,
     };
     exit.into()
 }

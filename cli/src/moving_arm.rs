@@ -9,19 +9,14 @@ use anyhow::Context;
 use crcl::Command;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
-use servo::Control;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::Host;
-use crate::output;
+use crate::printer::Printer;
 use crate::progress::Progress;
 use crate::recording::Recording;
-
-/// How long an aborted arm may take to come to rest.
-const LAST_PATIENCE: Duration = Duration::from_secs(2);
+use crate::signals::SignalThread;
 
 /// How long the driver may take to agree to go on after a fault.
 const RECOVERY: Duration = Duration::from_secs(5);
@@ -29,11 +24,10 @@ const RECOVERY: Duration = Duration::from_secs(5);
 /// An engine with its driver, its clients and the signals of the operator.
 pub(crate) struct MovingArm {
     host: Host,
-    signals: Signals,
+    signals: SignalThread,
+    printer: Printer,
     recording: Recording<BufWriter<File>>,
     progress: Progress,
-    signalled: usize,
-    deadline: Option<Instant>,
     blame: Option<Exit>,
 }
 
@@ -47,7 +41,9 @@ impl MovingArm {
         mut host: Host,
         (joints, rate_hz): (usize, f64),
         samples: Option<&Path>,
+        printer: &Printer,
     ) -> Result<Self, Failure> {
+        let signals = SignalThread::start(printer, "once more to brake hard")?;
         host.own("canter plan-run");
         let create = |path: &Path| {
             File::create(path)
@@ -55,13 +51,13 @@ impl MovingArm {
                 .map_err(|cause| Failure::new(Exit::Unreadable, cause))
         };
         let sink = samples.map(create).transpose()?.map(BufWriter::new);
+        signals.steer(&host.session);
         Ok(Self {
             host,
-            signals: Signals::new([SIGINT, SIGTERM, SIGHUP])?,
+            signals,
+            printer: printer.clone(),
             recording: Recording::new(joints, rate_hz, sink)?,
-            progress: Progress::new(io::stderr().is_terminal()),
-            signalled: 0,
-            deadline: None,
+            progress: Progress::new(printer, io::stderr().is_terminal()),
             blame: None,
         })
     }
@@ -86,8 +82,7 @@ impl MovingArm {
     /// # Errors
     /// [`MotionFailure`], with `stopped` when the operator wanted it.
     pub(crate) fn execute(&mut self, commands: &[Command]) -> Result<(), MotionFailure> {
-        self.obey_signals();
-        if self.signalled > 0 {
+        if self.signals.count() > 0 {
             return Err(MotionFailure::stopped());
         }
         let program: crcl::Program = commands.iter().cloned().collect();
@@ -114,12 +109,10 @@ impl MovingArm {
                     self.blame = Some(exit_of(blame));
                     return Err(MotionFailure::new(0, reason));
                 }
-                Note::Stopped if self.signalled > 0 => return Err(MotionFailure::stopped()),
                 Note::Aborted { .. } => return Err(MotionFailure::stopped()),
                 Note::Closed => return Err(MotionFailure::new(0, "the engine has ended")),
                 Note::Message { text } => {
-                    self.progress.clear();
-                    output::note(&text);
+                    self.printer.note(&text);
                 }
                 _ => {}
             }
@@ -137,7 +130,10 @@ impl MovingArm {
 
     /// Clears a fault; whether that was possible.
     pub(crate) fn recover(&mut self) -> bool {
-        self.host.session.recover();
+        if self.host.session.recover().is_err() {
+            self.blame = None;
+            return true;
+        }
         let deadline = Instant::now() + RECOVERY;
         while Instant::now() < deadline {
             match self.turn() {
@@ -154,35 +150,16 @@ impl MovingArm {
 
     /// Serves clients and signals, keeps the recording, gives the next thing that happened.
     fn turn(&mut self) -> Result<Option<Note>, MotionFailure> {
-        self.obey_signals();
         let lost = |error: String| MotionFailure::new(0, error);
         let note = self.host.turn().map_err(|error| lost(error.to_string()))?;
         self.recording
             .take(&self.host.session.samples())
             .map_err(|error| lost(format!("the samples cannot be written: {error}")))?;
         self.progress.show(&self.host.session.status());
-        if self.host.is_shut_down() || self.deadline.is_some_and(|at| Instant::now() > at) {
+        if self.host.is_shut_down() || self.signals.has_stopped(&self.host.session) {
             return Err(MotionFailure::stopped());
         }
         Ok(note)
-    }
-
-    /// The first signal stops on the path, the second aborts.
-    fn obey_signals(&mut self) {
-        for _ in self.signals.pending() {
-            self.signalled += 1;
-            self.progress.clear();
-            if self.signalled == 1 {
-                output::note("canter: stopping on the path; once more to abort");
-                self.host.session.control(Control::Stop { fast: false });
-                if self.host.session.status().idle {
-                    self.deadline = Some(Instant::now());
-                }
-            } else {
-                self.host.session.control(Control::Stop { fast: true });
-                self.deadline = Some(Instant::now() + LAST_PATIENCE);
-            }
-        }
     }
 
     /// Ends engine and driver, and the file of samples; how far (m) the arm was off its path at
@@ -196,6 +173,7 @@ impl MovingArm {
         self.recording.take(&self.host.session.samples())?;
         let worst = self.recording.worst();
         drop(self.host);
+        self.signals.release();
         self.recording.finish()?;
         Ok(worst)
     }

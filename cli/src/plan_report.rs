@@ -60,15 +60,19 @@ impl PlanReport {
         self.outcome
     }
 
-    /// Prints the report, as JSON or for people; `off_path` is how far (m) the arm was off its path.
+    /// Writes the report, as JSON or for people; `off_path` is how far (m) the arm was off its path.
     ///
     /// # Errors
-    /// Standard output cannot be written.
-    pub(crate) fn print(&self, json: bool, off_path: Option<f64>) -> io::Result<()> {
+    /// The sink cannot be written.
+    pub(crate) fn write(
+        &self,
+        out: &mut impl Write,
+        json: bool,
+        off_path: Option<f64>,
+    ) -> io::Result<()> {
         if json {
-            return output::json(self);
+            return output::json_to(out, self);
         }
-        let mut out = io::stdout().lock();
         match (&self.reason, self.outcome) {
             (Some(reason), "interrupted") => writeln!(out, "interrupted: {reason}")?,
             (Some(reason), outcome) => {

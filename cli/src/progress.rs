@@ -1,55 +1,62 @@
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use engine::session::Status;
-use indicatif::{ProgressBar, ProgressStyle};
 
-/// One line at the bottom of a terminal that says what the arm is doing.
+use crate::printer::Printer;
+
+/// How often the line changes.
+const REFRESH: Duration = Duration::from_millis(100);
+
+/// Begins the line anew: to its start, no wrapping, clear.
+const BEGIN: &str = "\r\x1b[?7l\x1b[2K";
+
+/// Ends it: wrapping again.
+const END: &str = "\x1b[?7h";
+
+/// One line at the bottom of a terminal that says what the arm is doing. A terminal that takes
+/// nothing is not waited for.
 pub(crate) struct Progress {
-    line: Option<ProgressBar>,
+    printer: Option<Printer>,
+    shown: Option<Instant>,
 }
 
 impl Progress {
     /// A line that is shown only on a terminal.
-    pub(crate) fn new(terminal: bool) -> Self {
-        let line = terminal.then(|| {
-            let line = ProgressBar::new_spinner();
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
-                line.set_style(style);
-            }
-            line.enable_steady_tick(Duration::from_millis(100));
-            line
-        });
-        Self { line }
+    pub(crate) fn new(printer: &Printer, terminal: bool) -> Self {
+        if terminal {
+            printer.clear_before_lines();
+        }
+        Self {
+            printer: terminal.then(|| printer.clone()),
+            shown: None,
+        }
     }
 
     /// Says where the session is.
-    pub(crate) fn show(&self, status: &Status) {
-        let Some(line) = &self.line else { return };
+    pub(crate) fn show(&mut self, status: &Status) {
+        let Some(printer) = &self.printer else { return };
+        if self.shown.is_some_and(|at| at.elapsed() < REFRESH) {
+            return;
+        }
+        self.shown = Some(Instant::now());
         let [x, y, z] = status.position_m.map(|meters| meters * 1e3);
         let doing = match (status.held, status.command) {
             (true, _) => "held",
             (false, Some(name)) => name,
             (false, None) => "waiting",
         };
-        line.set_message(format!(
-            "{doing}  at ({x:.1}, {y:.1}, {z:.1}) mm  {:.0} % speed  {} commands wait",
+        printer.show(&format!(
+            "{BEGIN}{doing}  at ({x:.1}, {y:.1}, {z:.1}) mm  {:.0} % speed  {} commands wait{END}",
             status.path_rate * 100.0,
             status.queued
         ));
-    }
-
-    /// Makes place for other output.
-    pub(crate) fn clear(&self) {
-        if let Some(line) = &self.line {
-            line.suspend(|| {});
-        }
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(line) = &self.line {
-            line.finish_and_clear();
+        if let Some(printer) = &self.printer {
+            printer.show(&format!("{BEGIN}{END}"));
         }
     }
 }

@@ -7,8 +7,9 @@ use crcl::ReadOptions;
 use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
-use servo::Control;
+use servo::{Control, ExecutorError};
 
+use crate::control::ControlThread;
 use crate::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
 
 /// How often the report for everybody is written.
@@ -48,6 +49,7 @@ pub struct Host<D> {
     pub arm: Arm,
     /// The session.
     pub session: Session,
+    _control: ControlThread,
     channels: ClientChannels,
     reported: Option<Instant>,
     ownership: Ownership,
@@ -68,9 +70,13 @@ impl<D> Host<D> {
         config: &SessionConfig,
         driver: D,
     ) -> Result<Self, SessionError> {
+        let session = Session::start(robot, config)?;
+        let control =
+            ControlThread::start(&config.arm, session.steering()).map_err(ExecutorError::from)?;
         Ok(Self {
             arm: config.arm.clone(),
-            session: Session::start(robot, config)?,
+            session,
+            _control: control,
             channels,
             reported: None,
             ownership: Ownership::default(),
@@ -248,21 +254,26 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
     }
 }
 
-/// Passes on what acts on the motion that is under way.
+/// Passes on what acts on the motion that is under way, for clients that do not use the control
+/// channel.
 fn control(session: &Session, ask: &Verb) -> Answer {
-    match ask {
-        Verb::Pause => session.control(Control::Pause),
-        Verb::Resume => session.control(Control::Resume),
-        Verb::Override { share } if (0.0..=1.0).contains(share) => {
-            session.control(Control::Override(*share));
-        }
+    let control = match ask {
+        Verb::Pause => Control::Pause,
+        Verb::Resume => Control::Resume,
+        Verb::Override { share } if (0.0..=1.0).contains(share) => Control::Override(*share),
         Verb::Override { share } => {
             return Answer::refuse(format!("an override is 0 to 1, got {share}"));
         }
-        Verb::Stop { fast } => session.control(Control::Stop { fast: *fast }),
-        Verb::Abort => session.control(Control::Abort),
-        Verb::Recover => session.recover(),
+        Verb::Stop { fast } => Control::Stop { fast: *fast },
+        Verb::Abort => Control::Abort,
+        Verb::Recover => {
+            return match session.recover() {
+                Ok(_) => Answer::accept(Value::Null),
+                Err(error) => Answer::refuse(error.to_string()),
+            };
+        }
         _ => return Answer::refuse("this engine cannot do that"),
-    }
+    };
+    session.control(control);
     Answer::accept(Value::Null)
 }

@@ -9,6 +9,7 @@
 //! variable.
 #![forbid(unsafe_code)]
 
+pub mod control;
 pub mod doctor;
 pub mod host;
 pub mod queue;

@@ -10,6 +10,8 @@ use thiserror::Error;
 pub struct Queued {
     /// Number of the command, counted from 1 over the life of the queue.
     pub id: u32,
+    /// How many aborts there were when it was given: a later one drops it.
+    pub age: u32,
     /// The command and where it stood.
     pub located: Located,
 }
@@ -28,8 +30,8 @@ pub struct Full {
 /// use engine::queue::Queue;
 /// let mut queue = Queue::new(1);
 /// let command = |command| crcl::Located { command, span: 0..0, line: 1, column: 1 };
-/// assert_eq!(queue.push(command(crcl::Command::InitCanon)), Ok(1));
-/// assert!(queue.push(command(crcl::Command::OpenGripper)).is_err());
+/// assert_eq!(queue.push(command(crcl::Command::InitCanon), 0), Ok(1));
+/// assert!(queue.push(command(crcl::Command::OpenGripper), 0).is_err());
 /// assert_eq!(queue.pop().map(|queued| queued.id), Some(1));
 /// ```
 #[derive(Debug)]
@@ -50,11 +52,11 @@ impl Queue {
         }
     }
 
-    /// Appends a command and returns its number.
+    /// Appends a command that is given after `age` aborts, and returns its number.
     ///
     /// # Errors
     /// [`Full`], and the queue is as before.
-    pub fn push(&mut self, located: Located) -> Result<u32, Full> {
+    pub fn push(&mut self, located: Located, age: u32) -> Result<u32, Full> {
         if self.commands.len() >= self.capacity {
             return Err(Full {
                 capacity: self.capacity,
@@ -62,13 +64,34 @@ impl Queue {
         }
         let id = self.next_id;
         self.next_id += 1;
-        self.commands.push_back(Queued { id, located });
+        self.commands.push_back(Queued { id, age, located });
         Ok(id)
     }
 
     /// Takes the oldest command.
     pub fn pop(&mut self) -> Option<Queued> {
         self.commands.pop_front()
+    }
+
+    /// The oldest command.
+    #[must_use]
+    pub fn front(&self) -> Option<&Queued> {
+        self.commands.front()
+    }
+
+    /// All commands count as given at `age`.
+    pub fn renew(&mut self, age: u32) {
+        for queued in &mut self.commands {
+            queued.age = age;
+        }
+    }
+
+    /// Drops the commands that were given at another age than `age`, and returns how many there
+    /// were.
+    pub fn keep(&mut self, age: u32) -> usize {
+        let before = self.commands.len();
+        self.commands.retain(|queued| queued.age == age);
+        before - self.commands.len()
     }
 
     /// Drops all commands and returns how many there were.

@@ -6,7 +6,8 @@
 //! - [`Hello`] and [`HelloAck`] are the handshake that opens a session.
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
 //! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
-//!   report back.
+//!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
+//! - [`Observer`] sees the cyclic messages of an arm and takes part in nothing.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
 //! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
@@ -15,6 +16,7 @@
 mod arm;
 mod client;
 mod client_server;
+mod control;
 mod damage;
 mod domain;
 mod driver_link;
@@ -22,6 +24,7 @@ mod engine_link;
 mod error;
 mod hello;
 mod node;
+mod observer;
 mod ownership;
 mod probe;
 mod repair;
@@ -36,12 +39,16 @@ mod tool;
 pub use arm::{Arm, model_hash};
 pub use client::Client;
 pub use client_server::ClientServer;
+pub use control::{
+    ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
+};
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
 pub use node::{NodeCount, count_nodes, look_at_services, remove_dead_nodes};
+pub use observer::Observer;
 pub use ownership::Ownership;
 pub use probe::Probe;
 pub use repair::{Inhabitant, inhabitants_of, repair};
@@ -68,7 +75,7 @@ pub const TOOL_CHANGER: usize = 1;
 /// The version of the driver protocol. Both sides must have the same.
 pub const PROTOCOL: u32 = 1;
 
-/// A checksum of the byte layout of the two cyclic messages; part of the handshake, so that a
+/// A checksum of the byte layout of the messages and of the number of fault codes; part of the handshake, so that a
 /// driver built from other headers is refused before it moves.
 ///
 /// # Source
@@ -88,6 +95,7 @@ pub const fn schema_checksum() -> u64 {
         core::mem::offset_of!(State, digital_inputs),
         size_of::<Hello>(),
         size_of::<HelloAck>(),
+        FaultCode::COUNT,
     ];
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
     let mut index = 0;

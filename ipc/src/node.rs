@@ -206,6 +206,30 @@ where
         .map_err(|error| exchange_error(service, &error))
 }
 
+/// The same as [`exchange`] for many clients: nobody shall find no place to say stop.
+pub(crate) fn control_exchange<Q, A>(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+) -> Result<request_response::PortFactory<Shared, Q, (), A, ()>, IpcError>
+where
+    Q: Debug + ZeroCopySend,
+    A: Debug + ZeroCopySend,
+{
+    let (service, name) = service_name(arm, kind)?;
+    node.service_builder(&name)
+        .request_response::<Q, A>()
+        .enable_safe_overflow_for_requests(true)
+        .enable_safe_overflow_for_responses(true)
+        .max_active_requests_per_client(2)
+        .max_response_buffer_size(2)
+        .max_servers(1)
+        .max_clients(64)
+        .max_nodes(80)
+        .open_or_create()
+        .map_err(|error| exchange_error(service, &error))
+}
+
 /// The same as [`exchange`] for texts of any length.
 pub(crate) fn text_exchange(
     node: &Node<Shared>,

@@ -110,6 +110,8 @@ pub enum Event {
     },
     /// What was queued is forgotten; the arm rests.
     Aborted {
+        /// How many aborts were asked for by then: what was given after the last of them counts.
+        aborts: u32,
         /// The period.
         tick: u64,
     },

@@ -1,6 +1,5 @@
 //! Starting and ending the real-time thread, and what it reports.
 
-use core::sync::atomic::Ordering;
 use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
 
@@ -117,7 +116,7 @@ impl<const N: usize> Executor<N> {
     }
 
     fn end(&mut self) {
-        self.remote.shared.shutdown.store(true, Ordering::Release);
+        self.remote.steering().shut_down();
         if let Some(thread) = self.thread.take() {
             // A thread that panicked has already said so; there is nothing left to end.
             let _ = thread.join();

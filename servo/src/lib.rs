@@ -2,8 +2,9 @@
 //!
 //! [`Executor::start`] opens a session with the driver and starts the thread. Beside the
 //! [`Executor`] itself there are three ends, each for one thread of the engine: a [`Feeder`] for
-//! the planner (segments and tool orders, in order), a [`Remote`] for anyone (pause, override, stop, where the arm is), and a
-//! [`Monitor`] for reports (events, samples).
+//! the planner (segments and tool orders, in order), a [`Remote`] for anyone (pause, override,
+//! stop, where the arm is; [`Steering`] is the part of it that knows no joints), and a [`Monitor`]
+//! for reports (events, samples).
 //!
 //! The thread never plans and never waits for any of them: what it gets comes through wait-free
 //! rings and atomics. When the planner is late, the arm stops on the path; when the driver is
@@ -22,6 +23,7 @@ mod event;
 mod feed;
 mod handle;
 mod histogram;
+mod orders;
 mod remote;
 mod runner;
 mod thread;
@@ -31,5 +33,6 @@ pub use event::{Event, Fault, Recorded};
 pub use feed::{Feeder, Full, ToolOrder};
 pub use handle::{Executor, Monitor};
 pub use histogram::Histogram;
+pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Control, Counters, Measured, Remote};
 pub use runner::{Runner, Tick};

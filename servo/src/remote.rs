@@ -1,11 +1,12 @@
 //! Everybody's grip on the real-time thread: atomics that it reads and writes each period.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::Arc;
 
 use nalgebra::SVector;
 
 use super::histogram::Histogram;
+use super::orders::{NoFault, Orders, Steering};
 
 /// What an operator may ask while the arm moves. It acts in the next period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,19 +67,11 @@ pub struct Counters {
     pub driver_missed: u64,
 }
 
-/// How the thread shall behave, as a number in an atomic.
-const RUN: u32 = 0;
-const GENTLE: u32 = 1;
-const FAST: u32 = 2;
-
 /// The numbers that both sides see.
 #[derive(Debug)]
 pub(super) struct Shared<const N: usize> {
-    demand: AtomicU32,
-    share: AtomicU64,
-    pub(super) abort: AtomicBool,
-    pub(super) recover: AtomicBool,
-    pub(super) shutdown: AtomicBool,
+    /// What is asked for.
+    pub(super) orders: Arc<Orders>,
     age: AtomicU32,
     /// Events reported, and how many of them the planner had seen when it had no more to do.
     reported: AtomicU64,
@@ -104,11 +97,7 @@ impl<const N: usize> Shared<N> {
     pub(super) fn new() -> Self {
         let zeros = || core::array::from_fn(|_| AtomicU64::new(0));
         Self {
-            demand: AtomicU32::new(RUN),
-            share: AtomicU64::new(1.0_f64.to_bits()),
-            abort: AtomicBool::new(false),
-            recover: AtomicBool::new(false),
-            shutdown: AtomicBool::new(false),
+            orders: Arc::new(Orders::default()),
             age: AtomicU32::new(0),
             reported: AtomicU64::new(0),
             answered: AtomicU64::new(0),
@@ -153,30 +142,6 @@ impl<const N: usize> Shared<N> {
     /// Whether the planner has seen all events and has nothing more to do.
     pub(super) fn is_settled(&self) -> bool {
         self.answered.load(Ordering::Acquire) == self.reported.load(Ordering::Acquire)
-    }
-
-    /// What the operator wants now.
-    pub(super) fn demand(&self) -> realtime::Demand {
-        match self.demand.load(Ordering::Acquire) {
-            RUN => realtime::Demand::Run(f64::from_bits(self.share.load(Ordering::Acquire))),
-            GENTLE => realtime::Demand::Stop(realtime::Manner::Gentle),
-            _ => realtime::Demand::Stop(realtime::Manner::Fast),
-        }
-    }
-
-    pub(super) fn control(&self, control: Control) {
-        let set = |demand| self.demand.store(demand, Ordering::Release);
-        match control {
-            Control::Pause | Control::Stop { fast: false } => set(GENTLE),
-            Control::Stop { fast: true } => set(FAST),
-            Control::Resume => set(RUN),
-            Control::Override(share) if share.is_finite() => {
-                self.share
-                    .store(share.clamp(0.0, 1.0).to_bits(), Ordering::Release);
-            }
-            Control::Override(_) => {}
-            Control::Abort => self.abort.store(true, Ordering::Release),
-        }
     }
 
     /// Writes where the arm is; only the real-time thread does.
@@ -229,7 +194,7 @@ impl<const N: usize> Shared<N> {
                 resting: flags & 1 != 0,
                 idle: flags & 2 != 0,
                 faulted: flags & 4 != 0,
-                held: self.demand.load(Ordering::Relaxed) != RUN,
+                held: self.orders.asked().holds(),
                 tools: self
                     .tools
                     .each_ref()
@@ -251,16 +216,27 @@ pub struct Remote<const N: usize> {
 }
 
 impl<const N: usize> Remote<N> {
-    /// Asks for something; it acts in the next period.
-    pub fn control(&self, control: Control) {
-        self.shared.control(control);
+    /// Asks for something; it acts in the next period. Gives the number of the order, for
+    /// [`super::Progress::has`].
+    pub fn control(&self, control: Control) -> u32 {
+        self.steering().control(control)
     }
 
-    /// Asks for a new session with the driver, which clears a latched fault and forgets all that
-    /// was pushed. The answer is an event: [`super::Event::Recovered`], or
-    /// [`super::Event::Faulted`] again.
-    pub fn recover(&self) {
-        self.shared.recover.store(true, Ordering::Release);
+    /// Asks for a new session with the driver, which clears the fault that is latched now and
+    /// forgets all that was pushed. The answer is an event: [`super::Event::Recovered`], or
+    /// [`super::Event::Faulted`] again. Gives the number of the fault.
+    ///
+    /// # Errors
+    /// [`NoFault`], and nothing is left behind that could act later.
+    pub fn recover(&self) -> Result<u32, NoFault> {
+        self.steering().recover()
+    }
+
+    /// The part of it that knows no joints.
+    pub fn steering(&self) -> Steering {
+        Steering {
+            orders: Arc::clone(&self.shared.orders),
+        }
     }
 
     /// Where the arm is.

@@ -8,13 +8,14 @@ use ipc::{
     ToolStatus,
 };
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Manner, Pushed, Sample, Step, check_following};
+use realtime::{Cycle, Demand, Following, Manner, Pushed, Sample, Step, check_following};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::config::ExecutorConfig;
 use super::event::{Event, Fault, Recorded};
 use super::feed::{Feeder, Item, ToolOrder, Work};
 use super::handle::Monitor;
+use super::orders::{Asked, Progress};
 use super::remote::{Measured, Remote, Shared};
 
 /// Planned segments that the cycle has at hand.
@@ -28,6 +29,9 @@ const REPORTS: usize = 1 << 14;
 
 /// Items taken from the ring in a period at most.
 const A_PERIOD: usize = 64;
+
+/// In about this time a driver is back where the setpoints are after a stall (s).
+const REJOIN: f64 = 0.25;
 
 /// When a period runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,13 +71,17 @@ pub struct Runner<const N: usize> {
     state: State,
     quiet: u64,
     ready: bool,
-    aborting: bool,
+    asked: Asked,
+    aborting: Option<Manner>,
+    leaving: bool,
     stopped: bool,
     fault: Option<Fault>,
     tool: Option<Working>,
     orders: u32,
     tools: [ToolCommand; MAX_TOOLS],
     published: Sample<N>,
+    /// How far the driver may be ahead after a stall (rad).
+    ahead: f64,
     pending: Option<Recorded<N>>,
     tick: u64,
 }
@@ -99,13 +107,16 @@ impl<const N: usize> Runner<N> {
             state: State::default(),
             quiet: 0,
             ready: false,
-            aborting: false,
+            asked: shared.orders.asked(),
+            aborting: None,
+            leaving: false,
             stopped: false,
             fault: None,
             tool: None,
             orders: 0,
             tools: [ToolCommand::default(); MAX_TOOLS],
             published: Sample::rest(rest),
+            ahead: 0.0,
             pending: None,
             tick: 0,
             config,
@@ -138,9 +149,11 @@ impl<const N: usize> Runner<N> {
         self.quiet = 0;
         self.ready = false;
         self.fault = None;
+        self.shared.orders.clear();
         self.tool = None;
         self.orders = 0;
         self.tools = [ToolCommand::default(); MAX_TOOLS];
+        self.ahead = 0.0;
         self.pending = None;
         self.share_position();
     }
@@ -169,7 +182,12 @@ impl<const N: usize> Runner<N> {
 
     /// Whether the operator asked for a new session, and the arm rests so that there may be one.
     pub(super) fn wants_session(&self) -> bool {
-        self.shared.recover.load(Ordering::Acquire) && self.cycle.is_resting()
+        self.shared.orders.wants_recovery() && self.cycle.is_resting()
+    }
+
+    /// Comes to rest on the path, whatever is asked for: the thread shall end.
+    pub(super) fn leave(&mut self) {
+        self.leaving = true;
     }
 
     /// Whether the driver follows and the arm rests: the time to leave.
@@ -186,10 +204,10 @@ impl<const N: usize> Runner<N> {
 
     /// Whether virtual time may stand: the planner thinks, or there is nothing to do.
     pub(super) fn may_stand(&self) -> bool {
-        if self.aborting || self.shared.abort.load(Ordering::Acquire) {
+        if self.aborting.is_some() || self.shared.orders.is_newer(self.asked) {
             return false;
         }
-        let held = matches!(self.shared.demand(), Demand::Stop(_));
+        let held = self.asked.holds();
         let begun = self.ready || self.fault.is_some();
         let at_rest = self.cycle.is_resting() && self.tool.is_none();
         let nothing_to_do = if held {
@@ -213,6 +231,7 @@ impl<const N: usize> Runner<N> {
     pub(super) fn latch(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
+            self.shared.orders.latch();
             self.age = self.shared.new_age();
             self.report(Event::Faulted {
                 fault,
@@ -224,11 +243,12 @@ impl<const N: usize> Runner<N> {
     /// One period: `state` is the newest state that came since the last one, unchecked.
     pub fn tick(&mut self, state: Option<State>, tick: Tick) -> Setpoint {
         self.tick = tick.number;
+        self.watch_stall(tick.skipped);
         self.take_state(state, tick);
         self.record();
         self.obey();
         self.feed();
-        self.move_on(tick.skipped);
+        self.move_on();
         self.watch_tool();
         self.tell_stopped();
         self.shared.published.fetch_add(1, Ordering::Relaxed);
@@ -281,18 +301,29 @@ impl<const N: usize> Runner<N> {
         let measured = self.measured();
         if self.ready
             && self.fault.is_none()
-            && let Some(trip) = check_following(&self.published, &measured, self.config.following)
+            && let Some(trip) = check_following(&self.published, &measured, self.following())
         {
             self.latch(Fault::Limit(trip));
         }
     }
 
+    /// How far the arm may be from the setpoint: further for a while after a stall, in which the
+    /// driver went on as it was going.
+    fn following(&self) -> Following {
+        let allowed = self.config.following;
+        Following {
+            base: allowed.base + self.ahead,
+            ..allowed
+        }
+    }
+
     /// Takes what the operator asked for.
     fn obey(&mut self) {
-        if self.shared.abort.swap(false, Ordering::AcqRel) {
-            self.aborting = true;
-            self.shared.control(super::Control::Resume);
+        let asked = self.shared.orders.asked();
+        if asked.aborts() != self.asked.aborts() {
+            self.aborting = Some(asked.abort_manner());
         }
+        self.asked = asked;
         if !self.cycle.is_resting() {
             return;
         }
@@ -300,12 +331,14 @@ impl<const N: usize> Runner<N> {
             self.cycle.flush();
             self.tool = None;
         }
-        if self.aborting {
+        if self.aborting.take().is_some() {
             self.cycle.flush();
             self.tool = None;
-            self.aborting = false;
             self.age = self.shared.new_age();
-            self.report(Event::Aborted { tick: self.tick });
+            self.report(Event::Aborted {
+                aborts: asked.aborts(),
+                tick: self.tick,
+            });
         }
     }
 
@@ -342,6 +375,7 @@ impl<const N: usize> Runner<N> {
 
     /// Sends a tool order; says whether it may begin now.
     fn start_tool(&mut self, order: ToolOrder) -> bool {
+        let moving = matches!(self.demand(), Demand::Run(share) if share > 0.0);
         let Some(command) = self.tools.get_mut(order.tool) else {
             self.latch(Fault::Tool {
                 tool: order.tool,
@@ -349,8 +383,7 @@ impl<const N: usize> Runner<N> {
             });
             return true;
         };
-        let moving = matches!(self.shared.demand(), Demand::Run(share) if share > 0.0);
-        if !self.ready || !moving || self.aborting {
+        if !self.ready || !moving {
             return false;
         }
         self.orders += 1;
@@ -409,37 +442,42 @@ impl<const N: usize> Runner<N> {
         if self.fault.is_some() {
             return Demand::Stop(Manner::Fast);
         }
-        match self.shared.demand() {
-            Demand::Run(_) if self.aborting || !self.ready => Demand::Stop(Manner::Gentle),
-            demand => demand,
+        match (self.asked.demand(), self.aborting) {
+            (Demand::Stop(Manner::Fast), _) => Demand::Stop(Manner::Fast),
+            (_, Some(manner)) => Demand::Stop(manner),
+            (Demand::Run(_), None) if self.leaving || !self.ready => Demand::Stop(Manner::Gentle),
+            (demand, None) => demand,
         }
     }
 
-    /// Moves along the path: one step, and one more for each period that was left out.
-    fn move_on(&mut self, skipped: u64) {
+    /// Latches a fault where the thread was kept from running for longer than the driver waits.
+    fn watch_stall(&mut self, skipped: u64) {
         let late = skipped as f64 * self.period;
-        let mut steps = skipped + 1;
         if late > self.config.watchdog.as_secs_f64() {
             self.latch(Fault::Stalled {
                 late_ms: (late * 1e3) as u64,
             });
-            steps = 1;
         }
-        let demand = self.demand();
-        for step in 0..steps {
-            let made = self.cycle.step(demand);
-            let tick = self.tick + step + 1 - steps;
-            self.tell(&made, tick);
-            self.published = made.setpoint;
-            self.pending = self.samples.is_some().then_some(Recorded {
-                tick: self.tick,
-                command: made.command,
-                path_time: made.path_time,
-                path_rate: made.path_rate,
-                setpoint: made.setpoint,
-                measured: [0.0; N],
-            });
-        }
+        let ahead = self.published.velocity.amax() * late.min(self.config.watchdog.as_secs_f64());
+        let fading = self.ahead * (1.0 - self.period / REJOIN);
+        self.ahead = ahead.max(if fading > 1e-6 { fading } else { 0.0 });
+    }
+
+    /// Moves along the path by one step. Periods that were left out are not made up for: the
+    /// plan is late by them, and a setpoint is never further from the one before than the joints
+    /// can come in a period.
+    fn move_on(&mut self) {
+        let made = self.cycle.step(self.demand());
+        self.tell(&made, self.tick);
+        self.published = made.setpoint;
+        self.pending = self.samples.is_some().then_some(Recorded {
+            tick: self.tick,
+            command: made.command,
+            path_time: made.path_time,
+            path_rate: made.path_rate,
+            setpoint: made.setpoint,
+            measured: [0.0; N],
+        });
     }
 
     /// Reports what a step brought.
@@ -457,7 +495,7 @@ impl<const N: usize> Runner<N> {
 
     /// Reports once that a pause or stop has brought the arm to rest.
     fn tell_stopped(&mut self) {
-        let held = matches!(self.shared.demand(), Demand::Stop(_));
+        let held = self.asked.holds();
         let resting = self.cycle.is_resting();
         if held && resting && !self.stopped {
             self.report(Event::Stopped { tick: self.tick });
@@ -497,20 +535,28 @@ impl<const N: usize> Runner<N> {
     }
 
     fn share_position(&self) {
+        let resting = self.cycle.is_resting();
+        let path_rate = if resting { 0.0 } else { self.cycle.path_rate() };
+        let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
         self.shared.write(&Measured {
             position: self.measured(),
             velocity: first(&self.state.velocity),
             setpoint: self.published.position,
-            path_rate: if self.cycle.is_resting() {
-                0.0
-            } else {
-                self.cycle.path_rate()
-            },
-            resting: self.cycle.is_resting(),
-            idle: self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none(),
+            path_rate,
+            resting,
+            idle,
             faulted: self.fault.is_some(),
             held: false,
             tools: self.state.tools.map(|tool| tool.status),
+        });
+        self.shared.orders.tell(&Progress {
+            order: self.asked.order(),
+            tick: self.tick,
+            path_rate,
+            resting,
+            held: self.asked.holds(),
+            idle,
+            ..Progress::default()
         });
     }
 

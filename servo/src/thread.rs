@@ -11,7 +11,7 @@ use scheduling::{Granted, now_ns, sleep_until_ns, urge};
 
 use super::config::{ExecutorConfig, ExecutorError};
 use super::event::Fault;
-use super::remote::{Control, Shared};
+use super::remote::Shared;
 use super::runner::{Runner, Tick};
 
 /// How long a driver of a lock-step session may think about a period.
@@ -59,7 +59,7 @@ pub(super) fn main<const N: usize>(
                 config,
                 link,
                 runner,
-                shared,
+                shared: std::sync::Arc::clone(&shared),
                 tick: 0,
                 origin: 0,
                 leaving: None,
@@ -70,6 +70,7 @@ pub(super) fn main<const N: usize>(
         Ok(begun) => begun,
         Err(error) => {
             // Whoever asked has gone; the thread goes too.
+            shared.orders.end();
             let _ = tell.send(Err(error));
             return;
         }
@@ -89,6 +90,7 @@ pub(super) fn main<const N: usize>(
         Clock::LockStep => all.in_step(),
     }
     all.runner.end();
+    shared.orders.end();
 }
 
 impl<const N: usize> Loop<'_, N> {
@@ -110,7 +112,6 @@ impl<const N: usize> Loop<'_, N> {
         if !self.runner.wants_session() {
             return;
         }
-        self.shared.recover.store(false, Ordering::Release);
         if self
             .greet(self.config.connect.min(Duration::from_secs(1)))
             .is_ok()
@@ -125,10 +126,10 @@ impl<const N: usize> Loop<'_, N> {
 
     /// Whether the thread shall end now: it was asked to before this period, and the arm rests.
     fn leaves(&mut self) -> bool {
-        if !self.shared.shutdown.load(Ordering::Acquire) {
+        if !self.shared.orders.is_shutting_down() {
             return false;
         }
-        self.shared.control(Control::Pause);
+        self.runner.leave();
         let Some(since) = self.leaving else {
             // One more period, so that a lock-step run ends with the same one each time.
             self.leaving = Some(Instant::now());
@@ -204,7 +205,7 @@ impl<const N: usize> Loop<'_, N> {
                     self.send(last);
                     self.tick += 1;
                 }
-                None if self.shared.shutdown.load(Ordering::Acquire) => return,
+                None if self.shared.orders.is_shutting_down() => return,
                 None => {
                     let silent_ms = LOCK_STEP_PATIENCE.as_millis() as u64;
                     self.runner.latch(Fault::DriverLost { silent_ms });
@@ -215,7 +216,7 @@ impl<const N: usize> Loop<'_, N> {
                 return self.say_goodbye(last);
             }
             self.recover();
-            while self.runner.samples_wait() && !self.shared.shutdown.load(Ordering::Acquire) {
+            while self.runner.samples_wait() && !self.shared.orders.is_shutting_down() {
                 thread::yield_now();
             }
         }
@@ -229,7 +230,7 @@ impl<const N: usize> Loop<'_, N> {
         // The first period of a session is what a sign of life repeats.
         let mine = last.session == self.runner.session();
         while self.config.wait_for_planner && mine && self.runner.may_stand() {
-            if self.shared.shutdown.load(Ordering::Acquire) {
+            if self.shared.orders.is_shutting_down() {
                 self.leaving.get_or_insert_with(Instant::now);
                 break;
             }
@@ -292,7 +293,7 @@ impl<const N: usize> Loop<'_, N> {
                 core::hint::spin_loop();
             } else {
                 thread::sleep(Duration::from_micros(20));
-                let ends = self.shared.shutdown.load(Ordering::Acquire)
+                let ends = self.shared.orders.is_shutting_down()
                     && start.elapsed() > Duration::from_millis(200);
                 if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {
                     return None;

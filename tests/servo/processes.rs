@@ -72,6 +72,41 @@ fn stop_the_engine_process_for_300_ms() {
     assert_within_limits(&lines);
 }
 
+/// Stalls that are shorter than the watchdog: no setpoint is further from the one before than the
+/// joints can come in a period, however long that one is ago.
+#[test]
+fn a_short_stall_of_the_engine_makes_no_jump() {
+    let scene = Scene::new("short-stalls");
+    let (engine, _driver) = scene.moving();
+    for stall in [5, 20, 40, 60, 75, 30, 70, 10, 50, 65] {
+        engine.signal(libc::SIGSTOP);
+        thread::sleep(Duration::from_millis(stall));
+        engine.signal(libc::SIGCONT);
+        thread::sleep(Duration::from_millis(250));
+    }
+    let lines = read(&scene.log(0));
+    assert!(assert_within_limits(&lines) > 1000);
+    let velocity = system_tests::servo_arm::limits().velocity;
+    let mut late = 0;
+    for pair in lines.windows(2) {
+        // What the driver was too late to read is not in its log.
+        let follows =
+            pair[1].session == pair[0].session && pair[1].sequence == pair[0].sequence + 1;
+        if !follows {
+            continue;
+        }
+        late += usize::from(pair[1].tick > pair[0].tick + 4);
+        for joint in 0..velocity.len() {
+            let step = (pair[1].setpoint[0][joint] - pair[0].setpoint[0][joint]).abs();
+            assert!(
+                step <= velocity[joint] * 0.001 * 1.001,
+                "{step} rad in one setpoint"
+            );
+        }
+    }
+    assert!(late >= 5, "only {late} stalls were seen");
+}
+
 #[test]
 fn stop_the_driver_process_for_300_ms() {
     let scene = Scene::new("stop-driver");

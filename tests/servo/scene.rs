@@ -134,6 +134,7 @@ impl Scene {
 pub(crate) struct Line {
     pub(crate) received_ns: u64,
     pub(crate) session: u64,
+    pub(crate) sequence: u64,
     pub(crate) tick: u64,
     pub(crate) setpoint: [[f64; JOINTS]; 3],
     pub(crate) joints: [f64; JOINTS],
@@ -152,6 +153,7 @@ pub(crate) fn read(path: &Path) -> Vec<Line> {
             Line {
                 received_ns: words[0].parse().unwrap(),
                 session: words[1].parse().unwrap(),
+                sequence: words[2].parse().unwrap(),
                 tick: words[3].parse().unwrap(),
                 setpoint: [row(5), row(5 + JOINTS), row(5 + 2 * JOINTS)],
                 joints: row(5 + 3 * JOINTS),

@@ -7,6 +7,7 @@ mod bad_inputs;
 mod benchmarks;
 mod canter;
 mod command_line;
+mod control;
 mod documents;
 mod domains;
 mod drivers;

@@ -1,5 +1,5 @@
 use clap::Args;
-use ipc::Verb;
+use ipc::ControlAsk;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -15,6 +15,6 @@ pub(crate) struct Abort {
 impl Abort {
     /// Asks the engine.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        self.arm.tell(Verb::Abort)
+        self.arm.control(ControlAsk::Abort, true)
     }
 }

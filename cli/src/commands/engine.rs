@@ -1,21 +1,17 @@
-use std::io::{self, Write};
-
 use clap::Args;
 use engine::session::Note;
-use servo::Control;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{HostOptions, RefusalOption};
-use crate::output;
+use crate::printer::Printer;
 use crate::robot::RobotOption;
+use crate::signals::SignalThread;
 
 /// Run the engine of an arm until Ctrl-C; programs come from `canter send`
 ///
-/// Prints a line for everything that happens. Ctrl-C stops on the path and ends; a second Ctrl-C
-/// does not wait for the arm to rest.
+/// Prints a line for everything that happens; the arm waits for no reader. Ctrl-C stops on the path
+/// and ends; a second Ctrl-C brakes as fast as the joints can.
 #[derive(Args, Debug)]
 pub(crate) struct Engine {
     #[command(flatten)]
@@ -31,48 +27,53 @@ pub(crate) struct Engine {
 
 impl Engine {
     /// Serves until a signal or a client ends it.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+        if self.json {
+            printer.expect_json();
+        }
+        let signals = SignalThread::start(printer, "once more to brake hard")?;
         let length = crcl::LengthUnit::default();
         let mut host =
             self.host
                 .start(&robot, self.robot.place(), length, self.refusal.policy())?;
-        output::note(&format!(
+        signals.steer(&host.session);
+        printer.note(&format!(
             "canter: engine of {} at {}, driver {}",
             robot.name, host.arm, host.session.driver
         ));
-        let mut stopping = false;
-        while !host.is_shut_down() {
-            for _ in signals.pending() {
-                if stopping || host.session.status().idle {
-                    return Ok(Exit::Done);
-                }
-                stopping = true;
-                output::note("canter: stopping on the path; once more to end at once");
-                host.session.control(Control::Stop { fast: false });
+        let exit = loop {
+            if signals.has_stopped(&host.session) {
+                let idle = host.session.status().idle;
+                break if idle { Exit::Done } else { Exit::Stopped };
+            }
+            if signals.count() > 1 {
+                break Exit::Stopped;
+            }
+            if host.is_shut_down() {
+                break Exit::Done;
             }
             let note = host.turn()?;
             // Nobody reads the recording here; it must not grow.
             drop(host.session.samples());
             let Some(note) = note else { continue };
-            self.tell(&note)?;
-            match note {
-                Note::Stopped if stopping => return Ok(Exit::Stopped),
-                Note::Closed => return Ok(Exit::Internal),
-                _ => {}
+            self.tell(printer, &note);
+            if matches!(note, Note::Closed) {
+                break Exit::Internal;
             }
-        }
-        Ok(Exit::Done)
+        };
+        drop(host);
+        signals.release();
+        Ok(exit)
     }
 
-    fn tell(&self, note: &Note) -> io::Result<()> {
-        let mut out = io::stdout().lock();
-        if self.json {
-            serde_json::to_writer(&mut out, note)?;
-            writeln!(out)
-        } else {
-            writeln!(out, "{}", line(note))
+    fn tell(&self, printer: &Printer, note: &Note) {
+        if !self.json {
+            return printer.line(&line(note));
+        }
+        // A note has no key that is not a text: it can be written.
+        if let Ok(text) = serde_json::to_string(note) {
+            printer.line(&text);
         }
     }
 }

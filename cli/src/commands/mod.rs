@@ -35,6 +35,7 @@ use clap::Subcommand;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::printer::Printer;
 
 /// What `canter` can do.
 #[derive(Debug, Subcommand)]
@@ -71,7 +72,7 @@ pub(crate) enum Command {
 
 impl Command {
     /// Runs the command that was given.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
             Self::Bench(command) => command.run(),
@@ -80,7 +81,7 @@ impl Command {
             Self::Convert(command) => command.run(),
             Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
-            Self::Engine(command) => command.run(),
+            Self::Engine(command) => command.run(printer),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
             Self::Jog(command) => command.run(),
@@ -93,8 +94,8 @@ impl Command {
             Self::Robots(command) => command.run(),
             Self::World(command) => command.run(),
             Self::PlanCheck(command) => command.run(),
-            Self::PlanRun(command) => command.run(),
-            Self::Run(command) => command.run(),
+            Self::PlanRun(command) => command.run(printer),
+            Self::Run(command) => command.run(printer),
             Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
             Self::Shutdown(command) => command.run(),

@@ -1,5 +1,5 @@
 use clap::Args;
-use ipc::Verb;
+use ipc::ControlAsk;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -20,9 +20,8 @@ pub(crate) struct Override {
 impl Override {
     /// Asks the engine.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        self.arm.tell(Verb::Override {
-            share: self.percent / 100.0,
-        })
+        let share = self.percent / 100.0;
+        self.arm.control(ControlAsk::Override(share), false)
     }
 }
 

@@ -21,9 +21,10 @@ use crate::host_options::HostOptions;
 use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
+use crate::printer::Printer;
 use crate::robot::{RobotOption, with_joints};
+use crate::world_file;
 use crate::world_file::Database;
-use crate::{output, world_file};
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -96,7 +97,7 @@ fn refused(error: PlanError) -> Failure {
 
 impl PlanRun {
     /// Executes the plan.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let mut robot = self.robot.load()?;
         let source = self.plan.as_deref().map(world_file::read).transpose()?;
         let (parameters, limits) = (self.parameters()?, self.limits()?);
@@ -112,10 +113,11 @@ impl PlanRun {
         let arm = if self.dry_run {
             None
         } else {
-            Some(self.moving_arm(&robot)?)
+            Some(self.moving_arm(&robot, printer)?)
         };
         let task = Task {
             command: self,
+            printer,
             source,
             stored,
             parameters,
@@ -154,12 +156,12 @@ impl PlanRun {
         }
     }
 
-    fn moving_arm(&self, robot: &Robot) -> Result<MovingArm, Failure> {
+    fn moving_arm(&self, robot: &Robot, printer: &Printer) -> Result<MovingArm, Failure> {
         let place = self.robot.place();
         let (metres, policy) = (LengthUnit::Meter, FailurePolicy::Abort);
         let host = self.host.start(robot, place, metres, policy)?;
         let (joints, rate) = (robot.dof(), self.host.rate);
-        MovingArm::new(host, (joints, rate), self.samples.as_deref())
+        MovingArm::new(host, (joints, rate), self.samples.as_deref(), printer)
     }
 
     fn parameters(&self) -> Result<BTreeMap<String, String>, Failure> {
@@ -200,7 +202,7 @@ impl PlanRun {
         }
     }
 
-    fn observe(&self, event: &Event) {
+    fn observe(&self, printer: &Printer, event: &Event) {
         match event {
             Event::Statement {
                 name,
@@ -208,14 +210,14 @@ impl PlanRun {
                 seconds,
                 ..
             } if self.verbose => {
-                output::note(&format!(
+                printer.note(&format!(
                     "done     line {line:4}  {name:30} {seconds:9.3} s"
                 ));
             }
-            Event::Kit(number) => output::note(&format!("kit {number} is finished")),
-            Event::EndEffector(name) if self.verbose => output::note(&format!("with {name}")),
-            Event::Warning(text) => output::note(&format!("warning: {text}")),
-            Event::Retry(text) => output::note(&format!("tried again: {text}")),
+            Event::Kit(number) => printer.note(&format!("kit {number} is finished")),
+            Event::EndEffector(name) if self.verbose => printer.note(&format!("with {name}")),
+            Event::Warning(text) => printer.note(&format!("warning: {text}")),
+            Event::Retry(text) => printer.note(&format!("tried again: {text}")),
             _ => {}
         }
     }
@@ -236,6 +238,7 @@ fn pairs(option: &str, texts: &[String]) -> Result<BTreeMap<String, String>, Fai
 /// A plan with all it needs but an arm.
 struct Task<'a> {
     command: &'a PlanRun,
+    printer: &'a Printer,
     /// Text of the plan; none when a run is resumed.
     source: Option<String>,
     /// The run that goes on; none when a plan is started.
@@ -256,6 +259,7 @@ impl Task<'_> {
     fn kitting(self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, PlanError> {
         let Self {
             command,
+            printer,
             source,
             stored,
             parameters,
@@ -286,11 +290,11 @@ impl Task<'_> {
             Some(source) => Controller::start(cell, source, &parameters, &stock, options),
             None => Controller::resume(cell, options),
         }?;
-        controller.run(&mut |event| command.observe(event))
+        controller.run(&mut |event| command.observe(printer, event))
     }
 
     fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, Failure> {
-        let command = self.command;
+        let (command, printer) = (self.command, self.printer);
         let table = action_table(command.actions.as_deref())?;
         let options = &command.robot_options(robot);
         let mut interpreter = PddlInterpreter::new(&self.database.path, table, options.clone());
@@ -305,7 +309,7 @@ impl Task<'_> {
         interpreter.go_on(run.source(), run.done());
         let mut step = |number| {
             if command.verbose {
-                output::note(&format!("done     step {number}"));
+                printer.note(&format!("done     step {number}"));
             }
         };
         let writer = &mut self.writer;
@@ -323,7 +327,7 @@ fn execute<const N: usize>(
     robot: &Robot,
     arm: Option<MovingArm>,
 ) -> Result<Exit, Failure> {
-    let command = task.command;
+    let (command, printer) = (task.command, task.printer);
     let mut motion = ArmMotion::<N>::new(robot, command.host.rate, arm)?;
     let report: PlanReport = if task.is_pddl() {
         task.pddl(robot, &mut motion)?
@@ -333,7 +337,9 @@ fn execute<const N: usize>(
     .into();
     let blame = motion.blame();
     let off_path = motion.finish()?;
-    report.print(command.json, off_path)?;
+    let mut text = Vec::new();
+    report.write(&mut text, command.json, off_path)?;
+    printer.lines(text);
     Ok(match report.outcome() {
         "stopped" => Exit::Done,
         "interrupted" => Exit::Stopped,

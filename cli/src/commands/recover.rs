@@ -1,5 +1,5 @@
 use clap::Args;
-use ipc::Verb;
+use ipc::ControlAsk;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -17,6 +17,6 @@ pub(crate) struct Recover {
 impl Recover {
     /// Asks the engine.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        self.arm.tell(Verb::Recover)
+        self.arm.control(ControlAsk::Recover, false)
     }
 }

@@ -1,5 +1,5 @@
 use clap::Args;
-use ipc::Verb;
+use ipc::ControlAsk;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -15,6 +15,6 @@ pub(crate) struct Resume {
 impl Resume {
     /// Asks the engine.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        self.arm.tell(Verb::Resume)
+        self.arm.control(ControlAsk::Resume, false)
     }
 }

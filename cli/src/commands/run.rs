@@ -1,7 +1,6 @@
 use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal};
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
@@ -9,27 +8,24 @@ use engine::session::{Blame, Note};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use serde_json::json;
-use servo::Control;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
-use crate::output;
+use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::robot::RobotOption;
-
-/// How long an aborted arm may take to come to rest.
-const LAST_PATIENCE: Duration = Duration::from_secs(2);
+use crate::signals::SignalThread;
 
 /// Run a program on an arm
 ///
 /// Starts the engine and, unless told otherwise, the simulated driver, runs the program, prints a
 /// line for each command that is done, and ends both. The whole program is planned first: one that
-/// cannot be executed moves nothing. Ctrl-C stops on the path and ends; a second Ctrl-C aborts.
+/// cannot be executed moves nothing. Ctrl-C stops on the path and ends; a second Ctrl-C brakes as
+/// fast as the joints can. The arm waits for nobody who reads: where standard output is closed or
+/// not read, the program goes on to its end, lines are dropped and counted, and the exit code is 8.
 #[derive(Args, Debug)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -50,7 +46,7 @@ pub(crate) struct Run {
 
 impl Run {
     /// Runs the program to its end.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
         let program = self.program.read()?;
         program.report();
@@ -64,7 +60,10 @@ impl Run {
         {
             return Ok(Exit::Refused);
         }
-        let signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+        if self.json {
+            printer.expect_json();
+        }
+        let signals = SignalThread::start(printer, "once more to brake hard")?;
         let mut host = self.host.start(
             &robot,
             self.robot.place(),
@@ -85,15 +84,15 @@ impl Run {
         });
         let sink = sink.transpose()?.map(BufWriter::new);
         let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
-        let progress = Progress::new(io::stderr().is_terminal() && !self.json);
+        let progress = Progress::new(printer, io::stderr().is_terminal() && !self.json);
+        signals.steer(&host.session);
         Running {
             json: self.json,
             host,
             signals,
+            printer: printer.clone(),
             recording,
             progress,
-            signalled: 0,
-            deadline: None,
         }
         .finish_program(&program)
     }
@@ -121,11 +120,10 @@ impl Run {
 struct Running {
     json: bool,
     host: Host,
-    signals: Signals,
+    signals: SignalThread,
+    printer: Printer,
     recording: Recording<BufWriter<File>>,
     progress: Progress,
-    signalled: usize,
-    deadline: Option<Instant>,
 }
 
 impl Running {
@@ -140,18 +138,17 @@ impl Running {
         let last = ids.last().copied().unwrap_or(0);
         let mut done = 0;
         let exit = loop {
-            self.obey_signals();
+            if self.signals.has_stopped(&self.host.session) {
+                break Exit::Stopped;
+            }
             let note = self.host.turn()?;
             self.recording.take(&self.host.session.samples())?;
             self.progress.show(&self.host.session.status());
-            if self.deadline.is_some_and(|at| Instant::now() > at) {
-                break Exit::Stopped;
-            }
             if self.host.is_shut_down() {
                 break Exit::Stopped;
             }
             let Some(note) = note else { continue };
-            self.tell(&note)?;
+            self.tell(&note);
             done += usize::from(matches!(note, Note::Done { .. }));
             if let Some(exit) = self.over(&note, last) {
                 break exit;
@@ -165,7 +162,6 @@ impl Running {
         match note {
             Note::Done { id, .. } if *id == last => Some(Exit::Done),
             Note::Refused { id, dropped, .. } if *dropped > 0 || *id == last => Some(Exit::Refused),
-            Note::Stopped if self.signalled > 0 => Some(Exit::Stopped),
             Note::Aborted { .. } => Some(Exit::Stopped),
             Note::Faulted {
                 blame: Blame::Guard,
@@ -177,65 +173,42 @@ impl Running {
         }
     }
 
-    /// The first signal stops on the path, the second aborts.
-    fn obey_signals(&mut self) {
-        for _ in self.signals.pending() {
-            self.signalled += 1;
-            if self.signalled == 1 {
-                output::note("canter: stopping on the path; once more to abort");
-                self.host.session.control(Control::Stop { fast: false });
-                // An arm that rests already has nothing to report.
-                if self.host.session.status().idle {
-                    self.deadline = Some(Instant::now());
-                }
-            } else {
-                self.host.session.control(Control::Stop { fast: true });
-                self.deadline = Some(Instant::now() + LAST_PATIENCE);
-            }
-        }
-    }
-
     /// One line for what happened.
-    fn tell(&mut self, note: &Note) -> io::Result<()> {
-        self.progress.clear();
+    fn tell(&mut self, note: &Note) {
+        let printer = &self.printer;
         if self.json {
-            let mut out = io::stdout().lock();
-            serde_json::to_writer(&mut out, note)?;
-            return writeln!(out);
+            // A note has no key that is not a text: it can be written.
+            if let Ok(text) = serde_json::to_string(note) {
+                printer.line(&text);
+            }
+            return;
         }
-        let mut out = io::stdout().lock();
         match note {
             Note::Done {
                 line, name, ticks, ..
             } => {
                 let seconds = *ticks as f64 * self.recording.period();
-                writeln!(out, "done     line {line:4}  {name:30} {seconds:9.3} s")
+                printer.line(&format!(
+                    "done     line {line:4}  {name:30} {seconds:9.3} s"
+                ));
             }
-            Note::Message { text } => writeln!(out, "message  {text}"),
+            Note::Message { text } => printer.line(&format!("message  {text}")),
             Note::Refused {
                 line, name, error, ..
-            } => {
-                output::note(&format!(
-                    "canter: error: line {line}: {name}: {}",
-                    error.message
-                ));
-                Ok(())
-            }
-            Note::Faulted { reason, .. } => {
-                output::note(&format!("canter: error: {reason}"));
-                Ok(())
-            }
+            } => printer.note(&format!(
+                "canter: error: line {line}: {name}: {}",
+                error.message
+            )),
+            Note::Faulted { reason, .. } => printer.note(&format!("canter: error: {reason}")),
             Note::Ended { reason } if *reason > 0 => {
-                output::note(&format!("canter: the program ended with reason {reason}"));
-                Ok(())
+                printer.note(&format!("canter: the program ended with reason {reason}"));
             }
-            _ => Ok(()),
+            _ => {}
         }
     }
 
     /// Ends session and driver, writes the rest of the samples, sums up.
     fn finish(mut self, exit: Exit, done: usize, count: usize) -> Result<Exit, Failure> {
-        self.progress.clear();
         let duration = self.recording.duration();
         let status = self.host.session.status();
         // The sample of a period is complete when the next state came: the last ones are still out.
@@ -249,8 +222,8 @@ impl Running {
             exit => exit,
         };
         drop(self.host);
+        self.signals.release();
         self.recording.finish()?;
-        let mut out = io::stdout().lock();
         if self.json {
             let summary = json!({
                 "event": "summary",
@@ -264,19 +237,17 @@ impl Running {
                 "cycles": status.cycles,
                 "off_path_m": tracking,
             });
-            serde_json::to_writer(&mut out, &summary).map_err(io::Error::from)?;
-            writeln!(out)?;
+            self.printer.line(&summary.to_string());
             return Ok(exit);
         }
         let cycles = status.cycles;
-        writeln!(
-            out,
+        self.printer.line(&format!(
             "{done} of {count} commands done in {duration:.3} s; {} periods, {} of them late; \
              driver {driver} at most {:.3} mm off the path",
             cycles.ticks,
             cycles.skipped,
             tracking * 1e3
-        )?;
+        ));
         Ok(exit)
     }
 }

@@ -1,5 +1,5 @@
 use clap::Args;
-use ipc::Verb;
+use ipc::ControlAsk;
 
 use crate::client::ArmOption;
 use crate::exit::Exit;
@@ -7,7 +7,8 @@ use crate::failure::Failure;
 
 /// Come to rest on the path, now
 ///
-/// `canter resume` goes on from there, `canter abort` forgets the rest. This is not an emergency
+/// Waits until the arm rests and says where the motion is. `canter resume` goes on from there,
+/// `canter abort` forgets the rest. This is not an emergency
 /// stop: that is the robot's own.
 #[derive(Args, Debug)]
 pub(crate) struct Stop {
@@ -21,6 +22,6 @@ pub(crate) struct Stop {
 impl Stop {
     /// Asks the engine.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        self.arm.tell(Verb::Stop { fast: self.fast })
+        self.arm.control(ControlAsk::Stop { fast: self.fast }, true)
     }
 }

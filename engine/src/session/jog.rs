@@ -96,7 +96,7 @@ impl<const N: usize> Worker<'_, N> {
         if let Some(fault) = &self.fault {
             return Err(JogError::Fault(fault.clone()));
         }
-        if !self.flight.is_empty() || !self.queue.is_empty() {
+        if self.has_program() {
             return Err(JogError::Program);
         }
         let Some(jogging) = &mut self.jogging else {
@@ -122,7 +122,7 @@ impl<const N: usize> Worker<'_, N> {
         until: Instant,
     ) -> Result<(), JogError> {
         let now = self.remote.measured();
-        if now.held || self.held {
+        if now.held || self.is_held() {
             return Err(JogError::Held);
         }
         if !(now.idle && now.resting) {
@@ -168,6 +168,7 @@ impl<const N: usize> Worker<'_, N> {
             }
             Phase::Moving => {
                 jogging.phase = Phase::Ending;
+                self.jog_aborts += 1;
                 self.remote.control(Control::Abort);
             }
             Phase::Ending => {}

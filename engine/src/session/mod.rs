@@ -2,16 +2,20 @@
 //!
 //! A session owns a worker thread, which plans ahead of the executor and
 //! reports each command in order. The executor's real-time thread is its own.
+//! What an operator asks of the motion goes straight to the real-time thread;
+//! the worker, which may think for long, learns of it afterwards.
 
+mod inbox;
 mod jog;
 mod note;
 mod status;
 mod worker;
 
+use core::fmt;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{JoinHandle, sleep};
+use std::time::{Duration, Instant};
 
 use crcl::{LengthUnit, Located};
 use ipc::{Arm, Clock};
@@ -23,10 +27,11 @@ pub use note::{Blame, Note};
 pub use status::{Cycles, Status};
 
 use crate::queue::Full;
+use inbox::Inbox;
 use planner::dry_run::FailurePolicy;
 use planner::robot::{Robot, RobotError};
 use planner::with_dof;
-use servo::{Control, ExecutorError};
+use servo::{Control, ExecutorError, NoFault, Progress, Steering};
 
 /// How a session runs.
 #[derive(Clone, Debug)]
@@ -126,20 +131,43 @@ pub enum SubmitError {
     Closed,
 }
 
+/// How long the worker may go on thinking after the arm rests and the session is over; what it
+/// thinks about is then of no use to anybody.
+const LAST_THOUGHT: Duration = Duration::from_millis(500);
+
+/// How long the arm may take to come to rest at the end.
+const LAST_REST: Duration = Duration::from_secs(8);
+
 /// What is asked of the worker.
 enum Order {
-    Submit(Vec<Located>, Sender<Result<Vec<u32>, SubmitError>>),
-    Control(Control),
+    /// There is something new in the inbox.
+    Look,
     Jog(Jog, Sender<Result<(), JogError>>),
-    Recover,
     Close,
 }
 
 /// What both sides see.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Shared {
     status: Mutex<Status>,
     samples: Mutex<Vec<RunSample>>,
+    inbox: Mutex<Inbox>,
+}
+
+impl Shared {
+    /// The commands that wait. It is held for a few instructions only, never while planning.
+    fn inbox(&self) -> MutexGuard<'_, Inbox> {
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Fills in what is known of the moment without asking the worker.
+struct Live(Box<dyn Fn(&mut Status) + Send + Sync>);
+
+impl fmt::Debug for Live {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Live")
+    }
 }
 
 /// A running session on one arm. Dropping it stops the arm on the path.
@@ -149,6 +177,8 @@ pub struct Session {
     notes: Receiver<Note>,
     shared: Arc<Shared>,
     worker: Option<JoinHandle<()>>,
+    steering: Steering,
+    live: Live,
     /// What the operating system refused to the real-time thread, in one sentence.
     pub warning: Option<String>,
     /// The driver's name.
@@ -162,6 +192,8 @@ struct Begun {
     warning: Option<String>,
     driver: String,
     start: Vec<f64>,
+    steering: Steering,
+    live: Live,
 }
 
 impl Session {
@@ -174,7 +206,11 @@ impl Session {
         let (orders, receiver) = mpsc::channel();
         let (tell, notes) = mpsc::channel();
         let (begin, begun) = mpsc::sync_channel(1);
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(Shared {
+            status: Mutex::default(),
+            samples: Mutex::default(),
+            inbox: Mutex::new(Inbox::new(config.capacity)),
+        });
         let (robot, config, seen) = (robot.clone(), config.clone(), Arc::clone(&shared));
         let worker = std::thread::Builder::new()
             .name("planner".to_owned())
@@ -195,34 +231,51 @@ impl Session {
             warning,
             driver,
             start,
+            steering,
+            live,
         } = begun;
         Ok(Self {
             orders,
             notes,
             shared,
             worker: Some(worker),
+            steering,
+            live,
             warning,
             driver,
             start,
         })
     }
 
-    /// Appends commands to the queue: all of them or none.
+    /// Appends commands to the queue: all of them or none. Does not wait for the planner.
     ///
     /// # Errors
     /// [`SubmitError`], and the queue is as before.
     pub fn submit(&self, commands: Vec<Located>) -> Result<Vec<u32>, SubmitError> {
-        let (answer, answered) = mpsc::channel();
-        if self.orders.send(Order::Submit(commands, answer)).is_err() {
+        let ids = self.shared.inbox().submit(commands, &self.steering)?;
+        if self.orders.send(Order::Look).is_err() {
             return Err(SubmitError::Closed);
         }
-        answered.recv().unwrap_or(Err(SubmitError::Closed))
+        Ok(ids)
     }
 
-    /// Asks for a pause, a stop, another speed; it does not wait in the queue.
-    pub fn control(&self, control: Control) {
-        // A session that has ended has nothing left to control.
-        let _ = self.orders.send(Order::Control(control));
+    /// The hand on the motion, for a thread that has nothing else to do.
+    #[must_use]
+    pub fn steering(&self) -> Steering {
+        self.steering.clone()
+    }
+
+    /// Asks for a pause, a stop, another speed. It goes straight to the real-time thread and acts
+    /// in its next period, whatever the planner is doing. Gives the number of the order, for
+    /// [`Progress::has`].
+    pub fn control(&self, control: Control) -> u32 {
+        self.steering.control(control)
+    }
+
+    /// Where the motion is, as of the last servo period.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.steering.progress()
     }
 
     /// Moves by hand: goes on as long as requests come within each other's timeout, then stops on
@@ -231,6 +284,10 @@ impl Session {
     /// # Errors
     /// [`JogError`]: a program is under way, a fault is latched, there is no way in that direction.
     pub fn jog(&self, jog: Jog) -> Result<(), JogError> {
+        // While a program is under way the worker may be thinking; its answer is known.
+        if self.shared.inbox().is_busy() {
+            return Err(JogError::Program);
+        }
         let (answer, answered) = mpsc::channel();
         if self.orders.send(Order::Jog(jog, answer)).is_err() {
             return Err(JogError::Closed);
@@ -238,9 +295,13 @@ impl Session {
         answered.recv().unwrap_or(Err(JogError::Closed))
     }
 
-    /// Asks for a new agreement with the driver, which clears a latched fault.
-    pub fn recover(&self) {
-        let _ = self.orders.send(Order::Recover);
+    /// Asks for a new agreement with the driver, which clears the latched fault. Gives the number
+    /// of the fault: [`Progress::fault`] shows it until it is cleared.
+    ///
+    /// # Errors
+    /// [`NoFault`], and nothing is left behind that could act later.
+    pub fn recover(&self) -> Result<u32, NoFault> {
+        self.steering.recover()
     }
 
     /// The next thing that happened; none within the time. [`Note::Closed`] is the last.
@@ -253,14 +314,17 @@ impl Session {
         }
     }
 
-    /// Where the session is.
+    /// Where the session is. What belongs to the motion is of the last servo period, what belongs
+    /// to the program is as the planner left it.
     #[must_use]
     pub fn status(&self) -> Status {
-        self.shared
-            .status
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        let status = self.shared.status.lock();
+        let mut status = status.unwrap_or_else(PoisonError::into_inner).clone();
+        (self.live.0)(&mut status);
+        let inbox = self.shared.inbox();
+        status.queued = inbox.waiting();
+        status.idle &= !inbox.is_busy();
+        status
     }
 
     /// What was recorded since the last call.
@@ -282,11 +346,25 @@ impl Session {
     }
 
     fn end(&mut self) {
+        let Some(worker) = self.worker.take() else {
+            return;
+        };
+        // Straight to the real-time thread: the worker may be thinking.
+        self.steering.shut_down();
         let _ = self.orders.send(Order::Close);
-        if let Some(worker) = self.worker.take() {
+        let rest = Instant::now() + LAST_REST;
+        while !self.steering.progress().ended && !worker.is_finished() && Instant::now() < rest {
+            sleep(Duration::from_micros(500));
+        }
+        let patience = Instant::now() + LAST_THOUGHT;
+        while !worker.is_finished() && Instant::now() < patience {
+            sleep(Duration::from_micros(500));
+        }
+        if worker.is_finished() {
             // A worker that panicked has already said so.
             let _ = worker.join();
         }
+        // A worker that still plans is left to itself: it holds neither the driver nor a file.
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use ipc::Clock;
@@ -14,14 +14,13 @@ use trajectory::ToolLimits;
 use super::jog::Jogging;
 use super::note::{Blame, Note};
 use super::status::state_name;
-use super::{Begun, Order, RunSample, SessionConfig, SessionError, Shared, SubmitError};
-use crate::queue::{Full, Queue};
+use super::{Begun, Live, Order, RunSample, SessionConfig, SessionError, Shared, Status};
 use planner::controller::{Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
-    Control, Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, ToolOrder,
+    Event, Executor, ExecutorConfig, Fault, Feeder, Monitor, Recorded, Remote, Steering, ToolOrder,
 };
 
 /// How many commands are planned ahead of the one that moves.
@@ -64,16 +63,23 @@ pub(super) struct Worker<'a, const N: usize> {
     /// Largest speeds of the controlled point, for jogs.
     pub(super) most: ToolLimits,
     pub(super) controller: Controller<N>,
-    pub(super) queue: Queue,
     pub(super) feeder: Feeder<N>,
     monitor: Monitor<N>,
     pub(super) remote: Remote<N>,
+    steering: Steering,
+    /// How many aborts were carried out: what was given at another age waits or is dropped.
+    age: u32,
+    /// Aborts of jogs that are under way.
+    pub(super) jog_aborts: u32,
+    /// The chain in force, for who asks where the controlled point is.
+    seen: Arc<Mutex<Chain<N>>>,
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     pub(super) jogging: Option<Jogging>,
     /// Tool in force for recorded samples, of the last commands that were reported.
     chains: VecDeque<(u32, Chain<N>)>,
-    pub(super) held: bool,
+    /// Number of the newest order when a refusal held the arm; a later `Resume` lets it go.
+    held: Option<u32>,
     pub(super) fault: Option<String>,
     closing: bool,
     ends: Ends,
@@ -98,6 +104,8 @@ pub(super) fn run<const N: usize>(
         warning: executor.warning.clone(),
         driver: executor.driver.clone(),
         start: worker.controller.joints().as_slice().to_vec(),
+        steering: worker.steering.clone(),
+        live: worker.live(),
     };
     worker.write_status(robot, &executor.driver);
     let _ = begin.send(Ok(begun));
@@ -105,6 +113,7 @@ pub(super) fn run<const N: usize>(
         worker.turn();
         worker.write_status(robot, &executor.driver);
     }
+    worker.ends.shared.inbox().close();
     executor.shutdown();
     worker.read_reports();
     worker.say(Note::Closed);
@@ -137,16 +146,19 @@ fn start<'a, const N: usize>(
     let worker = Worker {
         config,
         most: robot.motion_limits(),
-        queue: Queue::new(config.capacity),
         chains: VecDeque::from([(0, *controller.chain())]),
+        seen: Arc::new(Mutex::new(*controller.chain())),
         controller,
         feeder,
         monitor,
+        steering: remote.steering(),
+        age: remote.steering().aborts(),
+        jog_aborts: 0,
         remote,
         work: VecDeque::new(),
         flight: VecDeque::new(),
         jogging: None,
-        held: false,
+        held: None,
         fault: None,
         closing: false,
         ends,
@@ -175,14 +187,23 @@ impl<const N: usize> Worker<'_, N> {
     fn may_take(&self) -> bool {
         self.flight.len() < AHEAD
             && self.work.is_empty()
-            && !self.held
+            && !self.is_held()
             && self.fault.is_none()
-            && !self.queue.is_empty()
             && self.jogging.is_none()
+            // While an abort is under way nobody knows where the next command begins.
+            && self.steering.aborts() == self.age
+            && self.ends.shared.inbox().has(self.age)
+    }
+
+    /// Whether a refusal holds the arm until a `Resume` comes.
+    pub(super) fn is_held(&self) -> bool {
+        self.held
+            .is_some_and(|order| !self.steering.was_resumed_after(order))
     }
 
     fn read_orders(&mut self) {
-        let busy = !self.work.is_empty() || (!self.queue.is_empty() && self.flight.len() < AHEAD);
+        let waiting = !self.ends.shared.inbox().is_empty() && self.flight.len() < AHEAD;
+        let busy = !self.work.is_empty() || waiting;
         // In lock-step the other side waits for us.
         let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();
         let wait = Duration::from_micros(if busy || stepping { 20 } else { 500 });
@@ -199,58 +220,29 @@ impl<const N: usize> Worker<'_, N> {
 
     fn obey(&mut self, order: Order) {
         match order {
-            Order::Submit(commands, answer) => {
-                let result = self.submit(commands);
-                // The client may have gone; its commands stay.
-                let _ = answer.send(result);
-            }
-            Order::Control(control) => self.control(control),
+            // It was waited for; the inbox is looked at in every turn.
+            Order::Look => {}
             Order::Jog(jog, answer) => {
                 let result = self.jog(jog);
                 // Who asked may have gone; the dead man's switch ends the jog.
                 let _ = answer.send(result);
             }
-            Order::Recover => self.remote.recover(),
             Order::Close => self.closing = true,
         }
     }
 
-    fn submit(&mut self, commands: Vec<crcl::Located>) -> Result<Vec<u32>, SubmitError> {
-        if let Some(fault) = &self.fault {
-            return Err(SubmitError::Fault(fault.clone()));
-        }
-        if self.queue.len() + commands.len() > self.config.capacity {
-            return Err(SubmitError::Full(Full {
-                capacity: self.config.capacity,
-            }));
-        }
-        let mut ids = Vec::with_capacity(commands.len());
-        for located in commands {
-            if let crcl::Command::StopMotion { emergency } = located.command
-                && !self.flight.is_empty()
-            {
-                // A stop does not wait behind what it is to stop.
-                self.control(Control::Stop {
-                    fast: emergency != 0,
-                });
-            }
-            ids.push(self.queue.push(located)?);
-        }
-        Ok(ids)
-    }
-
-    fn control(&mut self, control: Control) {
-        if control == Control::Resume {
-            self.held = false;
-        }
-        self.remote.control(control);
+    /// Whether commands wait or are under way.
+    pub(super) fn has_program(&self) -> bool {
+        !self.flight.is_empty() || !self.ends.shared.inbox().is_empty()
     }
 
     /// Takes the next command off the queue and turns it into work.
     fn take_next(&mut self) {
-        let Some(queued) = self.queue.pop() else {
+        let Some(queued) = self.ends.shared.inbox().take(self.age) else {
             return;
         };
+        // Read before the command is looked at: who resumes later has seen what it came to.
+        let newest = self.steering.newest();
         let command = &queued.located.command;
         let mut flight = InFlight {
             id: queued.id,
@@ -272,10 +264,10 @@ impl<const N: usize> Worker<'_, N> {
                 let dropped = match self.config.on_refusal {
                     FailurePolicy::Abort => {
                         self.controller.abort();
-                        self.queue.flush()
+                        self.ends.shared.inbox().drop_all(None)
                     }
                     FailurePolicy::Hold => {
-                        self.held = true;
+                        self.held = Some(newest);
                         0
                     }
                     FailurePolicy::Skip => 0,
@@ -385,15 +377,18 @@ impl<const N: usize> Worker<'_, N> {
                 self.report_done();
             }
             Event::Stopped { .. } => self.say(Note::Stopped),
-            Event::Aborted { .. } if self.rest_from_jog() => {}
-            Event::Aborted { .. } => {
-                let dropped = self.drop_all();
-                self.say(Note::Aborted { dropped });
+            Event::Aborted { aborts, .. } => {
+                let asked = aborts.wrapping_sub(self.age);
+                let ours = asked <= self.jog_aborts;
+                self.jog_aborts = self.jog_aborts.saturating_sub(asked);
+                self.age = aborts;
+                self.on_abort(ours);
             }
             Event::Faulted { fault, tick } => {
                 let (blame, reason) = (blame(&fault), fault.to_string());
-                let dropped = self.drop_all();
+                let dropped = self.drop_all(None);
                 self.fault = Some(reason.clone());
+                self.ends.shared.inbox().set_fault(self.fault.clone());
                 self.say(Note::Faulted {
                     blame,
                     reason,
@@ -402,8 +397,9 @@ impl<const N: usize> Worker<'_, N> {
                 });
             }
             Event::Recovered { .. } => {
-                let dropped = self.drop_all();
+                let dropped = self.drop_all(None);
                 self.fault = None;
+                self.ends.shared.inbox().set_fault(None);
                 tracing::debug!(dropped, "recovered");
                 self.say(Note::Recovered);
             }
@@ -411,14 +407,35 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Forgets all that is planned or queued and begins again from where the arm is.
-    fn drop_all(&mut self) -> usize {
-        let dropped = self.queue.flush() + self.flight.len();
+    /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. What
+    /// was given before drops with the latter only.
+    fn on_abort(&mut self, ends_jog: bool) {
+        if ends_jog {
+            self.ends.shared.inbox().renew(self.age);
+        }
+        if !self.rest_from_jog() {
+            let dropped = self.drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
+        } else if !ends_jog {
+            let dropped = self.ends.shared.inbox().drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
+        }
+    }
+
+    /// Forgets all that is planned or queued, but what was given at `age`, and begins again from
+    /// where the arm is.
+    fn drop_all(&mut self, age: Option<u32>) -> usize {
+        let dropped = self.flight.len();
         self.work.clear();
         self.flight.clear();
+        let dropped = dropped + {
+            let mut inbox = self.ends.shared.inbox();
+            inbox.set_flying(0);
+            inbox.drop_all(age)
+        };
         self.jogging = None;
         self.feeder.renew();
-        self.held = false;
+        self.held = None;
         self.controller.abort();
         self.controller.set_joints(self.remote.measured().setpoint);
         dropped
@@ -487,7 +504,8 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     fn write_status(&self, robot: &Robot, driver: &str) {
-        let now = self.remote.measured();
+        *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = *self.controller.chain();
+        self.ends.shared.inbox().set_flying(self.flight.len());
         let mut status = self
             .ends
             .shared
@@ -500,17 +518,26 @@ impl<const N: usize> Worker<'_, N> {
         status.state = state_name(self.controller.modal().state());
         let jog = self.jogging.as_ref().map(|_| "jog");
         status.command = self.flight.front().map(|flight| flight.name).or(jog);
-        status.queued = self.queue.len() + self.flight.len().saturating_sub(1);
-        status.idle =
-            now.idle && self.flight.is_empty() && self.queue.is_empty() && self.jogging.is_none();
-        status.held = now.held || self.held;
+        status.idle = self.flight.is_empty() && self.jogging.is_none();
+        status.held = self.is_held();
         status.fault.clone_from(&self.fault);
-        status.path_rate = now.path_rate;
-        status.joints = now.position.as_slice().to_vec();
-        status.setpoint = now.setpoint.as_slice().to_vec();
-        status.set_pose(&self.controller.chain().forward(&now.position));
         status.settings = Some(self.controller.modal().settings().clone());
-        status.cycles = self.remote.counters().into();
+    }
+
+    /// What fills in a status without this thread.
+    fn live(&self) -> Live {
+        let (remote, chain) = (self.remote.clone(), Arc::clone(&self.seen));
+        Live(Box::new(move |status: &mut Status| {
+            let now = remote.measured();
+            status.idle &= now.idle;
+            status.held |= now.held;
+            status.path_rate = now.path_rate;
+            status.joints = now.position.as_slice().to_vec();
+            status.setpoint = now.setpoint.as_slice().to_vec();
+            let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
+            status.set_pose(&chain.forward(&now.position));
+            status.cycles = remote.counters().into();
+        }))
     }
 
     pub(super) fn say(&self, note: Note) {

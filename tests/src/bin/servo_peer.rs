@@ -54,7 +54,11 @@ fn engine(arm: &str) -> Outcome {
     thread::spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
             match line.as_str() {
-                "recover" => remote.recover(),
+                "recover" => {
+                    if let Err(error) = remote.recover() {
+                        say(&error.to_string());
+                    }
+                }
                 "starve" => STARVE.store(true, Ordering::Relaxed),
                 _ => {}
             }

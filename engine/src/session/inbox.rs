@@ -1,0 +1,124 @@
+//! The commands that wait, where who gives them and who plans them meet.
+
+use crcl::{Command, Located};
+
+use super::SubmitError;
+use crate::queue::{Full, Queue, Queued};
+use servo::{Control, Steering};
+
+/// The queue with what decides whether commands are taken.
+#[derive(Debug)]
+pub(super) struct Inbox {
+    queue: Queue,
+    capacity: usize,
+    /// Commands that left the queue and are not reported yet.
+    flying: usize,
+    /// The fault that is latched, until the worker has seen that it is cleared.
+    fault: Option<String>,
+    closed: bool,
+}
+
+impl Inbox {
+    /// An empty inbox for at most `capacity` commands.
+    pub(super) fn new(capacity: usize) -> Self {
+        Self {
+            queue: Queue::new(capacity),
+            capacity,
+            flying: 0,
+            fault: None,
+            closed: false,
+        }
+    }
+
+    /// Appends commands: all of them or none. A stop among them does not wait behind what it is
+    /// to stop.
+    pub(super) fn submit(
+        &mut self,
+        commands: Vec<Located>,
+        steering: &Steering,
+    ) -> Result<Vec<u32>, SubmitError> {
+        if self.closed {
+            return Err(SubmitError::Closed);
+        }
+        if let Some(fault) = &self.fault {
+            return Err(SubmitError::Fault(fault.clone()));
+        }
+        if steering.progress().fault != 0 {
+            return Err(SubmitError::Fault("it was just found".to_owned()));
+        }
+        if self.queue.len() + commands.len() > self.capacity {
+            return Err(SubmitError::Full(Full {
+                capacity: self.capacity,
+            }));
+        }
+        let age = steering.aborts();
+        let mut ids = Vec::with_capacity(commands.len());
+        for located in commands {
+            if let Command::StopMotion { emergency } = located.command
+                && self.flying > 0
+            {
+                steering.control(Control::Stop {
+                    fast: emergency != 0,
+                });
+            }
+            ids.push(self.queue.push(located, age)?);
+        }
+        Ok(ids)
+    }
+
+    /// Takes the oldest command off the queue, if it was given at `age`.
+    pub(super) fn take(&mut self, age: u32) -> Option<Queued> {
+        self.queue.front().filter(|queued| queued.age == age)?;
+        self.flying += 1;
+        self.queue.pop()
+    }
+
+    /// Whether a command of this age can be taken.
+    pub(super) fn has(&self, age: u32) -> bool {
+        self.queue.front().is_some_and(|queued| queued.age == age)
+    }
+
+    /// What waits counts as given at `age`.
+    pub(super) fn renew(&mut self, age: u32) {
+        self.queue.renew(age);
+    }
+
+    /// Drops what waits and, unless it is given, what was given at another age than `age`;
+    /// returns how many commands that were.
+    pub(super) fn drop_all(&mut self, age: Option<u32>) -> usize {
+        match age {
+            Some(age) => self.queue.keep(age),
+            None => self.queue.flush(),
+        }
+    }
+
+    /// Tells how many commands have left the queue and are not reported yet.
+    pub(super) fn set_flying(&mut self, flying: usize) {
+        self.flying = flying;
+    }
+
+    /// Tells which fault is latched.
+    pub(super) fn set_fault(&mut self, fault: Option<String>) {
+        self.fault = fault;
+    }
+
+    /// Takes no more commands.
+    pub(super) fn close(&mut self) {
+        self.closed = true;
+    }
+
+    /// Whether a command waits or is under way.
+    pub(super) fn is_busy(&self) -> bool {
+        self.flying > 0 || !self.queue.is_empty()
+    }
+
+    /// How many commands wait behind the one that moves.
+    pub(super) fn waiting(&self) -> usize {
+        self.queue.len() + self.flying.saturating_sub(1)
+    }
+
+    /// Whether no command is in the queue.
+    pub(super) fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+}

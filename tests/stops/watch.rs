@@ -1,0 +1,139 @@
+//! Who sees all setpoints of an arm, and says when it became slower.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::{JoinHandle, sleep};
+use std::time::{Duration, Instant};
+
+use ipc::{Arm, Observer};
+use kinematics::Chain;
+
+use crate::Taken;
+
+/// How long a test waits for something that must come.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What is kept of a setpoint.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    published_ns: u64,
+    sequence: u64,
+    path_rate: f64,
+    resting: bool,
+    joints: [f64; 6],
+}
+
+/// A thread that reads all setpoints.
+pub(crate) struct Watch {
+    seen: Arc<Mutex<Vec<Seen>>>,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    chain: Chain<6>,
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+impl Watch {
+    pub(crate) fn start(arm: &Arm) -> Self {
+        let (seen, ends) = (Arc::default(), Arc::new(AtomicBool::new(false)));
+        let (arm, list, stop) = (arm.clone(), Arc::clone(&seen), Arc::clone(&ends));
+        let thread = std::thread::spawn(move || read(&arm, &list, &stop));
+        let robot = planner::robot::load("ur5e").unwrap();
+        let chain = robot.chain::<6>().unwrap();
+        Self {
+            seen,
+            ends,
+            thread: Some(thread),
+            chain,
+        }
+    }
+
+    /// Waits until the arm moves at the planned speed.
+    pub(crate) fn wait_for_speed(&self) {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let last = self.seen.lock().unwrap().last().copied();
+            if last.is_some_and(|last| last.path_rate >= 1.0 && !last.resting) {
+                return;
+            }
+            assert!(Instant::now() < end, "the arm does not move: {last:?}");
+            sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// What a stop took that was called at `called` (ns); forgets what was seen. None where the
+    /// arm was at rest between two commands just then, or where setpoints were not seen.
+    pub(crate) fn taken(&self, called: u64) -> Option<Taken> {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let rests = {
+                let seen = self.seen.lock().unwrap();
+                let after = seen.iter().filter(|seen| seen.published_ns > called);
+                after.clone().count() > 5 && after.last().is_some_and(|seen| seen.resting)
+            };
+            if rests {
+                break;
+            }
+            assert!(Instant::now() < end, "the arm does not rest");
+            sleep(Duration::from_millis(1));
+        }
+        let seen = std::mem::take(&mut *self.seen.lock().unwrap());
+        let before = seen.iter().rposition(|seen| seen.published_ns <= called)?;
+        if seen[before].resting || seen[before].path_rate < 1.0 {
+            return None;
+        }
+        let slower = (before + 1..seen.len()).find(|at| seen[*at].path_rate < 1.0)?;
+        let rest = (slower..seen.len()).find(|at| seen[*at].resting)?;
+        let whole = seen[before..=rest]
+            .windows(2)
+            .all(|pair| pair[1].sequence == pair[0].sequence + 1);
+        if !whole {
+            return None;
+        }
+        let ms = |at: usize| (seen[at].published_ns - called) as f64 * 1e-6;
+        let way = |at: usize| self.way(&seen[before..=at]);
+        Some(Taken {
+            effect_ms: ms(slower),
+            effect_mm: way(slower),
+            rest_ms: ms(rest),
+            rest_mm: way(rest),
+        })
+    }
+
+    /// The way of the controlled point (mm).
+    fn way(&self, seen: &[Seen]) -> f64 {
+        let places = seen.iter().map(|seen| {
+            let joints = nalgebra::SVector::<f64, 6>::from(seen.joints);
+            self.chain.forward(&joints).translation.vector
+        });
+        let places: Vec<_> = places.collect();
+        let steps = places.windows(2).map(|pair| (pair[1] - pair[0]).norm());
+        steps.sum::<f64>() * 1e3
+    }
+}
+
+fn read(arm: &Arm, list: &Mutex<Vec<Seen>>, stop: &AtomicBool) {
+    let observer = Observer::open(arm).unwrap();
+    while !stop.load(Ordering::Relaxed) {
+        while let Some(setpoint) = observer.next_setpoint() {
+            let resting = setpoint.flags & ipc::SetpointFlags::HOLD != 0;
+            let mut joints = [0.0; 6];
+            joints.copy_from_slice(&setpoint.position[..6]);
+            list.lock().unwrap().push(Seen {
+                published_ns: setpoint.published_ns,
+                sequence: setpoint.sequence,
+                path_rate: setpoint.path_rate,
+                resting,
+                joints,
+            });
+        }
+        sleep(Duration::from_millis(2));
+    }
+}
