@@ -13,6 +13,7 @@
 
 mod client;
 mod commands;
+mod damage;
 mod equipment;
 mod exit;
 mod failure;
@@ -82,7 +83,10 @@ pub fn main() -> ExitCode {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => failure.report(&printer),
         // The panic hook has told where; a panic is our mistake, whatever the input was.
-        Err(_) => Exit::Internal,
+        Err(_) => {
+            damage::tell();
+            Exit::Internal
+        }
     };
     let exit = match (printer.finish(), exit) {
         (1.., Exit::Done) => Exit::OutputLost,

@@ -21,6 +21,7 @@ mod planned_once;
 mod plans;
 mod runs;
 mod session;
+mod shared_memory;
 mod soak;
 mod world_in_use;
 
