@@ -10,6 +10,7 @@ import time
 from xml.etree import ElementTree
 
 try:
+    import iceoryx2  # noqa: F401 (the kit needs it to run)
     import mujoco
 
     from canter_driver import Robot, messages, run
@@ -22,8 +23,8 @@ REST = 1e-9
 LISTS = {
     "home": "positions at the start (rad)",
     "velocity": "largest speeds (rad/s)",
-    "acceleration": "what the driver's own stop may use (rad/s2)",
-    "jerk": "what the driver's own stop may use (rad/s3)",
+    "acceleration": "largest accelerations (rad/s2)",
+    "jerk": "largest jerks (rad/s3)",
 }
 
 
@@ -160,11 +161,8 @@ def main():
     if words.until_end_of_input:
         threading.Thread(target=until_end_of_input, args=[stop], daemon=True).start()
     lists = {name: getattr(words, name) for name in LISTS}
-    try:
-        robot = Physics(words.urdf, words.joints, lists, words.viewer)
-        run(words.arm, robot, stop.is_set, lambda: print("ready", flush=True))
-    except KeyboardInterrupt:
-        pass
+    robot = Physics(words.urdf, words.joints, lists, words.viewer)
+    run(words.arm, robot, stop.is_set, lambda: print("ready", flush=True))
 
 
 if __name__ == "__main__":

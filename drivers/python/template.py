@@ -14,12 +14,13 @@ class MyRobot(Robot):
     """Six joints that are at once where they shall be."""
 
     name = "my robot"
-    # HERE: the ranges (rad), speeds (rad/s), and what your own stop may use (rad/s2, rad/s3).
-    lower = [-6.28] * 6
-    upper = [6.28] * 6
-    velocity = [3.14] * 6
-    acceleration = [10.0] * 6
-    jerk = [100.0] * 6
+    # HERE: the ranges (rad), and the most of speed (rad/s), acceleration (rad/s2) and jerk (rad/s3):
+    # at least what the robot's folder has.
+    lower = [-6.3] * 6
+    upper = [6.3] * 6
+    velocity = [3.2] * 6
+    acceleration = [20.0] * 6
+    jerk = [400.0] * 6
 
     def __init__(self):
         self.position = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
@@ -45,7 +46,5 @@ class MyRobot(Robot):
 
 
 if __name__ == "__main__":
-    try:
-        run(sys.argv[1] if len(sys.argv) > 1 else "cell/arm", MyRobot())
-    except KeyboardInterrupt:
-        pass
+    # Until Ctrl-C or SIGTERM: the kit brakes the arm first.
+    run(sys.argv[1] if len(sys.argv) > 1 else "cell/arm", MyRobot())

@@ -7,6 +7,7 @@
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
 //! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
 //!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
+//! - [`Observer`] sees the cyclic messages of an arm and takes part in nothing.
 //!
 //! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
 //! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
@@ -61,7 +62,7 @@ pub const TOOL_CHANGER: usize = 1;
 /// The version of the driver protocol. Both sides must have the same.
 pub const PROTOCOL: u32 = 1;
 
-/// A checksum of the byte layout of the two cyclic messages; part of the handshake, so that a
+/// A checksum of the byte layout of the messages and of the number of fault codes; part of the handshake, so that a
 /// driver built from other headers is refused before it moves.
 ///
 /// # Source
@@ -81,6 +82,7 @@ pub const fn schema_checksum() -> u64 {
         core::mem::offset_of!(State, digital_inputs),
         size_of::<Hello>(),
         size_of::<HelloAck>(),
+        FaultCode::COUNT,
     ];
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
     let mut index = 0;

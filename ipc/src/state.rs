@@ -60,15 +60,22 @@ pub enum FaultCode {
     Watchdog = 1,
     /// A setpoint that makes no sense.
     BadSetpoint = 2,
-    /// A setpoint that asks for a jump, or is out of the joint's range.
+    /// A setpoint that asks for a jump, or is out of the joint's range, speed or acceleration.
     OutOfRange = 3,
     /// The engine asked for it.
     StopRequest = 4,
     /// The hardware has a fault of its own.
     Hardware = 5,
+    /// The driver itself was stopped for longer than the watchdog time.
+    Stalled = 6,
+    /// The driver was told to end.
+    Ended = 7,
 }
 
 impl FaultCode {
+    /// How many there are, [`Self::None`] included.
+    pub(crate) const COUNT: usize = 8;
+
     /// The fault that a number on the wire stands for.
     pub const fn from_number(number: u32) -> Option<Self> {
         match number {
@@ -78,6 +85,8 @@ impl FaultCode {
             3 => Some(Self::OutOfRange),
             4 => Some(Self::StopRequest),
             5 => Some(Self::Hardware),
+            6 => Some(Self::Stalled),
+            7 => Some(Self::Ended),
             _ => None,
         }
     }
@@ -88,9 +97,11 @@ impl FaultCode {
             Self::None => "no fault",
             Self::Watchdog => "no setpoint within the watchdog time",
             Self::BadSetpoint => "a setpoint made no sense",
-            Self::OutOfRange => "a setpoint was out of range or asked for a jump",
+            Self::OutOfRange => "a setpoint was out of range, too fast, or asked for a jump",
             Self::StopRequest => "the engine asked for a stop",
             Self::Hardware => "a fault of the hardware",
+            Self::Stalled => "the driver itself did not run for longer than the watchdog time",
+            Self::Ended => "the driver was told to end",
         }
     }
 }

@@ -322,6 +322,8 @@ fn constants() -> Vec<(&'static str, u64)> {
         number("CANTER_FAULT_OUT_OF_RANGE", FaultCode::OutOfRange as u32),
         number("CANTER_FAULT_STOP_REQUEST", FaultCode::StopRequest as u32),
         number("CANTER_FAULT_HARDWARE", FaultCode::Hardware as u32),
+        number("CANTER_FAULT_STALLED", FaultCode::Stalled as u32),
+        number("CANTER_FAULT_ENDED", FaultCode::Ended as u32),
         number("CANTER_WELCOME", Verdict::Welcome as u32),
         number("CANTER_WRONG_PROTOCOL", Verdict::WrongProtocol as u32),
         number("CANTER_WRONG_SCHEMA", Verdict::WrongSchema as u32),

@@ -22,7 +22,7 @@ fn the_simulated_driver_conforms() {
             for clause in &clauses {
                 println!("{:?} {}: {}", clause.verdict, clause.name, clause.seen);
             }
-            assert_eq!(clauses.len(), 18);
+            assert_eq!(clauses.len(), 20);
             clauses.iter().all(|clause| clause.verdict == Verdict::Pass)
         });
         assert!(passed);

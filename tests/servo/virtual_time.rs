@@ -376,7 +376,7 @@ fn a_clock_that_jumps() {
     assert!(bench.events().iter().any(stalled));
 }
 
-/// The same for the driver: an hour without a setpoint, by its clock, is a stop within its own
+/// The same for the driver: an hour without a period, by its clock, is a stop within its own
 /// limits from where it was; a clock that goes back moves nothing.
 #[test]
 fn a_clock_that_jumps_at_the_driver() {
@@ -397,6 +397,7 @@ fn a_clock_that_jumps_at_the_driver() {
             joints: JOINTS as u32,
             session: ack.session,
             sequence: number + 1,
+            published_ns: now,
             period_ns: PERIOD,
             watchdog_ns: 100_000_000,
             ..Setpoint::default()
@@ -426,7 +427,7 @@ fn a_clock_that_jumps_at_the_driver() {
     }
     assert_eq!(
         (last.driver(), last.fault_code()),
-        (DriverState::Fault, FaultCode::Watchdog)
+        (DriverState::Fault, FaultCode::Stalled)
     );
     for pair in positions.windows(2) {
         for joint in 0..JOINTS {

@@ -9,3 +9,4 @@ pub mod motion;
 pub mod repository;
 pub mod servo_arm;
 pub mod signal;
+pub mod witness;

@@ -42,7 +42,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ("servo", &["realtime", "ipc", "scheduling"]),
     ("planner", &["crcl", "kinematics", "trajectory", "realtime"]),
     ("trajectory", &["realtime"]),
-    ("driver-kit", &["ipc", "realtime", "scheduling"]),
+    ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),

@@ -76,6 +76,100 @@ fn the_simulated_driver_passes_its_test() {
     assert_eq!(health("limits of robot and driver"), Some("ok".into()));
 }
 
+/// Waits until a joint of `arm` moves with more than 0.05 rad/s.
+fn wait_for_motion(arm: &str) {
+    let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(60) {
+        if let Some(state) = observer.next_state() {
+            let following = state.driver() == ipc::DriverState::Active;
+            if following && state.velocity.iter().any(|speed| speed.abs() > 0.05) {
+                return;
+            }
+        } else {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    panic!("{arm} does not move");
+}
+
+/// A driver that is told to end in motion, twice: it brakes, says so, and the engine names it.
+fn ends_in_motion(mut driver: Command, name: &str, signal: i32) {
+    let arm = arm(name);
+    let driver = driver.arg(&arm).stderr(Stdio::piped()).spawn().unwrap();
+    let program = "examples/pick_and_place.canon";
+    let words = ["run", program, "-r", "ur5e", "--arm", &arm];
+    let run = command([&words[..], &["--driver", "external"]].concat())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_for_motion(&arm);
+    system_tests::signal::send(&driver, signal);
+    std::thread::sleep(Duration::from_millis(20));
+    system_tests::signal::send(&driver, signal);
+    let driver = driver.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&driver.stderr).into_owned();
+    assert!(driver.status.success(), "{}: {said}", driver.status);
+    assert!(
+        said.contains("braked to rest within the joint limits"),
+        "{said}"
+    );
+    let run = run.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(said.contains("the driver was told to end"), "{said}");
+    assert!(!run.status.success(), "{said}");
+}
+
+#[test]
+fn a_simulated_driver_that_ends_brakes_first() {
+    for (name, signal) in [
+        ("int", libc::SIGINT),
+        ("term", libc::SIGTERM),
+        ("hup", libc::SIGHUP),
+    ] {
+        let sim = command(["driver", "sim", "--robot", "ur5e", "--arm"]);
+        ends_in_motion(sim, name, signal);
+    }
+}
+
+/// The template in Python, where Python has iceoryx2.
+#[test]
+fn a_python_driver_that_ends_brakes_first() {
+    if !python_has("iceoryx2") {
+        return println!("ignored: python3 has no iceoryx2 (pip install iceoryx2==0.9.3)");
+    }
+    for (name, signal) in [("python-int", libc::SIGINT), ("python-hup", libc::SIGHUP)] {
+        let mut python = Command::new("python3");
+        system_tests::domain::join(&mut python);
+        python.arg("-B");
+        python.arg(system_tests::repository::root().join("drivers/python/template.py"));
+        ends_in_motion(python, name, signal);
+    }
+}
+
+/// The Python kit keeps the laws of the Rust kit, in virtual time.
+#[test]
+fn the_python_kit_keeps_the_limits() {
+    let laws = system_tests::repository::root().join("drivers/python/tests/laws.py");
+    let ran = Command::new("python3").arg("-B").arg(laws).output();
+    let ran = match ran {
+        Err(error) => return println!("ignored: no python3 ({error})"),
+        Ok(ran) => ran,
+    };
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert!(ran.status.success(), "{said}");
+}
+
+/// Whether Python can import a package.
+fn python_has(package: &str) -> bool {
+    let status = Command::new("python3")
+        .args(["-c", &format!("import {package}")])
+        .stderr(Stdio::null())
+        .status();
+    status.is_ok_and(|status| status.success())
+}
+
 #[test]
 fn without_a_driver_nothing_is_tested() {
     let arm = arm("nobody");
@@ -108,12 +202,8 @@ fn mujoco_without_its_python_says_so() {
 /// The README's promise: a physics simulation drives the same program, twice the same.
 #[test]
 fn mujoco_in_step_is_the_same_every_time() {
-    let packages = Command::new("python3")
-        .args(["-c", "import mujoco, iceoryx2"])
-        .stderr(Stdio::null())
-        .status();
-    if !packages.is_ok_and(|status| status.success()) {
-        println!("skipped: python3 has no mujoco or no iceoryx2");
+    if !python_has("mujoco, iceoryx2") {
+        println!("ignored: python3 has no mujoco or no iceoryx2");
         return;
     }
     let folder = tempfile::tempdir().unwrap();

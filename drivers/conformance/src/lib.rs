@@ -90,7 +90,7 @@ pub fn test_driver(arm: &Arm) -> Result<Report, IpcError> {
     ];
     clauses.extend(requests.map(|(name, change)| judge(name, player.refuses(change))));
     let driver = text_of(&player.ack.name);
-    let sessions: [Named<Trial>; 13] = [
+    let sessions: [Named<Trial>; 15] = [
         ("states come at the rate", Player::rate),
         ("a setpoint of another session is ignored", Player::foreign),
         ("becomes active by holding", Player::holds),
@@ -105,6 +105,10 @@ pub fn test_driver(arm: &Arm) -> Result<Report, IpcError> {
         ("a number that is not finite latches", |player| {
             player.spoil(|s| s.position[0] = f64::NAN)
         }),
+        ("an acceleration beyond any limit latches", |player| {
+            player.spoil(|setpoint| setpoint.acceleration[0] = 1e6)
+        }),
+        ("setpoints that are too old are silence", Player::outdated),
         ("a stop request stops and latches", |player| {
             player.spoil(|setpoint| setpoint.flags |= SetpointFlags::STOP_REQUEST)
         }),
@@ -397,6 +401,18 @@ impl Player {
         }
         self.hold(100);
         self.expect(&[DriverState::Fault], &seen)
+    }
+
+    /// Setpoints that were sent longer ago than the watchdog, by their own word.
+    fn outdated(&mut self) -> Seen {
+        self.hold(100);
+        for _ in 0..100 {
+            let mut setpoint = self.setpoint([0.0; 3]);
+            setpoint.published_ns = setpoint.published_ns.saturating_sub(2 * WATCHDOG);
+            self.period(Some(setpoint));
+        }
+        let reason = format!("{}; ", self.state.fault_code().reason());
+        self.expect(&[DriverState::Stopping, DriverState::Fault], &reason)
     }
 
     /// Holds, sends one setpoint that is spoilt, holds again: the driver must have latched.

@@ -1,9 +1,7 @@
 //! A driver for a robot of your own: fill in the places marked HERE. Run it, then let Canter drive:
 //!     cargo run --release -p driver-kit --example template -- cell/arm
 //!     canter run PROGRAM --robot ur5e --driver external --arm cell/arm
-use std::sync::atomic::AtomicBool;
-
-use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, run};
+use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, asked_to_end, run};
 use ipc::{GRIPPER, ToolAction, ToolStatus};
 
 /// Six joints that are at once where they shall be.
@@ -11,14 +9,15 @@ struct MyRobot([Measured; 6], ToolStatus);
 
 impl Robot for MyRobot {
     fn about(&self) -> About {
-        // HERE: ranges (rad), speeds (rad/s), and what your own stop may use (rad/s2, rad/s3).
+        // HERE: ranges (rad), and the most of speed (rad/s), acceleration (rad/s2), jerk (rad/s3):
+        // at least what the robot's folder has.
         About {
             name: "my robot".to_owned(),
-            lower: vec![-6.2; 6],
-            upper: vec![6.2; 6],
-            velocity: vec![3.1; 6],
-            acceleration: vec![10.0; 6],
-            jerk: vec![100.0; 6],
+            lower: vec![-6.3; 6],
+            upper: vec![6.3; 6],
+            velocity: vec![3.2; 6],
+            acceleration: vec![20.0; 6],
+            jerk: vec![400.0; 6],
             ..About::default()
         }
     }
@@ -49,7 +48,9 @@ fn main() -> Result<(), DriverError> {
     let domain = ipc::Domain::choose(None, |name| std::env::var_os(name))?;
     let home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0].map(|at| Reference::rest(at).into());
     let robot = MyRobot(home, ToolStatus::Open);
-    let never = AtomicBool::new(false);
-    run(&domain.arm(&arm)?, robot, &RunOptions::default(), &never)?;
+    // Ctrl-C and SIGTERM: the kit brakes the arm first.
+    let stop = asked_to_end()?;
+    let report = run(&domain.arm(&arm)?, robot, &RunOptions::default(), &stop)?;
+    report.braked.iter().for_each(|text| eprintln!("{text}"));
     Ok(())
 }

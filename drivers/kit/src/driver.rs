@@ -1,12 +1,8 @@
 //! The driver's side of the protocol, without a clock and without a channel.
 
-use ipc::{
-    Clock, DriverState, FaultCode, Hello, HelloAck, MAX_TOOLS, Setpoint, SetpointFlags, State,
-    ToolAction, Verdict, bytes_of, text_of,
-};
-use realtime::Bounds;
+use ipc::{Clock, DriverState, FaultCode, MAX_TOOLS, Setpoint, SetpointFlags, State, ToolAction};
 
-use crate::{About, DriverError, Measured, Reference, Robot};
+use crate::{About, DriverError, Limiter, Measured, Reference, Robot};
 
 /// How far the first setpoint of a session may be from the measured position (rad).
 const FIRST: f64 = 1e-3;
@@ -14,36 +10,49 @@ const FIRST: f64 = 1e-3;
 /// Room for a setpoint beside what speed and time allow (rad).
 const ROOM: f64 = 2e-3;
 
+/// How far velocity and acceleration of a setpoint may be from zero, as a multiple of the joint's
+/// limit: room for rounding.
+const MARGIN: f64 = 1.001;
+
 /// What an engine and the driver agreed on.
 #[derive(Clone, Debug)]
-struct Session {
-    number: u64,
-    owner: String,
-    process: u32,
-    period_ns: u64,
-    watchdog_ns: u64,
-    clock: Clock,
+pub(crate) struct Session {
+    pub(crate) number: u64,
+    pub(crate) owner: String,
+    pub(crate) process: u32,
+    pub(crate) period_ns: u64,
+    pub(crate) watchdog_ns: u64,
+    pub(crate) clock: Clock,
 }
 
 /// A robot with the driver's side of the protocol. Times go in as numbers, so that the same
 /// setpoints at the same times give the same states.
 #[derive(Clone, Debug)]
 pub struct Driver<R> {
-    robot: R,
-    about: About,
-    state: DriverState,
-    fault: FaultCode,
-    fault_joint: u32,
-    session: Option<Session>,
-    sessions: u64,
-    measured: Vec<Measured>,
-    references: Vec<Reference>,
-    orders: [u32; MAX_TOOLS],
-    last: Setpoint,
-    fresh: bool,
-    received_ns: u64,
+    pub(crate) robot: R,
+    pub(crate) about: About,
+    limiters: Vec<Limiter>,
+    pub(crate) state: DriverState,
+    pub(crate) fault: FaultCode,
+    pub(crate) fault_joint: u32,
+    pub(crate) session: Option<Session>,
+    pub(crate) sessions: u64,
+    pub(crate) leaving: bool,
+    pub(crate) measured: Vec<Measured>,
+    /// What the robot follows.
+    pub(crate) references: Vec<Reference>,
+    /// What the setpoints say, or would say by now.
+    pub(crate) targets: Vec<Reference>,
+    pub(crate) orders: [u32; MAX_TOOLS],
+    pub(crate) last: Setpoint,
+    pub(crate) fresh: bool,
+    pub(crate) received_ns: u64,
+    /// When the newest setpoint was sent, by its own word.
+    pub(crate) newest_ns: u64,
+    /// When the last period was; 0 before the first of a session.
+    pub(crate) stepped_ns: u64,
     sequence: u64,
-    missed: u64,
+    pub(crate) missed: u64,
     missed_ever: u64,
     reported: State,
 }
@@ -58,18 +67,26 @@ impl<R: Robot> Driver<R> {
         about.check()?;
         let mut measured = vec![Measured::default(); about.joints()];
         robot.measure(&mut measured);
-        let at = measured.iter().map(|joint| Reference::rest(joint.position));
+        let at: Vec<Reference> = measured
+            .iter()
+            .map(|joint| Reference::rest(joint.position))
+            .collect();
         Ok(Self {
+            limiters: about.limiters(),
             state: DriverState::Disconnected,
             fault: FaultCode::None,
             fault_joint: u32::MAX,
             session: None,
             sessions: 0,
-            references: at.collect(),
+            leaving: false,
+            references: at.clone(),
+            targets: at,
             orders: [0; MAX_TOOLS],
             last: Setpoint::default(),
             fresh: false,
             received_ns: 0,
+            newest_ns: 0,
+            stepped_ns: 0,
             sequence: 0,
             missed: 0,
             missed_ever: 0,
@@ -143,90 +160,6 @@ impl<R: Robot> Driver<R> {
         &self.last
     }
 
-    /// Answers a request for a session at `now_ns`.
-    pub fn greet(&mut self, hello: &Hello, now_ns: u64) -> HelloAck {
-        let joints = self.joints();
-        if let Some((verdict, reason)) = self.objection(hello) {
-            let mut ack = HelloAck::refusal(joints, verdict, &reason);
-            ack.name = bytes_of(&self.about.name);
-            return ack;
-        }
-        self.sessions += 1;
-        // Unlike any session of a driver process before, so that old setpoints do not fit.
-        let number = (now_ns | 1).wrapping_add(self.sessions << 1).max(1);
-        self.session = Some(Session {
-            number,
-            owner: text_of(&hello.name),
-            process: hello.process,
-            period_ns: hello.period_ns,
-            watchdog_ns: hello.watchdog_ns,
-            clock: Clock::from_number(hello.clock).unwrap_or(Clock::Wall),
-        });
-        self.state = DriverState::Synced;
-        self.fault = FaultCode::None;
-        self.fault_joint = u32::MAX;
-        self.fresh = false;
-        self.last = Setpoint::default();
-        self.missed = 0;
-        self.received_ns = now_ns;
-        for (joint, reference) in self.measured.iter().zip(&mut self.references) {
-            *reference = Reference::rest(joint.position);
-        }
-        self.orders = [0; MAX_TOOLS];
-        self.welcome(number, hello.watchdog_ns)
-    }
-
-    fn welcome(&self, session: u64, watchdog_ns: u64) -> HelloAck {
-        let mut ack = HelloAck::refusal(self.joints(), Verdict::Welcome, "");
-        ack.session = session;
-        ack.watchdog_ns = watchdog_ns;
-        ack.name = bytes_of(&self.about.name);
-        for (joint, measured) in self.measured.iter().enumerate() {
-            ack.position[joint] = measured.position;
-            ack.lower[joint] = self.about.lower[joint];
-            ack.upper[joint] = self.about.upper[joint];
-            ack.velocity[joint] = self.about.velocity[joint];
-        }
-        ack
-    }
-
-    /// Why there can be no session now.
-    fn objection(&self, hello: &Hello) -> Option<(Verdict, String)> {
-        if let Err(cause) = hello.check(self.joints()) {
-            let verdict = match cause {
-                ipc::MessageError::Protocol { .. } => Verdict::WrongProtocol,
-                ipc::MessageError::Schema { .. } => Verdict::WrongSchema,
-                ipc::MessageError::Joints { .. } => Verdict::WrongJoints,
-                ipc::MessageError::Choice { .. } => Verdict::WrongClock,
-                _ => Verdict::WrongPeriod,
-            };
-            return Some((verdict, cause.to_string()));
-        }
-        if self.about.model != 0 && hello.model != 0 && self.about.model != hello.model {
-            return Some((
-                Verdict::WrongModel,
-                format!(
-                    "robot model {:#x} here, {:#x} there",
-                    self.about.model, hello.model
-                ),
-            ));
-        }
-        let resting = self.references.iter().all(Reference::rests);
-        match (&self.session, self.state) {
-            (Some(session), DriverState::Armed | DriverState::Active)
-                if session.process != hello.process =>
-            {
-                let (owner, process) = (&session.owner, session.process);
-                Some((
-                    Verdict::Busy,
-                    format!("driven by {owner} (process {process})"),
-                ))
-            }
-            _ if !resting => Some((Verdict::NotReady, "the arm still moves".to_owned())),
-            _ => None,
-        }
-    }
-
     /// Takes a setpoint at `now_ns`. What does not belong to the session is ignored; what makes
     /// no sense stops the arm.
     pub fn receive(&mut self, setpoint: &Setpoint, now_ns: u64) {
@@ -241,23 +174,34 @@ impl<R: Robot> Driver<R> {
         {
             return;
         }
-        if setpoint.check(self.joints()).is_err() {
+        if self.has_stalled(now_ns) {
+            self.stop(FaultCode::Stalled, u32::MAX);
+            return;
+        }
+        let wall = session.clock == Clock::Wall;
+        // Both sides read the same clock: what comes from long after now makes no sense.
+        let future = wall && setpoint.published_ns > now_ns.saturating_add(session.watchdog_ns);
+        if future || setpoint.check(self.joints()).is_err() {
             self.stop(FaultCode::BadSetpoint, u32::MAX);
             return;
         }
         // After a stall setpoints come together: then the time between them is that of their ticks.
         let ticks = setpoint.tick.saturating_sub(self.last.tick);
-        let planned = ticks
-            .saturating_mul(session.period_ns)
-            .min(session.watchdog_ns);
+        let planned = ticks.saturating_mul(session.period_ns);
         let elapsed = now_ns
             .saturating_sub(self.received_ns)
             .max(planned)
-            .max(session.period_ns);
+            .clamp(session.period_ns, session.watchdog_ns);
+        let newest_ns = if wall {
+            setpoint.published_ns.min(now_ns)
+        } else {
+            now_ns
+        };
         if let Some(joint) = self.unreachable_joint(setpoint, elapsed as f64 * 1e-9) {
             self.stop(FaultCode::OutOfRange, joint as u32);
             return;
         }
+        self.newest_ns = newest_ns;
         self.last = *setpoint;
         self.received_ns = now_ns;
         if setpoint.flags & SetpointFlags::STOP_REQUEST != 0 {
@@ -294,13 +238,14 @@ impl<R: Robot> Driver<R> {
         Some(self.reported)
     }
 
-    /// The first joint whose setpoint is out of range, too fast, or further away than the joint
-    /// can have come in `elapsed` (s).
+    /// The first joint whose setpoint is out of range, too fast, accelerates too much, or is further
+    /// away than the joint can have come in `elapsed` (s).
     fn unreachable_joint(&self, setpoint: &Setpoint, elapsed: f64) -> Option<usize> {
         let first = self.state == DriverState::Synced;
         (0..self.joints()).find(|&joint| {
             let (at, speed) = (setpoint.position[joint], setpoint.velocity[joint]);
-            let most = self.about.velocity[joint] * 1.001;
+            let most = self.about.velocity[joint] * MARGIN;
+            let force = self.about.acceleration[joint] * MARGIN;
             // A late setpoint follows on the last one, not on what was made up meanwhile.
             let before = if first {
                 self.measured[joint].position
@@ -311,6 +256,7 @@ impl<R: Robot> Driver<R> {
             at < self.about.lower[joint] - ROOM
                 || at > self.about.upper[joint] + ROOM
                 || speed.abs() > most
+                || setpoint.acceleration[joint].abs() > force
                 || (at - before).abs() > room
         })
     }
@@ -321,12 +267,43 @@ impl<R: Robot> Driver<R> {
         self.state = DriverState::Stopping;
     }
 
+    /// Begins to leave: an open session ends with [`FaultCode::Ended`], the arm stops within its
+    /// limits, and no session is opened any more. Says whether the arm moves.
+    pub fn leave(&mut self) -> bool {
+        self.leaving = true;
+        if self.is_following() || self.state == DriverState::Synced {
+            self.stop(FaultCode::Ended, u32::MAX);
+        }
+        !self.is_resting()
+    }
+
+    /// Whether what the robot follows rests.
+    pub fn is_resting(&self) -> bool {
+        self.references.iter().all(Reference::rests)
+    }
+
+    fn is_following(&self) -> bool {
+        matches!(self.state, DriverState::Armed | DriverState::Active)
+    }
+
+    /// Whether the driver itself was stopped for longer than the watchdog, at `now_ns`.
+    fn has_stalled(&self, now_ns: u64) -> bool {
+        let Some(session) = &self.session else {
+            return false;
+        };
+        session.clock == Clock::Wall
+            && self.stepped_ns > 0
+            && self.is_following()
+            && now_ns.saturating_sub(self.stepped_ns) > session.watchdog_ns
+    }
+
     /// One period of `period_ns` that ends at `now_ns`: measures, chooses what to follow, has the
     /// robot follow it, returns the state to send.
     pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
         let period = period_ns as f64 * 1e-9;
         self.robot.measure(&mut self.measured);
         self.watch(now_ns);
+        self.stepped_ns = now_ns;
         let state = self.report(now_ns);
         self.reported = state;
         self.refer(period);
@@ -351,12 +328,14 @@ impl<R: Robot> Driver<R> {
 
     /// The watchdog, and the end of a stop.
     fn watch(&mut self, now_ns: u64) {
-        let following = matches!(self.state, DriverState::Armed | DriverState::Active);
-        if let Some(joint) = self.robot.fault().filter(|_| following) {
+        if let Some(joint) = self.robot.fault().filter(|_| self.is_following()) {
             self.stop(FaultCode::Hardware, joint);
+        } else if self.has_stalled(now_ns) {
+            self.stop(FaultCode::Stalled, u32::MAX);
         }
         let Some(session) = &self.session else { return };
-        let silence = now_ns.saturating_sub(self.received_ns);
+        // By its own time: a setpoint that waited while the driver did not run is not new.
+        let silence = now_ns.saturating_sub(self.newest_ns);
         match self.state {
             DriverState::Armed | DriverState::Active => {
                 if !self.fresh {
@@ -370,33 +349,41 @@ impl<R: Robot> Driver<R> {
             DriverState::Synced if silence > session.watchdog_ns.max(1_000_000_000) => {
                 self.stop(FaultCode::Watchdog, u32::MAX);
             }
-            DriverState::Stopping if self.references.iter().all(Reference::rests) => {
+            DriverState::Stopping if self.is_resting() => {
                 self.state = DriverState::Fault;
             }
             _ => {}
         }
     }
 
-    /// What the joints follow in this period.
+    /// What the joints follow in this period: the setpoint, what it would be by now, or a stop;
+    /// never more than a joint can.
     fn refer(&mut self, period: f64) {
         let fresh = std::mem::take(&mut self.fresh);
         let setpoint = &self.last;
-        for (joint, reference) in self.references.iter_mut().enumerate() {
-            let rate = self.about.acceleration[joint];
-            let change = self.about.jerk[joint];
-            match self.state {
-                DriverState::Armed | DriverState::Active if fresh => {
-                    *reference = Reference {
+        let following = self.is_following();
+        let stopping = matches!(
+            self.state,
+            DriverState::Stopping | DriverState::Disconnected
+        );
+        let joints = self.references.iter_mut().zip(&mut self.targets);
+        for (joint, (limiter, (reference, target))) in self.limiters.iter().zip(joints).enumerate()
+        {
+            if following {
+                *target = if fresh {
+                    Reference {
                         position: setpoint.position[joint],
                         velocity: setpoint.velocity[joint],
                         acceleration: setpoint.acceleration[joint],
-                    };
-                }
-                DriverState::Armed | DriverState::Active => reference.go_on(change, period),
-                DriverState::Stopping | DriverState::Disconnected => {
-                    reference.brake(Bounds { rate, change }, period);
-                }
-                _ => {}
+                    }
+                } else {
+                    limiter.go_on(target, period)
+                };
+                *reference = limiter.approach(reference, target, period);
+            } else if stopping {
+                *reference = limiter.stop(reference, period);
+            } else {
+                *reference = Reference::rest(reference.position);
             }
         }
     }

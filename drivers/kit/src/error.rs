@@ -42,6 +42,12 @@ pub enum DriverError {
         /// What the operating system said.
         cause: String,
     },
+    /// Signals cannot be received.
+    #[error("cannot receive signals: {cause}")]
+    Signals {
+        /// What the operating system said.
+        cause: String,
+    },
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] ipc::IpcError),

@@ -1,12 +1,15 @@
 //! The driver between shared memory and a clock.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use ipc::{Arm, Clock, DriverLink};
 use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
+
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::log::Log;
 use crate::{Driver, DriverError, Robot};
@@ -16,6 +19,9 @@ const IDLE_NS: u64 = 2_000_000;
 
 /// How many times lock-step looks for a setpoint before it sleeps between looks.
 const SPINS: u32 = 4000;
+
+/// How many periods a driver that ends goes on saying so.
+const FAREWELL: u32 = 20;
 
 /// How long lock-step waits for the engine before the arm counts as left alone (ns).
 const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
@@ -31,6 +37,8 @@ pub struct Report {
     pub sessions: u64,
     /// What the operating system refused, in one sentence.
     pub warning: Option<String>,
+    /// When the driver was told to end while the arm moved: what it did then, in one sentence.
+    pub braked: Option<String>,
 }
 
 /// How a driver runs.
@@ -54,7 +62,25 @@ impl Default for RunOptions {
     }
 }
 
-/// Drives `robot` as `arm` until `stop` becomes true.
+/// A flag that SIGINT, SIGTERM and SIGHUP set, for [`run`]: how an operator ends a driver. A second
+/// signal changes nothing, so that it does not cut the braking short.
+///
+/// # Errors
+/// [`DriverError::Signals`] when signals cannot be received.
+pub fn asked_to_end() -> Result<Arc<AtomicBool>, DriverError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|cause| {
+            DriverError::Signals {
+                cause: cause.to_string(),
+            }
+        })?;
+    }
+    Ok(stop)
+}
+
+/// Drives `robot` as `arm` until `stop` becomes true. An arm that moves then is braked within its
+/// limits first, and an engine that drives it is told: [`ipc::FaultCode::Ended`].
 ///
 /// # Errors
 /// When what the robot says of itself does not fit together, or the arm already has a driver, or
@@ -88,9 +114,43 @@ pub fn run<R: Robot>(
             }
         }
     }
+    report.braked = end(&link, &mut driver, &mut log);
     report.missed = driver.missed_in_all();
     report.sessions = driver.sessions();
     Ok(report)
+}
+
+/// Brings the arm to rest and tells the engine; says what was done where the arm moved.
+fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Option<String> {
+    let period = driver.period_ns().unwrap_or(IDLE_NS);
+    let paced = driver.clock() == Some(Clock::LockStep);
+    let told = driver.clock().is_some();
+    let moves = driver.leave();
+    let (mut periods, mut more) = (0_u64, if told { FAREWELL } else { 0 });
+    // Braking has an end; a limit that is next to nothing may make it a far one.
+    while periods < 1_000_000 && (!driver.is_resting() || more > 0) {
+        if driver.is_resting() {
+            more -= 1;
+        } else {
+            periods += 1;
+        }
+        if paced {
+            // Nobody paces it any more; the last states are given time to be read.
+            answer_greeting(link, driver);
+            link.send(driver.step(0, period));
+            if driver.is_resting() {
+                thread::sleep(Duration::from_millis(1));
+            }
+        } else {
+            wall_period(link, driver, log);
+        }
+    }
+    moves.then(|| {
+        format!(
+            "told to end while the arm moved: braked to rest within the joint limits in {} ms",
+            periods.saturating_mul(period) / 1_000_000
+        )
+    })
 }
 
 /// Answers a request for a session if one waits.
@@ -115,13 +175,13 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
     if driver.clock() == Some(Clock::LockStep) {
         return;
     }
-    let now = now_ns();
     while let Some(setpoint) = link.next_setpoint() {
+        // Anew each time: a process may be stopped at any place, and a setpoint's age counts.
+        let now = now_ns();
         driver.receive(&setpoint, now);
         log.write(&setpoint, driver, now);
     }
-    let state = driver.step(now, period);
-    link.send(state);
+    link.send(driver.step(now_ns(), period));
 }
 
 /// Periods as fast as the engine asks for them; time is what the setpoints say. Returns after a

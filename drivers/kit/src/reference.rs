@@ -1,6 +1,4 @@
-//! What one joint follows: the setpoint, or what the driver makes up without one.
-
-use realtime::{Bounds, next_rate};
+//! What one joint follows.
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) to follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,25 +21,55 @@ impl Reference {
         }
     }
 
-    /// Goes on for `period` (s) as it was going; the acceleration fades with `jerk` (rad/s³), so
-    /// that the speed stays near what it was.
-    pub(crate) fn go_on(&mut self, jerk: f64, period: f64) {
-        let fade = (jerk * period).min(self.acceleration.abs());
-        self.follow(self.acceleration - fade.copysign(self.acceleration), period);
+    /// After `time` (s) with a constant `jerk` (rad/s³).
+    pub(crate) fn after(&self, time: f64, jerk: f64) -> Self {
+        let (velocity, acceleration) = (self.velocity, self.acceleration);
+        Self {
+            position: self.position
+                + (velocity + (acceleration / 2.0 + jerk * time / 6.0) * time) * time,
+            velocity: velocity + (acceleration + jerk * time / 2.0) * time,
+            acceleration: acceleration + jerk * time,
+        }
     }
 
-    /// Brakes for `period` (s) within `bounds`: acceleration (rad/s²) and jerk (rad/s³).
-    pub(crate) fn brake(&mut self, bounds: Bounds, period: f64) {
-        let next = next_rate([self.velocity, self.acceleration], 0.0, bounds, period);
-        self.follow(next, period);
+    /// The speed that is left when the acceleration has faded with `jerk` (rad/s).
+    pub(crate) fn coasting_speed(&self, jerk: f64) -> f64 {
+        self.velocity + self.acceleration * self.acceleration.abs() / (2.0 * jerk)
     }
 
-    /// Moves for `period` (s) while the acceleration goes linearly to `next` (rad/s²).
-    fn follow(&mut self, next: f64, period: f64) {
-        let mean = (2.0 * self.acceleration + next) / 6.0;
-        self.position += (self.velocity + mean * period) * period;
-        self.velocity += (self.acceleration + next) / 2.0 * period;
-        self.acceleration = next;
+    /// The times (s) at which the speed is zero under a constant `jerk` (rad/s³), before or after
+    /// now; not a number where there is none.
+    pub(crate) fn turns(&self, jerk: f64) -> [f64; 2] {
+        if jerk == 0.0 {
+            return [-self.velocity / self.acceleration, f64::NAN];
+        }
+        let square = self.acceleration * self.acceleration - 2.0 * jerk * self.velocity;
+        let root = square.sqrt();
+        [-root, root].map(|root| (root - self.acceleration) / jerk)
+    }
+
+    /// A mixture: `share` of `other`, the rest of this.
+    pub(crate) fn mixed(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * share;
+        Self {
+            position: mix(self.position, other.position),
+            velocity: mix(self.velocity, other.velocity),
+            acceleration: mix(self.acceleration, other.acceleration),
+        }
+    }
+
+    /// How far this is from `other`, in each quantity.
+    pub(crate) fn beyond(&self, other: &Self) -> Self {
+        Self {
+            position: self.position - other.position,
+            velocity: self.velocity - other.velocity,
+            acceleration: self.acceleration - other.acceleration,
+        }
+    }
+
+    /// The same seen in a mirror.
+    pub(crate) fn mirrored(&self) -> Self {
+        Self::default().beyond(self)
     }
 
     /// Whether it rests, but for rounding.

@@ -2,7 +2,7 @@
 
 use ipc::{MAX_JOINTS, ToolAction, ToolFeedback, ToolStatus};
 
-use crate::{DriverError, Reference};
+use crate::{DriverError, Limiter, Reference};
 
 /// What a robot is like. Lists have one value a joint, root first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,9 +17,9 @@ pub struct About {
     pub upper: Vec<f64>,
     /// Largest speeds (rad/s).
     pub velocity: Vec<f64>,
-    /// Accelerations of the driver's own stop (rad/s²).
+    /// Largest accelerations (rad/s²): those of the driver's own stop; setpoints beyond are refused.
     pub acceleration: Vec<f64>,
-    /// Jerks of the driver's own stop (rad/s³).
+    /// Largest jerks (rad/s³): those of the driver's own stop; what follows setpoints keeps them.
     pub jerk: Vec<f64>,
 }
 
@@ -27,6 +27,17 @@ impl About {
     /// How many joints there are.
     pub fn joints(&self) -> usize {
         self.lower.len()
+    }
+
+    /// A limiter a joint.
+    pub(crate) fn limiters(&self) -> Vec<Limiter> {
+        let limiter = |joint: usize| Limiter {
+            range: [self.lower[joint], self.upper[joint]],
+            velocity: self.velocity[joint],
+            acceleration: self.acceleration[joint],
+            jerk: self.jerk[joint],
+        };
+        (0..self.joints()).map(limiter).collect()
     }
 
     /// Whether the lists fit together.

@@ -9,7 +9,7 @@ PROTOCOL = 1
 
 # Driver states, faults, verdicts, tool actions and statuses, clocks and setpoint flags by number.
 DISCONNECTED, SYNCED, ARMED, ACTIVE, STOPPING, FAULT = range(6)
-NO_FAULT, WATCHDOG, BAD_SETPOINT, OUT_OF_RANGE, STOP_REQUEST, HARDWARE = range(6)
+NO_FAULT, WATCHDOG, BAD_SETPOINT, OUT_OF_RANGE, STOP_REQUEST, HARDWARE, STALLED, ENDED = range(8)
 WELCOME, WRONG_PROTOCOL, WRONG_SCHEMA, WRONG_JOINTS = range(4)
 WRONG_MODEL, WRONG_PERIOD, WRONG_CLOCK, BUSY, NOT_READY = range(4, 9)
 NO_ACTION, OPEN, CLOSE = range(3)
@@ -157,7 +157,8 @@ class HelloAck(ctypes.Structure):
 
 
 def schema_checksum():
-    """The checksum of the layout as this file has it (FNV-1a over sizes and offsets)."""
+    """The checksum of the layout as this file has it (FNV-1a over sizes, offsets and
+    the number of fault codes)."""
     numbers = [
         PROTOCOL,
         MAX_JOINTS,
@@ -172,6 +173,7 @@ def schema_checksum():
         State.digital_inputs.offset,
         ctypes.sizeof(Hello),
         ctypes.sizeof(HelloAck),
+        ENDED + 1,
     ]
     value = 0xCBF29CE484222325
     for number in numbers:

@@ -16,7 +16,7 @@ mod tool;
 use std::sync::atomic::AtomicBool;
 
 use driver_kit::RunOptions;
-pub use driver_kit::{DriverError, Report};
+pub use driver_kit::{DriverError, Report, asked_to_end};
 pub use options::{Options, ToolOptions};
 pub use robot::Simulated;
 

@@ -40,6 +40,7 @@ impl Pair {
             joints: 2,
             session: self.session,
             sequence: self.sequence,
+            published_ns: self.now + PERIOD,
             period_ns: PERIOD,
             watchdog_ns: WATCHDOG,
             ..Setpoint::default()

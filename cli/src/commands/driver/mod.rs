@@ -11,7 +11,6 @@ use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -49,14 +48,8 @@ impl Driver {
 }
 
 /// A flag that a signal sets, and with `until_end_of_input` the starter too.
-///
-/// # Errors
-/// Signals cannot be received.
-fn asked_to_end(until_end_of_input: bool) -> io::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+fn asked_to_end(until_end_of_input: bool) -> Result<Arc<AtomicBool>, Failure> {
+    let stop = driver_sim::asked_to_end().map_err(|cause| Failure::new(Exit::Internal, cause))?;
     if until_end_of_input {
         end_with_input(Arc::clone(&stop));
     }

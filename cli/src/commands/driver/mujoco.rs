@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::robot::RobotOption;
 
 /// The Python side, as it is in `drivers/python`.
-const SOURCES: [(&str, &str); 4] = [
+const SOURCES: [(&str, &str); 7] = [
     (
         "mujoco_driver.py",
         include_str!("../../../../drivers/python/mujoco_driver.py"),
@@ -26,6 +26,18 @@ const SOURCES: [(&str, &str); 4] = [
     (
         "canter_driver/__init__.py",
         include_str!("../../../../drivers/python/canter_driver/__init__.py"),
+    ),
+    (
+        "canter_driver/driver.py",
+        include_str!("../../../../drivers/python/canter_driver/driver.py"),
+    ),
+    (
+        "canter_driver/limiter.py",
+        include_str!("../../../../drivers/python/canter_driver/limiter.py"),
+    ),
+    (
+        "canter_driver/link.py",
+        include_str!("../../../../drivers/python/canter_driver/link.py"),
     ),
     (
         "canter_driver/domain.py",

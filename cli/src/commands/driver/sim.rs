@@ -62,6 +62,9 @@ impl Sim {
         if let Some(warning) = &report.warning {
             tracing::warn!("{warning}");
         }
+        if let Some(braked) = &report.braked {
+            output::note(braked);
+        }
         if !self.until_end_of_input {
             output::note(&format!(
                 "{} periods in {} sessions, {} without a new setpoint",

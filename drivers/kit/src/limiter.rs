@@ -1,0 +1,188 @@
+//! The last hand on what a joint follows: nothing leaves the limits, whatever is asked for.
+//!
+//! The state of a joint is its last reference. In a period it can come no further down than by the
+//! quickest way to its largest downward speed, no further up than by that to its largest upward
+//! speed, and each mixture of the two keeps acceleration, jerk and speed limits. So one number a
+//! period is chosen: the share of the mixture. A share is refused from which even the hardest
+//! braking passes an end of the range; the hardest braking is always left. A setpoint that follows
+//! on the last reference is taken as it is, bit for bit.
+//!
+//! # Source
+//! Own derivation. The choice of the share makes the distance to the target, stopped as quickly as
+//! allowed, zero: the switching surface of a third-order time-optimal law, as in R. Zanasi,
+//! C. Guarino Lo Bianco, A. Tonielli, "Nonlinear filters for the generation of smooth
+//! trajectories", Automatica 36(3), 2000.
+
+use crate::{Ramp, Reference};
+
+/// Room for rounding, as a share of a limit.
+const ROUNDING: f64 = 1e-3;
+
+/// Room for rounding (rad, rad/s), and at an end of the range (rad).
+const SMALL: f64 = 1e-9;
+const AT_END: f64 = 1e-6;
+
+/// Share of the jerk limit, and least share of the acceleration limit, with which the distance to
+/// the target is closed: the rest is for the motion of the target itself.
+const CLOSING: [f64; 2] = [0.3, 0.2];
+
+/// Halvings of a share: to a 64 000th for an end of the range, as far as numbers go for a target.
+const COARSE: u32 = 16;
+const FINE: u32 = 44;
+
+/// The limits of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Limiter {
+    /// Lower and upper end of the range (rad).
+    pub(crate) range: [f64; 2],
+    /// Largest speed (rad/s).
+    pub(crate) velocity: f64,
+    /// Largest acceleration (rad/s²).
+    pub(crate) acceleration: f64,
+    /// Largest jerk (rad/s³).
+    pub(crate) jerk: f64,
+}
+
+impl Limiter {
+    /// One period (s) from `from` towards `target`, which is where the joint shall be at its end.
+    pub(crate) fn approach(&self, from: &Reference, target: &Reference, period: f64) -> Reference {
+        if self.follows(from, target, period) {
+            return *target;
+        }
+        let [low, high] = self.extremes(from, period);
+        let acceleration =
+            (self.acceleration - target.acceleration.abs()).max(CLOSING[1] * self.acceleration);
+        let closing = [acceleration, CLOSING[0] * self.jerk];
+        // Beyond the target when the distance to it were stopped now.
+        let beyond = |share: f64| {
+            let distance = low.mixed(&high, share).beyond(target);
+            Ramp::new(&distance, 0.0, closing).end(&distance)
+        };
+        let share = if beyond(0.0) >= 0.0 {
+            0.0
+        } else if beyond(1.0) <= 0.0 {
+            1.0
+        } else {
+            before_share(|share| beyond(share) > 0.0, FINE)
+        };
+        self.within_range(&low, &high, share)
+    }
+
+    /// One period (s) without anything new: braking goes on, a speed is kept, and it is braked
+    /// early enough to rest within the range.
+    pub(crate) fn go_on(&self, from: &Reference, period: f64) -> Reference {
+        let (acceleration, velocity) = (from.acceleration, from.velocity);
+        let next = if acceleration * velocity < 0.0 {
+            let bounds = [acceleration.abs().min(self.acceleration), self.jerk];
+            Ramp::new(from, 0.0, bounds).sample(from, period)
+        } else {
+            let speed = from.coasting_speed(self.jerk);
+            let speed = speed.clamp(-self.velocity, self.velocity);
+            Ramp::new(from, speed, self.bounds()).sample(from, period)
+        };
+        let [lower, upper] = self.range;
+        let rest = Ramp::new(&next, 0.0, self.bounds()).end(&next);
+        if rest < lower || rest > upper {
+            return self.stop(from, period);
+        }
+        self.or_brake(from, next, period)
+    }
+
+    /// One period (s) of the quickest stop within the range.
+    pub(crate) fn stop(&self, from: &Reference, period: f64) -> Reference {
+        let next = Ramp::new(from, 0.0, self.bounds()).sample(from, period);
+        self.or_brake(from, next, period)
+    }
+
+    /// `next`, or the hardest braking where only that stays within the range.
+    fn or_brake(&self, from: &Reference, next: Reference, period: f64) -> Reference {
+        let [low, high] = self.extremes(from, period);
+        if !self.stays_below(&next, AT_END) {
+            low
+        } else if !self.stays_above(&next, AT_END) {
+            high
+        } else {
+            next
+        }
+    }
+
+    fn bounds(&self) -> [f64; 2] {
+        [self.acceleration, self.jerk]
+    }
+
+    /// The lowest and the highest that can be reached in a period (s).
+    fn extremes(&self, from: &Reference, period: f64) -> [Reference; 2] {
+        [-self.velocity, self.velocity]
+            .map(|speed| Ramp::new(from, speed, self.bounds()).sample(from, period))
+    }
+
+    /// Whether `next` is a motion of a period (s) from `from` within all limits, and leaves a way
+    /// to stay within them.
+    fn follows(&self, from: &Reference, next: &Reference, period: f64) -> bool {
+        let room = 1.0 + ROUNDING;
+        let jerk = self.jerk * room;
+        let (rate, speed) = (
+            from.acceleration + next.acceleration,
+            from.velocity + next.velocity,
+        );
+        let gained = next.velocity - from.velocity - rate * period / 2.0;
+        let moved = next.position - from.position - speed * period / 2.0;
+        let change = (next.acceleration - from.acceleration).abs();
+        next.velocity.abs() <= self.velocity * room
+            && next.acceleration.abs() <= self.acceleration * room
+            && change <= jerk * period + SMALL
+            // What a trapezium is off by at most when the jerk keeps its limit.
+            && gained.abs() <= jerk * period * period / 4.0 + SMALL
+            && moved.abs() <= jerk * period * period * period / 12.0 + SMALL
+            && self.stays_below(next, AT_END)
+            && self.stays_above(next, AT_END)
+    }
+
+    /// The mixture of `low` and `high` that is nearest to `share` and can stay within the range.
+    fn within_range(&self, low: &Reference, high: &Reference, share: f64) -> Reference {
+        let wanted = low.mixed(high, share);
+        if !self.stays_below(&wanted, 0.0) {
+            let passes = |part: f64| !self.stays_below(&low.mixed(high, part * share), 0.0);
+            return low.mixed(high, before_share(passes, COARSE) * share);
+        }
+        if !self.stays_above(&wanted, 0.0) {
+            let part = |part: f64| low.mixed(high, 1.0 - part * (1.0 - share));
+            let passes = |value: f64| !self.stays_above(&part(value), 0.0);
+            return part(before_share(passes, COARSE));
+        }
+        wanted
+    }
+
+    /// Whether the hardest braking from `from` keeps below the upper end and `room` (rad).
+    fn stays_below(&self, from: &Reference, room: f64) -> bool {
+        let bounds @ [acceleration, jerk] = self.bounds();
+        // Seen from afar: the way that fading and braking together take at most.
+        let speed = from.velocity.abs() + from.acceleration * from.acceleration / (2.0 * jerk);
+        let most = speed * (speed / (2.0 * acceleration) + 2.0 * acceleration / jerk);
+        let end = self.range[1];
+        from.position + most <= end
+            || Ramp::new(from, -self.velocity, bounds).top(from) <= end + room
+    }
+
+    /// Whether the hardest braking from `from` keeps above the lower end less `room` (rad).
+    fn stays_above(&self, from: &Reference, room: f64) -> bool {
+        let [lower, upper] = self.range;
+        let range = [-upper, -lower];
+        Self { range, ..*self }.stays_below(&from.mirrored(), room)
+    }
+}
+
+/// The largest share in 0..1 for which `is_beyond` is not true; from there on it stays true. 0 where
+/// there is none.
+fn before_share(is_beyond: impl Fn(f64) -> bool, halvings: u32) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..halvings {
+        let middle = (low + high) / 2.0;
+        if is_beyond(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    low
+}

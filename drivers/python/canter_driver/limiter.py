@@ -1,0 +1,211 @@
+"""The last hand on what a joint follows: nothing leaves the limits, whatever is asked for.
+
+The same law as `drivers/kit/src/limiter.rs`, where it is explained. A reference is position (rad),
+velocity (rad/s) and acceleration (rad/s2) of one joint.
+"""
+
+from math import copysign, sqrt
+
+# Room for rounding: as a share of a limit, in rad and rad/s, and at an end of the range in rad.
+ROUNDING, SMALL, AT_END = 1e-3, 1e-9, 1e-6
+
+# Share of the jerk limit, and least share of the acceleration limit, that close the distance to the
+# target; the rest is for the motion of the target itself.
+CLOSING = 0.3, 0.2
+
+# Halvings of a share: for an end of the range, and for a target.
+COARSE, FINE = 16, 44
+
+
+def after(reference, time, jerk):
+    """A reference after `time` (s) with a constant `jerk` (rad/s3)."""
+    p, v, a = reference
+    return (
+        p + (v + (a / 2 + jerk * time / 6) * time) * time,
+        v + (a + jerk * time / 2) * time,
+        a + jerk * time,
+    )
+
+
+def ramp(reference, speed, acceleration, jerk):
+    """The quickest way to a constant speed: three phases, each a time (s) and a jerk (rad/s3)."""
+    _, v, a = reference
+    toward = 1.0 if speed >= v + a * abs(a) / (2 * jerk) else -1.0
+    missing, now = toward * (speed - v), toward * a
+    peak, hold = sqrt(max(jerk * missing + now * now / 2, 0.0)), 0.0
+    if peak > acceleration:
+        peak = acceleration
+        gained = abs(peak * peak - now * now) / (2 * jerk)
+        hold = max((missing - gained) / peak - peak / (2 * jerk), 0.0)
+    first = jerk if peak >= now else -jerk
+    return (
+        (abs(peak - now) / jerk, toward * first),
+        (hold, 0.0),
+        (peak / jerk, -toward * jerk),
+    )
+
+
+def sample(reference, speed, acceleration, jerk, time):
+    """Where the joint is `time` (s) after it began the quickest way to a constant speed."""
+    for duration, change in ramp(reference, speed, acceleration, jerk):
+        if time <= duration:
+            return after(reference, time, change)
+        reference = after(reference, duration, change)
+        time -= duration
+    return reference[0] + speed * time, speed, 0.0
+
+
+def end(reference, acceleration, jerk):
+    """Where the joint rests when it stops as quickly as it can (rad)."""
+    for duration, change in ramp(reference, 0.0, acceleration, jerk):
+        reference = after(reference, duration, change)
+    return reference[0]
+
+
+def top(reference, speed, acceleration, jerk):
+    """The highest position on the quickest way to a constant speed (rad)."""
+    highest = reference[0]
+    for duration, change in ramp(reference, speed, acceleration, jerk):
+        _, v, a = reference
+        turns = ()
+        if change:
+            square = a * a - 2 * change * v
+            if square >= 0:
+                root = sqrt(square)
+                turns = ((-root - a) / change, (root - a) / change)
+        elif a:
+            turns = (-v / a,)
+        for time in turns:
+            if 0 < time < duration:
+                highest = max(highest, after(reference, time, change)[0])
+        reference = after(reference, duration, change)
+        highest = max(highest, reference[0])
+    return highest
+
+
+def mixed(low, high, share):
+    """A mixture of two references: `share` of `high`, the rest of `low`."""
+    return tuple(a + (b - a) * share for a, b in zip(low, high))
+
+
+def before_share(is_beyond, halvings):
+    """The largest share in 0..1 for which `is_beyond` is not true; from there on it stays true."""
+    low, high = 0.0, 1.0
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        if is_beyond(middle):
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+class Limiter:
+    """The limits of one joint."""
+
+    def __init__(self, lower, upper, velocity, acceleration, jerk):
+        self.lower, self.upper = lower, upper
+        self.velocity, self.acceleration, self.jerk = velocity, acceleration, jerk
+
+    def approach(self, reference, target, period):
+        """One period (s) towards `target`, which is where the joint shall be at its end."""
+        if self.follows(reference, target, period):
+            return target
+        low, high = self.extremes(reference, period)
+        closing = max(self.acceleration - abs(target[2]), CLOSING[1] * self.acceleration)
+        jerk = CLOSING[0] * self.jerk
+
+        def beyond(share):
+            """How far beyond the target, when the distance to it were stopped now."""
+            now = mixed(low, high, share)
+            return end(tuple(a - b for a, b in zip(now, target)), closing, jerk)
+
+        if beyond(0.0) >= 0:
+            share = 0.0
+        elif beyond(1.0) <= 0:
+            share = 1.0
+        else:
+            share = before_share(lambda share: beyond(share) > 0, FINE)
+        return self.within_range(low, high, share)
+
+    def go_on(self, reference, period):
+        """One period (s) without anything new: braking goes on, a speed is kept, and it is braked
+        early enough to rest within the range."""
+        _, v, a = reference
+        if a * v < 0:
+            force = min(abs(a), self.acceleration)
+            following = sample(reference, 0.0, force, self.jerk, period)
+        else:
+            speed = v + copysign(a * a / (2 * self.jerk), a)
+            speed = min(max(speed, -self.velocity), self.velocity)
+            following = sample(reference, speed, self.acceleration, self.jerk, period)
+        rest = end(following, self.acceleration, self.jerk)
+        if rest < self.lower or rest > self.upper:
+            return self.stop(reference, period)
+        return self.or_brake(reference, following, period)
+
+    def stop(self, reference, period):
+        """One period (s) of the quickest stop within the range."""
+        following = sample(reference, 0.0, self.acceleration, self.jerk, period)
+        return self.or_brake(reference, following, period)
+
+    def or_brake(self, reference, following, period):
+        """`following`, or the hardest braking where only that stays within the range."""
+        if not self.stays_below(following, AT_END):
+            return self.extremes(reference, period)[0]
+        if not self.stays_above(following, AT_END):
+            return self.extremes(reference, period)[1]
+        return following
+
+    def extremes(self, reference, period):
+        """The lowest and the highest that can be reached in a period (s)."""
+        a, j = self.acceleration, self.jerk
+        return [sample(reference, v, a, j, period) for v in (-self.velocity, self.velocity)]
+
+    def follows(self, reference, target, period):
+        """Whether `target` is a motion of a period (s) from `reference` within all limits, and
+        leaves a way to stay within them."""
+        (p, v, a), (q, w, b) = reference, target
+        room = 1 + ROUNDING
+        jerk = self.jerk * room * period
+        return (
+            abs(w) <= self.velocity * room
+            and abs(b) <= self.acceleration * room
+            and abs(b - a) <= jerk + SMALL
+            and abs(w - v - (a + b) * period / 2) <= jerk * period / 4 + SMALL
+            and abs(q - p - (v + w) * period / 2) <= jerk * period * period / 12 + SMALL
+            and self.stays_below(target, AT_END)
+            and self.stays_above(target, AT_END)
+        )
+
+    def within_range(self, low, high, share):
+        """The mixture that is nearest to `share` and can stay within the range."""
+        wanted = mixed(low, high, share)
+        if not self.stays_below(wanted, 0.0):
+            passes = lambda part: not self.stays_below(mixed(low, high, part * share), 0.0)
+            return mixed(low, high, before_share(passes, COARSE) * share)
+        if not self.stays_above(wanted, 0.0):
+            rest = 1 - share
+            passes = lambda part: not self.stays_above(mixed(low, high, 1 - part * rest), 0.0)
+            return mixed(low, high, 1 - before_share(passes, COARSE) * rest)
+        return wanted
+
+    def most(self, v, a):
+        """The way that fading and braking together take at most (rad)."""
+        speed = abs(v) + a * a / (2 * self.jerk)
+        return speed * (speed / (2 * self.acceleration) + 2 * self.acceleration / self.jerk)
+
+    def stays_below(self, reference, room):
+        """Whether the hardest braking keeps below the upper end and `room` (rad)."""
+        p, v, a = reference
+        if p + self.most(v, a) <= self.upper:
+            return True
+        return top(reference, -self.velocity, self.acceleration, self.jerk) <= self.upper + room
+
+    def stays_above(self, reference, room):
+        """Whether the hardest braking keeps above the lower end less `room` (rad)."""
+        p, v, a = reference
+        if p - self.most(v, a) >= self.lower:
+            return True
+        mirror = -p, -v, -a
+        return top(mirror, -self.velocity, self.acceleration, self.jerk) <= room - self.lower
