@@ -130,6 +130,12 @@ impl<const N: usize> Chain<N> {
         (0..N).all(|i| q[i] >= self.lower[i] - slack && q[i] <= self.upper[i] + slack)
     }
 
+    /// Distance (m) from the place of joint `joint`, once it has slid, to that of the next, or from
+    /// the last to the tool.
+    pub(crate) fn beyond(&self, joint: usize) -> f64 {
+        self.links.beyond(joint)
+    }
+
     /// Which build of the arithmetic this chain uses.
     pub(crate) fn build(&self) -> Build {
         self.build

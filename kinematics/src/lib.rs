@@ -10,6 +10,7 @@
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
 //! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
+//! | `motion` | the tool's motion when the joints move: derivatives, and bounds of them |
 //! | [`measure`] | manipulability, singular values, condition number |
 //! | [`reach`] | how far the arm reaches |
 
@@ -21,6 +22,7 @@ mod frame;
 pub mod ik;
 mod links;
 pub mod measure;
+mod motion;
 pub mod reach;
 pub mod urdf;
 mod wide;
@@ -28,4 +30,5 @@ mod wide;
 pub use chain::Chain;
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
 pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
+pub use motion::{ToolGrowth, ToolMotion};
 pub use urdf::{Model, UrdfError};

@@ -125,6 +125,16 @@ impl<const N: usize> Links<N> {
         !self.all_turn && self.turns[joint] == 0.0
     }
 
+    /// Distance (m) from the frame of a joint to that of the next, or from the last to the end.
+    pub(crate) fn beyond(&self, joint: usize) -> f64 {
+        if joint + 1 < N {
+            let [x, y] = self.shift[joint];
+            return x.hypot(y);
+        }
+        let [x, y, z, _] = self.last.p.0;
+        (x * x + y * y + z * z).sqrt()
+    }
+
     /// Goes along the links with the joints at `q` (rad, m).
     #[inline(always)]
     pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {

@@ -19,7 +19,12 @@ fn a_move_to_where_the_arm_is_takes_no_time() {
         z_axis: axis(nalgebra::Vector3::z()),
         x_axis: axis(nalgebra::Vector3::x()),
     };
-    for command in [Command::MoveStraightTo { pose }, Command::MoveTo { pose }] {
+    let poses = vec![pose; 3];
+    for command in [
+        Command::MoveStraightTo { pose },
+        Command::MoveTo { pose },
+        Command::MoveSmoothlyTo { poses },
+    ] {
         let step = controller.step(&command).unwrap();
         assert_eq!(step.ticks, 0, "{command:?}");
         let moved = (controller.joints() - joints).amax();

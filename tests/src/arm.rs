@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use k::nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use k::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use toml::{Table, Value};
 
 use crate::repository::root;
@@ -21,6 +21,12 @@ pub struct Arm {
     pub tool_speed: f64,
     /// Largest acceleration of the controlled point, m/s2.
     pub tool_acceleration: f64,
+    /// Largest jerk of the controlled point, m/s3.
+    pub tool_jerk: f64,
+    /// Largest angular speed, acceleration and jerk of the tool, rad/s, rad/s2, rad/s3.
+    pub angular: [f64; 3],
+    /// The joints at home.
+    pub home: Vec<f64>,
     /// What the flange can carry.
     pub tools: Vec<Tool>,
     /// Index of the tool that is on the flange at first.
@@ -90,6 +96,13 @@ impl Arm {
             jerk,
             tool_speed: number(&limits["speed_m_per_s"]),
             tool_acceleration: number(&limits["acceleration_m_per_s2"]),
+            tool_jerk: number(&limits["jerk_m_per_s3"]),
+            angular: [
+                number(&limits["angular_speed_rad_per_s"]),
+                number(&limits["angular_acceleration_rad_per_s2"]),
+                number(&limits["angular_jerk_rad_per_s3"]),
+            ],
+            home: numbers(&file["home"]["joints_rad_or_m"]),
             tools: tools
                 .iter()
                 .map(|tool| Tool {
@@ -108,6 +121,28 @@ impl Arm {
         self.chain.set_joint_positions_unchecked(q);
         self.chain.update_transforms();
         self.workstation_from_base * self.chain.end_transform()
+    }
+
+    /// The joints where [`Arm::flange`] was asked for last, in the workstation: a point on each
+    /// axis, its direction, and whether it slides.
+    pub fn axes(&self) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
+        let base = self.workstation_from_base;
+        self.chain
+            .iter()
+            .filter_map(|node| {
+                let (axis, slides) = match &node.joint().joint_type {
+                    k::JointType::Rotational { axis } => (*axis, false),
+                    k::JointType::Linear { axis } => (*axis, true),
+                    k::JointType::Fixed => return None,
+                };
+                let frame = base * node.world_transform()?;
+                Some((
+                    frame.translation.vector,
+                    frame.rotation * axis.into_inner(),
+                    slides,
+                ))
+            })
+            .collect()
     }
 
     /// From the flange to the controlled point.

@@ -73,6 +73,11 @@ impl<const N: usize> Trajectory<N> {
     }
 }
 
+/// Lowest and highest position of one joint over a piece, rad or m.
+pub(crate) fn range<const N: usize>(piece: &Piece<N>, joint: usize) -> (f64, f64) {
+    Polynomial::of(piece, joint).range()
+}
+
 /// Coefficients of a polynomial on 0..=1, lowest power first.
 #[derive(Clone, Copy, Debug)]
 struct Polynomial {

@@ -7,6 +7,8 @@
 //! kinematics: geometry comes in as [`ToolCurve`] and [`Path`].
 #![forbid(unsafe_code)]
 
+mod active;
+pub mod bounds;
 mod error;
 mod extrema;
 mod hermite_path;
@@ -19,9 +21,9 @@ pub mod smooth;
 mod spline_path;
 pub mod timing;
 mod trajectory;
-pub mod verify;
 mod wide;
 
+pub use bounds::MotionBounds;
 pub use error::TimingError;
 pub use extrema::JointPeaks;
 pub use hermite_path::HermitePath;

@@ -3,8 +3,8 @@ use std::io::{self, BufReader, Read, Write};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use planner::recorded::{CommandVerdict, ProgramVerdict, Row, verify_program};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use planner::recorded::{CommandVerdict, ProgramVerdict, Row, RunColumns, verify_program};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -14,9 +14,10 @@ use crate::robot::RobotOption;
 
 /// Check a recorded motion against its program, from the samples alone
 ///
-/// Takes what `canter plan --samples` or `canter run --samples` wrote and proves from differences
-/// of the samples whether joint and tool limits, tolerances, their order, straight lines and rest
-/// at the ends were kept. It shares no code with the planner.
+/// Takes what `canter plan --samples` or `canter run --samples` wrote and holds every column against
+/// the program, the robot and the other columns: limits of joints and tool, tolerances and their
+/// order, straight lines and legs, orientation, rest, times. A finding names the rule, the time, the
+/// value and the limit. It shares no code with the planner.
 #[derive(Args, Debug)]
 pub(crate) struct Verify {
     /// CSV file of samples; `-` is standard input
@@ -41,8 +42,7 @@ impl Verify {
             return Ok(program.exit());
         }
         let rows = read(&self.samples, robot.dof())?;
-        let verdict = verify_program(&robot, program.program(), program.default_length(), &rows)
-            .map_err(|error| Failure::new(Exit::Unreadable, error))?;
+        let verdict = verify_program(&robot, program.program(), program.default_length(), &rows);
         if self.json {
             output::json(&verdict)?;
         } else {
@@ -80,9 +80,17 @@ fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
             .position(|cell| cell == name)
             .ok_or_else(|| anyhow!("line 1: there is no column {name}"))
     };
+    let numbered = |name: &str| (1..=joints).map(move |joint| format!("{name}{joint}"));
     let mut names = vec!["t_s".to_owned(), "command".to_owned()];
-    names.extend((1..=joints).map(|joint| format!("q{joint}")));
+    for name in ["q", "dq", "ddq"] {
+        names.extend(numbered(name).collect::<Vec<_>>());
+    }
     names.extend(["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"].map(str::to_owned));
+    if header.iter().any(|cell| cell == "path_time_s") {
+        names.push("path_time_s".to_owned());
+        names.extend(numbered("measured_q").collect::<Vec<_>>());
+        names.extend(["x", "y", "z"].map(|axis| format!("measured_{axis}_m")));
+    }
     let columns = names
         .iter()
         .map(|name| column(name))
@@ -111,28 +119,38 @@ fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
 
 /// A row from the numbers of its columns.
 fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
-    let ([t_s, command], rest) = numbers
-        .split_first_chunk()
-        .ok_or_else(|| anyhow!("too few columns"))?;
-    let (q, pose) = rest.split_at(joints);
-    let [x, y, z, w, i, j, k] = pose else {
-        return Err(anyhow!("too few columns"));
-    };
-    let turn = Quaternion::new(*w, *i, *j, *k);
-    if (turn.norm() - 1.0).abs() > 1e-3 {
+    let mut numbers = numbers.iter().copied();
+    let mut next = || numbers.next().ok_or_else(|| anyhow!("too few columns"));
+    let (t_s, command) = (next()?, next()?);
+    let mut list = |count: usize| (0..count).map(|_| next()).collect::<Result<Vec<_>, _>>();
+    let (joints_now, rates, accelerations) = (list(joints)?, list(joints)?, list(joints)?);
+    let (place, turn) = (list(3)?, list(4)?);
+    let turn = Quaternion::new(turn[0], turn[1], turn[2], turn[3]);
+    if (turn.norm() - 1.0).abs() > 1e-9 {
         return Err(anyhow!("the quaternion has length {}, not 1", turn.norm()));
     }
-    if *command < 0.0 || command.fract() != 0.0 {
+    if command < 0.0 || command.fract() != 0.0 {
         return Err(anyhow!("{command} is not the number of a command"));
     }
+    let run = match list(1) {
+        Ok(path_time) => Some(RunColumns {
+            path_time_s: path_time[0],
+            measured: list(joints)?,
+            measured_point: Vector3::from_row_slice(&list(3)?),
+        }),
+        Err(_) => None,
+    };
     Ok(Row {
-        t_s: *t_s,
-        command: *command as usize,
-        joints: q.to_vec(),
+        t_s,
+        command: command as usize,
+        joints: joints_now,
+        rates,
+        accelerations,
         pose: Isometry3::from_parts(
-            Translation3::new(*x, *y, *z),
+            Translation3::new(place[0], place[1], place[2]),
             UnitQuaternion::from_quaternion(turn),
         ),
+        run,
     })
 }
 
@@ -202,10 +220,11 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_name_and_faults_have_a_place() {
-        let text = "command,t_s,q1,dq1,x_m,y_m,z_m,qw,qx,qy,qz\n3,0.5,0.1,0,1,2,3,1,0,0,0\n";
+        let text = "command,t_s,q1,dq1,ddq1,x_m,y_m,z_m,qw,qx,qy,qz\n3,0.5,0.1,0,7,1,2,3,1,0,0,0\n";
         let rows = parse(text.as_bytes(), 1).unwrap();
         assert_eq!((rows[0].t_s, rows[0].command), (0.5, 3));
         assert_eq!(rows[0].joints, [0.1]);
+        assert_eq!((rows[0].accelerations[0], &rows[0].run), (7.0, &None));
         assert_eq!(rows[0].pose.translation.z, 3.0);
         let fault = |text: String| format!("{:#}", parse(text.as_bytes(), 1).unwrap_err());
         assert!(fault(text.replace("q1", "p1")).contains("no column q1"));

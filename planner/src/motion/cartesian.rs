@@ -2,14 +2,14 @@
 
 use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
 use kinematics::{Chain, Obstacle};
-use nalgebra::SVector;
+use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
 use trajectory::{
     Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
     smooth, time_path,
 };
 
-use super::{Blend, MotionError, Planner, certificate};
+use super::{Blend, Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest way of the tool between two solved points, m.
@@ -18,6 +18,9 @@ const STEP_M: f64 = 4e-3;
 const STEP_RAD: f64 = 0.02;
 /// Largest deviation of the fitted joint path between solved points, m and rad.
 const FIT: f64 = 5e-7;
+/// Share of the time by which a motion may be slowed down as a whole before another time law is
+/// looked for.
+const ENOUGH: f64 = 1e-3;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -28,12 +31,11 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
+    ) -> Result<Draft<N>, MotionError> {
         let goal = motion.poses.first().copied().unwrap_or_default();
         let from = self.chain().forward(start);
-        let gap = from.inv_mul(&goal);
-        if gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9 {
-            return Ok(Trajectory::new(Vec::new()));
+        if is_still(&[from, goal]) {
+            return Ok(Draft::of(Trajectory::new(Vec::new())));
         }
         let line = Line::new(from, goal);
         let points = self
@@ -45,21 +47,28 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let path = joint_path(&line, &points)?;
-        time_path(&path, &self.limits, &motion.limits, &options)
-            .map(|timed| timed.trajectory)
-            .map_err(|error| MotionError::Timing(error.to_string()))
+        let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
+        let draft = Draft {
+            // The joints of a seven-joint arm may take another way along the same line.
+            least: if N > 6 {
+                0.0
+            } else {
+                timed.certificate.lower_bound
+            },
+            ..Draft::of(timed.trajectory)
+        };
+        Ok(self.slowed(draft, motion))
     }
 
     pub(super) fn plan_smooth(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<(Trajectory<N>, Blend), MotionError> {
+    ) -> Result<(Draft<N>, Blend), MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
         let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
-        let plan = smooth::plan(&poses, &options)
-            .map_err(|error| MotionError::Smooth(error.to_string()))?;
+        let plan = smooth::plan(&poses, &options)?;
         let blend = Blend {
             tolerance: motion.tolerance,
             exact_stop: plan.exact_stop(),
@@ -71,6 +80,15 @@ impl<const N: usize> Planner<N> {
                 .max(plan.certificate().angular_jerk.ratio),
             fallbacks: plan.fallbacks(),
         };
+        let passes: Vec<f64> = plan.passes().iter().map(|pass| pass.time).collect();
+        let draft = |trajectory, passes| Draft {
+            passes,
+            ..Draft::of(trajectory)
+        };
+        if is_still(&poses) || plan.duration() <= 0.0 {
+            let at_once = vec![0.0; passes.len()];
+            return Ok((draft(Trajectory::new(Vec::new()), at_once), blend));
+        }
         let towards = |u: f64| {
             1 + plan
                 .passes()
@@ -82,12 +100,11 @@ impl<const N: usize> Planner<N> {
             .followed((&plan, true), start, &towards)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
-        let samples = certificate::tool_samples(self.chain(), &direct);
-        let stretch = certificate::peaks(&direct, &samples, &self.limits, &motion.limits).stretch();
-        if stretch <= 1.0 + 1e-4 {
+        let free = direct.duration();
+        let direct = self.slowed(draft(direct, passes.clone()), motion);
+        if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
             return Ok((direct, blend));
         }
-        let slow = direct.stretched(stretch);
         let options = TimingOptions {
             start: Boundary::Free,
             end: Boundary::Free,
@@ -95,11 +112,16 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let path = joint_path(&plan, &points)?;
-        match time_path(&path, &self.limits, &motion.limits, &options) {
-            Ok(timed) if timed.trajectory.duration() < slow.duration() => {
-                Ok((timed.trajectory, blend))
+        let timed = time_path(&path, &self.limits, &motion.limits, &options);
+        let timed = timed.map(|timed| {
+            let times = passes.iter().map(|u| moment(&timed.law, *u)).collect();
+            self.slowed(draft(timed.trajectory, times), motion)
+        });
+        match timed {
+            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => {
+                Ok((timed, blend))
             }
-            _ => Ok((slow, blend)),
+            _ => Ok((direct, blend)),
         }
     }
 
@@ -210,6 +232,33 @@ impl<const N: usize> Planner<N> {
     }
 }
 
+/// Whether all poses are where the first is, within 1e-9 m and rad.
+fn is_still(poses: &[Isometry3<f64>]) -> bool {
+    poses.iter().all(|pose| {
+        let gap = poses[0].inv_mul(pose);
+        gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9
+    })
+}
+
+/// When a time law that never goes back reaches `u`, s.
+fn moment(law: &Trajectory<1>, u: f64) -> f64 {
+    let pieces = law.pieces();
+    let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
+    let Some(piece) = pieces.get(next.saturating_sub(1)) else {
+        return 0.0;
+    };
+    let (mut low, mut high) = (0.0, piece.duration);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if piece.sample(middle).position[0] < u {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    law.times()[next.saturating_sub(1)] + high
+}
+
 /// A curve of the tool, whether it rests at both ends in its own parameter, and the
 /// pose of the command that a parameter is on the way to.
 struct Way<'a> {
@@ -248,8 +297,7 @@ fn joint_path<'a, const N: usize>(
         .iter()
         .map(|point| (point.u, JointPoint { q: point.q }))
         .collect();
-    HermitePath::new(points, curve)
-        .ok_or_else(|| MotionError::Timing("the way has fewer than two points".into()))
+    HermitePath::new(points, curve).ok_or(MotionError::NoWay)
 }
 
 /// Knots of the curve, with points between them so that no step is long.

@@ -1,11 +1,15 @@
 //! What was proved of a planned move, as data.
 
 use kinematics::Chain;
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
-use trajectory::{JointLimits, ToolLimits, Trajectory};
+use trajectory::bounds::{JointsToTool, Leg};
+use trajectory::smooth::angular_tolerance;
+use trajectory::timing::Limit;
+use trajectory::{JointPoint, MotionBounds, ToolPoint, Trajectory};
 
 use super::active::ActiveLimit;
+use super::{Draft, Fault};
 use crate::task::{Move, Shape};
 
 /// How one intermediate pose was passed.
@@ -17,11 +21,16 @@ pub struct PassReport {
     pub deviation_m: f64,
     /// Tolerance in force, m.
     pub tolerance_m: f64,
+    /// Angle of the tool from the orientation of the pose at the pass, rad.
+    pub angle_rad: f64,
+    /// Largest such angle: [`trajectory::smooth::angular_tolerance`] of the tolerance, rad.
+    pub angular_tolerance_rad: f64,
     /// Time of the pass after the start of the move, s.
     pub time_s: f64,
 }
 
-/// Peak of each limited quantity, divided by its limit.
+/// Peak of each limited quantity, divided by its limit: bounds for all times, and at most a
+/// hundredth above what is reached. 0 where there is no limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peaks {
     /// Joint velocity, one a joint.
@@ -34,27 +43,31 @@ pub struct Peaks {
     pub tool_speed: f64,
     /// Acceleration of the controlled point.
     pub tool_acceleration: f64,
+    /// Jerk of the controlled point.
+    pub tool_jerk: f64,
     /// Angular speed of the tool.
     pub tool_angular_speed: f64,
     /// Angular acceleration of the tool.
     pub tool_angular_acceleration: f64,
+    /// Angular jerk of the tool.
+    pub tool_angular_jerk: f64,
 }
 
 impl Peaks {
-    /// How much slower a motion must be for every ratio to be at most 1:
-    /// speeds fall with the factor, accelerations with its square, jerks with its cube.
-    #[must_use]
-    pub fn stretch(&self) -> f64 {
-        let most = |ratios: &[f64]| ratios.iter().copied().fold(0.0, f64::max);
-        let speed = most(&self.joint_velocity)
-            .max(self.tool_speed)
-            .max(self.tool_angular_speed);
-        let acceleration = most(&self.joint_acceleration)
-            .max(self.tool_acceleration)
-            .max(self.tool_angular_acceleration);
-        speed
-            .max(acceleration.sqrt())
-            .max(most(&self.joint_jerk).cbrt())
+    /// The ratios of a motion that is bounded.
+    pub(super) fn of<const N: usize>(bounds: &MotionBounds<N>) -> Self {
+        let joints = |limit: fn(usize) -> Limit| (0..N).map(|j| bounds.ratio(limit(j))).collect();
+        Self {
+            joint_velocity: joints(Limit::JointVelocity),
+            joint_acceleration: joints(Limit::JointAcceleration),
+            joint_jerk: joints(Limit::JointJerk),
+            tool_speed: bounds.ratio(Limit::ToolSpeed),
+            tool_acceleration: bounds.ratio(Limit::ToolAcceleration),
+            tool_jerk: bounds.ratio(Limit::ToolJerk),
+            tool_angular_speed: bounds.ratio(Limit::AngularSpeed),
+            tool_angular_acceleration: bounds.ratio(Limit::AngularAcceleration),
+            tool_angular_jerk: bounds.ratio(Limit::AngularJerk),
+        }
     }
 
     /// The largest ratio of all.
@@ -67,11 +80,24 @@ impl Peaks {
             .chain([
                 self.tool_speed,
                 self.tool_acceleration,
+                self.tool_jerk,
                 self.tool_angular_speed,
                 self.tool_angular_acceleration,
+                self.tool_angular_jerk,
             ])
             .fold(0.0, f64::max)
     }
+}
+
+/// How near a move comes to one limit, and when.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LimitReport {
+    /// Name of the limit: `tool speed`, `velocity of elbow`, ...
+    pub limit: String,
+    /// Bound of the quantity over its limit, for all times.
+    pub ratio: f64,
+    /// When the bound is about attained, s after the start of the move.
+    pub time_s: f64,
 }
 
 /// What holds of one planned move.
@@ -87,13 +113,19 @@ pub struct MoveCertificate {
     pub active: Vec<ActiveLimit>,
     /// Every intermediate pose, in the order of the command.
     pub poses: Vec<PassReport>,
-    /// Whether the intermediate poses are passed in order, each within its tolerance.
+    /// Whether the intermediate poses are passed in order, each within its tolerances.
     pub in_order: bool,
     /// Peaks of limits as ratios; at most 1.
     pub peaks: Peaks,
-    /// Largest distance from the straight line, m; only for straight moves.
+    /// The same with the time at which each is attained; every finite limit.
+    pub limits: Vec<LimitReport>,
+    /// Bound of the distance from the straight line at all times, m; only for straight moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub straightness_m: Option<f64>,
+    /// Bound of the distance from the leg travelled at all times, m; only for smooth moves. At
+    /// most the tolerance; well within it, it need not be near to what is reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub corridor_m: Option<f64>,
     /// Distance from the last pose at the end, m.
     pub end_deviation_m: f64,
     /// Angle from the last pose at the end, rad.
@@ -102,80 +134,22 @@ pub struct MoveCertificate {
     pub joint_margin: f64,
 }
 
-/// One state of the tool, sampled from the joints.
-pub(super) struct ToolSample {
-    pub time: f64,
-    pub pose: Isometry3<f64>,
-    pub speed: f64,
-    pub acceleration: f64,
-    pub angular_speed: f64,
-    pub angular_acceleration: f64,
-}
+/// The kinematics of an arm, for bounds of what its tool does.
+pub(super) struct Arm<'a, const N: usize>(pub &'a Chain<N>);
 
-/// Samples of a piece per evaluation of the tool; pieces are a few milliseconds long.
-const PER_PIECE: usize = 4;
-
-/// States of the tool all along a trajectory, from forward kinematics.
-pub(super) fn tool_samples<const N: usize>(
-    chain: &Chain<N>,
-    trajectory: &Trajectory<N>,
-) -> Vec<ToolSample> {
-    let mut samples = Vec::with_capacity(trajectory.pieces().len() * PER_PIECE + 1);
-    let mut start = 0.0;
-    for piece in trajectory.pieces() {
-        for part in 0..PER_PIECE {
-            let within = piece.duration * part as f64 / PER_PIECE as f64;
-            samples.push(tool_sample(chain, trajectory, start + within));
+impl<const N: usize> JointsToTool<N> for Arm<'_, N> {
+    fn motion(&self, joints: &JointPoint<N>) -> ToolPoint {
+        let seen = self.0.motion(&joints.q);
+        ToolPoint {
+            pose: seen.pose,
+            linear: seen.linear,
+            angular: seen.angular,
         }
-        start += piece.duration;
     }
-    samples.push(tool_sample(chain, trajectory, trajectory.duration()));
-    samples
-}
 
-fn tool_sample<const N: usize>(
-    chain: &Chain<N>,
-    trajectory: &Trajectory<N>,
-    time: f64,
-) -> ToolSample {
-    let joints = trajectory.sample(time);
-    let (pose, jacobian) = chain.jacobian(&joints.position);
-    let change = chain.jacobian_derivative(&joints.position, &joints.velocity);
-    let twist = jacobian * joints.velocity;
-    let rate = jacobian * joints.acceleration + change * joints.velocity;
-    let (linear, angular) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-    let (linear_rate, angular_rate) = (rate.fixed_rows::<3>(0), rate.fixed_rows::<3>(3));
-    ToolSample {
-        time,
-        pose,
-        speed: linear.norm(),
-        acceleration: linear_rate.norm(),
-        angular_speed: angular.norm(),
-        angular_acceleration: angular_rate.norm(),
-    }
-}
-
-/// Peaks of tool and joints as ratios to their limits.
-pub(super) fn peaks<const N: usize>(
-    trajectory: &Trajectory<N>,
-    tool: &[ToolSample],
-    joints: &JointLimits<N>,
-    limits: &ToolLimits,
-) -> Peaks {
-    let joint = trajectory.peaks();
-    let ratios = |peak: &SVector<f64, N>, limit: &SVector<f64, N>| {
-        peak.component_div(limit).as_slice().to_vec()
-    };
-    let most =
-        |of: fn(&ToolSample) -> f64, limit: f64| tool.iter().map(of).fold(0.0, f64::max) / limit;
-    Peaks {
-        joint_velocity: ratios(&joint.velocity, &joints.velocity),
-        joint_acceleration: ratios(&joint.acceleration, &joints.acceleration),
-        joint_jerk: ratios(&joint.jerk, &joints.jerk),
-        tool_speed: most(|s| s.speed, limits.speed),
-        tool_acceleration: most(|s| s.acceleration, limits.acceleration),
-        tool_angular_speed: most(|s| s.angular_speed, limits.angular_speed),
-        tool_angular_acceleration: most(|s| s.angular_acceleration, limits.angular_acceleration),
+    fn growth(&self, joints: &[SVector<f64, N>; 6]) -> ([f64; 9], [f64; 8]) {
+        let growth = self.0.growth(joints);
+        (growth.linear, growth.angular)
     }
 }
 
@@ -184,122 +158,150 @@ pub(super) struct Way {
     pub poses: Vec<PassReport>,
     pub in_order: bool,
     pub straightness_m: Option<f64>,
+    pub corridor_m: Option<f64>,
     pub end_deviation_m: f64,
     pub end_angle_rad: f64,
 }
 
+/// `start` is where the arm stands before the move.
 pub(super) fn way<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
-    trajectory: &Trajectory<N>,
-    samples: &[ToolSample],
+    start: &Isometry3<f64>,
+    (draft, bounds): (&Draft<N>, &MotionBounds<N>),
 ) -> Way {
     let (poses, in_order) = match motion.shape {
-        Shape::Smooth => passes(motion, chain, trajectory, samples),
+        Shape::Smooth => passes(motion, chain, (&draft.trajectory, &draft.passes)),
         Shape::Joint | Shape::Straight => (Vec::new(), true),
     };
-    let straight = motion.shape == Shape::Straight;
-    let straightness_m = straight.then(|| straightness(samples));
-    let end = chain.forward(&trajectory.sample(trajectory.duration()).position);
-    let gap = motion
-        .poses
-        .last()
-        .map(|goal| goal.inv_mul(&end))
-        .unwrap_or_default();
+    let last = draft.trajectory.sample(draft.trajectory.duration());
+    let end = chain.forward(&last.position);
+    let line = || bounds.off_line(&start.translation.vector, &end.translation.vector);
+    let gap = motion.poses.last().map(|goal| goal.inv_mul(&end));
+    let gap = gap.unwrap_or_default();
     Way {
+        straightness_m: (motion.shape == Shape::Straight).then(|| line().0),
+        corridor_m: (motion.shape == Shape::Smooth).then(|| {
+            bounds
+                .off_legs(&legs(motion, start, &poses), corridor(motion))
+                .0
+        }),
         poses,
         in_order,
-        straightness_m,
         end_deviation_m: gap.translation.vector.norm(),
         end_angle_rad: gap.rotation.angle(),
     }
 }
 
-fn straightness(samples: &[ToolSample]) -> f64 {
-    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
-        return 0.0;
-    };
-    let origin = first.pose.translation.vector;
-    let direction = last.pose.translation.vector - origin;
-    let length = direction.norm();
-    let along = if length > 0.0 {
-        direction / length
-    } else {
-        Vector3::zeros()
-    };
-    let off = |sample: &ToolSample| {
-        let way = sample.pose.translation.vector - origin;
-        (way - along * way.dot(&along)).norm()
-    };
-    samples.iter().map(off).fold(0.0, f64::max)
+/// Largest distance from the legs of a smooth move, m.
+pub(super) fn corridor(motion: &Move) -> f64 {
+    (motion.tolerance + FIT).max(super::STRAIGHT)
 }
 
-/// Finds, in order, the first local closest approach to each intermediate
-/// pose that lies within the tolerance; a later approach never repairs a miss.
+/// How far the joints may leave the planned way, m.
+const FIT: f64 = 1e-6;
+
+/// The legs of a smooth move, from pass to pass.
+fn legs(motion: &Move, start: &Isometry3<f64>, passes: &[PassReport]) -> Vec<Leg> {
+    let times = passes.iter().map(|pass| pass.time_s);
+    let ends = times.clone().chain([f64::INFINITY]);
+    let from = [start].into_iter().chain(&motion.poses);
+    let pairs = from.zip(&motion.poses);
+    let when = [0.0].into_iter().chain(times).zip(ends);
+    pairs
+        .zip(when)
+        .map(|((from, to), (since, until))| Leg {
+            ends: [from.translation.vector, to.translation.vector],
+            when: [since, until],
+        })
+        .collect()
+}
+
+/// How each intermediate pose is passed at the time known from the planned way, which is that of
+/// the closest approach. Where the joints leave the planned way by the last digits, and with them
+/// the ball, the closest moment near that time counts.
 fn passes<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
-    trajectory: &Trajectory<N>,
-    samples: &[ToolSample],
+    (trajectory, times): (&Trajectory<N>, &[f64]),
 ) -> (Vec<PassReport>, bool) {
     let intermediate = &motion.poses[..motion.poses.len() - 1];
-    let (mut from, mut in_order) = (0, true);
+    let angular_tolerance_rad = angular_tolerance(motion.tolerance);
+    let (mut since, mut in_order) = (0.0, times.len() == intermediate.len());
     let mut reports = Vec::with_capacity(intermediate.len());
-    for (index, pose) in intermediate.iter().enumerate() {
-        let target = pose.translation.vector;
-        let distance = |i: usize| (samples[i].pose.translation.vector - target).norm();
-        let at = first_approach(from, samples.len(), motion.tolerance, distance);
-        let window = (
-            samples[at.saturating_sub(1)].time,
-            samples[(at + 1).min(samples.len() - 1)].time,
-        );
-        let near = |t: f64| {
-            let pose = chain.forward(&trajectory.sample(t).position);
-            (pose.translation.vector - target).norm()
+    for (index, (pose, time)) in intermediate.iter().zip(times).enumerate() {
+        let seen = |t: f64| {
+            let gap = pose.inv_mul(&chain.forward(&trajectory.sample(t).position));
+            (gap.translation.vector.norm(), gap.rotation.angle())
         };
-        let (time_s, deviation_m) = closest(window, near);
-        in_order &= deviation_m <= motion.tolerance.max(EXACT);
-        reports.push(PassReport {
+        let mut time_s = time.clamp(since, trajectory.duration().max(since));
+        let (mut deviation_m, mut angle_rad) = seen(time_s);
+        if deviation_m > motion.tolerance {
+            let after = times
+                .get(index + 1)
+                .map_or(trajectory.duration(), |next| *next);
+            let window = (
+                since.max(time_s - NEAR),
+                (time_s + NEAR).min(after.max(time_s)),
+            );
+            let (closest_s, least) = closest(window, |t| seen(t).0);
+            if least < deviation_m {
+                time_s = closest_s;
+                (deviation_m, angle_rad) = seen(time_s);
+            }
+        }
+        let pass = PassReport {
             index: index + 1,
             deviation_m,
             tolerance_m: motion.tolerance,
+            angle_rad,
+            angular_tolerance_rad,
             time_s,
-        });
-        from = at;
+        };
+        in_order &= holds(&pass, since);
+        reports.push(pass);
+        since = time_s;
     }
     (reports, in_order)
+}
+
+/// Whether every intermediate pose is passed as the command asks.
+pub(super) fn check_passes(certificate: &MoveCertificate, motion: &Move) -> Result<(), Fault> {
+    let (poses, passed) = (motion.poses.len() - 1, certificate.poses.len());
+    if poses != passed {
+        return Err(Fault::Passes { poses, passed });
+    }
+    let mut since = 0.0;
+    for pass in &certificate.poses {
+        if !holds(pass, since) {
+            return Err(Fault::Pass {
+                pose: pass.index,
+                deviation_m: pass.deviation_m,
+                tolerance_m: pass.tolerance_m,
+                angle_rad: pass.angle_rad,
+                tolerance_rad: pass.angular_tolerance_rad,
+                time_s: pass.time_s,
+            });
+        }
+        since = pass.time_s;
+    }
+    Ok(())
+}
+
+/// Whether a pose is passed within its tolerances, not before a time (s).
+fn holds(pass: &PassReport, since: f64) -> bool {
+    pass.time_s >= since
+        && pass.deviation_m <= pass.tolerance_m.max(EXACT)
+        && pass.angle_rad <= pass.angular_tolerance_rad.max(EXACT_ANGLE)
 }
 
 /// What counts as exact where the tolerance is zero, m: a hundredth of the
 /// repeatability of the best arms.
 const EXACT: f64 = 2e-7;
-
-fn first_approach(
-    from: usize,
-    count: usize,
-    tolerance: f64,
-    distance: impl Fn(usize) -> f64,
-) -> usize {
-    let mut best = from;
-    for i in from..count {
-        let here = distance(i);
-        let falls_before = i == from || here <= distance(i - 1);
-        let rises_after = i + 1 == count || here < distance(i + 1);
-        // Between samples the approach may be nearer than at them, hence the slack.
-        let reach = if i + 1 < count {
-            (distance(i + 1) - here).abs()
-        } else {
-            0.0
-        };
-        if falls_before && rises_after && here <= tolerance.max(EXACT) + reach {
-            return i;
-        }
-        if here < distance(best) {
-            best = i;
-        }
-    }
-    best
-}
+/// The same of an orientation, rad.
+const EXACT_ANGLE: f64 = 1e-6;
+/// How near to the planned time of a pass the joints pass the pose, s.
+const NEAR: f64 = 2e-3;
 
 /// Least value of a function with one valley between two times, by golden section.
 fn closest((mut low, mut high): (f64, f64), distance: impl Fn(f64) -> f64) -> (f64, f64) {

@@ -1,13 +1,13 @@
 //! MoveTo: the configuration that is reached soonest, moved to in joint space.
 
-use kinematics::{Chain, Obstacle, Report};
+use kinematics::{Obstacle, Report};
 use nalgebra::{Isometry3, SVector};
+use trajectory::bounds::JointsToTool;
 use trajectory::otg::{self, Otg};
-use trajectory::{
-    Boundary, JointLine, JointPoint, TimingOptions, ToolPoint, Trajectory, time_path,
-};
+use trajectory::{Boundary, JointLine, JointPoint, TimingOptions, Trajectory, time_path};
 
-use super::{MotionError, Planner, certificate};
+use super::certificate::Arm;
+use super::{Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// How many configurations are planned in full, the most promising first.
@@ -26,7 +26,7 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
+    ) -> Result<Draft<N>, MotionError> {
         let pose = motion.poses.first().copied().unwrap_or_default();
         let mut goals = self.configurations(&pose, start)?;
         goals.sort_by(|a, b| self.effort(start, a).total_cmp(&self.effort(start, b)));
@@ -40,23 +40,21 @@ impl<const N: usize> Planner<N> {
             goals = apart;
         }
         goals.truncate(TRIED);
-        let mut best: Option<(f64, Trajectory<N>)> = None;
+        let mut best: Option<(f64, Draft<N>)> = None;
         let mut refusal = None;
         for goal in &goals {
             match self.joint_move(motion, start, goal) {
-                Ok(found)
-                    if best
-                        .as_ref()
-                        .is_none_or(|(least, _)| found.duration() / self.ease(goal) < *least) =>
-                {
-                    best = Some((found.duration() / self.ease(goal), found));
+                Ok(found) => {
+                    let time = found.trajectory.duration() / self.ease(goal);
+                    if best.as_ref().is_none_or(|(least, _)| time < *least) {
+                        best = Some((time, found));
+                    }
                 }
-                Ok(_) => {}
                 Err(error) => refusal = Some(error),
             }
         }
         best.map(|(_, found)| found)
-            .ok_or_else(|| refusal.unwrap_or_else(|| MotionError::Timing("no goal".into())))
+            .ok_or_else(|| refusal.unwrap_or(MotionError::NoWay))
     }
 
     /// All known configurations that reach a pose within the joint limits.
@@ -106,25 +104,28 @@ impl<const N: usize> Planner<N> {
         (room / ROOM).min(smallest / NIMBLE).clamp(1e-3, 1.0)
     }
 
+    /// The fastest way in joint space that keeps every limit of joints and tool.
     pub(super) fn joint_move(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
         goal: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
+    ) -> Result<Draft<N>, MotionError> {
         let free = self.rest_to_rest(start, goal)?;
-        let samples = certificate::tool_samples(self.chain(), &free);
-        let peaks = certificate::peaks(&free, &samples, &self.limits, &motion.limits);
-        let stretch = peaks.stretch();
-        if stretch <= 1.0 {
+        let alone = free.duration();
+        let free = self.slowed(Draft::of(free), motion);
+        if free.trajectory.duration() <= alone {
             return Ok(free);
         }
         // The tool is too fast: either everything slower, or a line in joint
         // space that is slow only where the tool is fast.
-        let slow = free.stretched(stretch);
         match self.timed_line(motion, start, goal) {
-            Ok(line) if line.duration() < slow.duration() => Ok(line),
-            _ => Ok(slow),
+            Ok(line) => {
+                let line = self.slowed(Draft::of(line), motion);
+                let faster = line.trajectory.duration() < free.trajectory.duration();
+                Ok(if faster { line } else { free })
+            }
+            Err(_) => Ok(free),
         }
     }
 
@@ -139,10 +140,7 @@ impl<const N: usize> Planner<N> {
             &otg::Limits::from(&self.limits),
             &otg::Options::default(),
         );
-        match plan {
-            Ok(found) => Ok(Trajectory::new(found.pieces())),
-            Err(error) => Err(MotionError::Timing(error.to_string())),
-        }
+        Ok(Trajectory::new(plan?.pieces()))
     }
 
     fn timed_line(
@@ -152,16 +150,14 @@ impl<const N: usize> Planner<N> {
         goal: &SVector<f64, N>,
     ) -> Result<Trajectory<N>, MotionError> {
         let chain = self.chain();
-        let tool = |joint: &trajectory::JointPoint<N>| tool_point(chain, joint);
+        let tool = |joint: &JointPoint<N>| Arm(chain).motion(joint);
         let line = JointLine::new(*start, *goal, tool);
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
             ..Default::default()
         };
-        time_path(&line, &self.limits, &motion.limits, &options)
-            .map(|timed| timed.trajectory)
-            .map_err(|error| MotionError::Timing(error.to_string()))
+        Ok(time_path(&line, &self.limits, &motion.limits, &options)?.trajectory)
     }
 
     /// The report of the solver in the words of a command.
@@ -186,27 +182,5 @@ impl<const N: usize> Planner<N> {
                 degrees: report.rotation_error.to_degrees(),
             },
         }
-    }
-}
-
-/// Pose and derivatives of the controlled point from those of the joints.
-fn tool_point<const N: usize>(chain: &Chain<N>, joint: &JointPoint<N>) -> ToolPoint {
-    let [q, dq, ddq, dddq] = &joint.q;
-    let (pose, jacobian) = chain.jacobian(q);
-    let change = chain.jacobian_derivative(q, dq);
-    // Second derivative of the Jacobian by central difference, over 1e-4 rad of the fastest joint.
-    let h = 1e-4 / dq.amax().max(1e-6);
-    let at = |h: f64| chain.jacobian_derivative(&(q + dq * h), &(dq + ddq * h));
-    let second = (at(h) - at(-h)) / (2.0 * h);
-    let twists = [
-        jacobian * dq,
-        jacobian * ddq + change * dq,
-        jacobian * dddq + change * ddq * 2.0 + second * dq,
-    ];
-    let part = |row: usize| twists.map(|twist| twist.fixed_rows::<3>(row).into_owned());
-    ToolPoint {
-        pose,
-        linear: part(0),
-        angular: part(3),
     }
 }

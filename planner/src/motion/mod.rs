@@ -6,19 +6,26 @@
 mod active;
 mod cartesian;
 mod certificate;
+mod draft;
+mod fault;
 mod goal;
 mod jog;
+mod least;
 mod motion_error;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
-use trajectory::smooth::{self, SmoothOptions};
-use trajectory::{JointLimits, ToolLimits, Trajectory};
+use trajectory::bounds::Held;
+use trajectory::{JointLimits, MotionBounds, Trajectory};
 
 pub use active::ActiveLimit;
-pub use certificate::{MoveCertificate, PassReport, Peaks};
+pub use certificate::{LimitReport, MoveCertificate, PassReport, Peaks};
+pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
+
+use certificate::Arm;
+use draft::Draft;
 
 use crate::task::{Move, Shape};
 
@@ -117,7 +124,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The smooth motion in the tolerance asked for; where its certificate fails after
-    /// the joints had their say, in a quarter of it, and at last with a stop at each pose.
+    /// the joints are taken into account, in a quarter of it, and at last with a stop at each pose.
     /// Never slower than with a stop at each pose.
     fn smooth_move(
         &self,
@@ -129,8 +136,8 @@ impl<const N: usize> Planner<N> {
                 tolerance,
                 ..motion.clone()
             };
-            let (trajectory, blend) = self.plan_smooth(&tighter, start)?;
-            let planned = self.certify(motion, start, trajectory)?;
+            let (draft, blend) = self.plan_smooth(&tighter, start)?;
+            let planned = self.certify(motion, start, draft)?;
             Ok(PlannedMove {
                 blend: Some(blend),
                 ..planned
@@ -154,93 +161,122 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// Slows the motion down, uniformly and by as little as needed, until every
-    /// limit holds, and proves what the command asked for.
+    /// Proves what the command asked for of a motion that keeps the limits.
     fn certify(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        trajectory: Trajectory<N>,
+        draft: Draft<N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        if trajectory.pieces().is_empty() {
+        if draft.trajectory.pieces().is_empty() {
             // Nothing to do: the arm is there. What is proved is that standing still is right.
             let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
+            let passes = draft.passes.clone();
+            let still = Draft {
+                passes,
+                ..Draft::of(still)
+            };
             let standing = self.certify(motion, start, still)?;
             return Ok(PlannedMove {
-                trajectory,
+                trajectory: draft.trajectory,
                 ..standing
             });
         }
-        check_smooth(&trajectory, start)?;
-        let trajectory = self.within_limits(trajectory, &motion.limits);
-        let samples = certificate::tool_samples(self.chain(), &trajectory);
-        let peaks = certificate::peaks(&trajectory, &samples, &self.limits, &motion.limits);
-        let way = certificate::way(motion, self.chain(), &trajectory, &samples);
-        let joint_margin = self.margin(&trajectory);
-        let active = active::active(
-            &trajectory,
-            &samples,
-            (&self.limits, &motion.limits),
-            &self.joint_names,
-        );
-        let certificate = MoveCertificate {
-            duration_s: trajectory.duration(),
-            lower_bound_s: self.least_time(motion, start, &trajectory),
-            active,
-            poses: way.poses,
-            in_order: way.in_order,
-            peaks,
-            straightness_m: way.straightness_m,
-            end_deviation_m: way.end_deviation_m,
-            end_angle_rad: way.end_angle_rad,
-            joint_margin,
-        };
+        check_smooth(&draft.trajectory, start)?;
+        let (draft, bounds) = self.within_limits(draft, motion);
+        let end = draft.trajectory.sample(draft.trajectory.duration());
+        let ends = (start, &end.position);
+        let lower_bound_s = self.least_time(motion, ends, &draft);
+        let certificate = self.certificate(motion, ends, (&draft, &bounds), lower_bound_s);
         check(&certificate, motion)?;
-        let end = trajectory.sample(trajectory.duration()).position;
         Ok(PlannedMove {
-            trajectory,
+            trajectory: draft.trajectory,
             certificate,
-            end,
+            end: end.position,
             blend: None,
         })
     }
 
-    /// No motion between the same ends within the limits is shorter, s: of each
-    /// joint alone, and of the tool alone through the poses.
-    fn least_time(
+    /// What holds of a motion from one place to another.
+    fn certificate(
         &self,
         motion: &Move,
-        start: &SVector<f64, N>,
-        trajectory: &Trajectory<N>,
-    ) -> f64 {
-        let end = trajectory.sample(trajectory.duration()).position;
-        let joints = self.rest_to_rest(start, &end);
-        let joints = joints.map_or(0.0, |found| found.duration());
-        let tool = match motion.shape {
-            Shape::Joint => 0.0,
-            Shape::Straight | Shape::Smooth => {
-                let mut poses = vec![self.chain().forward(start)];
-                poses.extend_from_slice(&motion.poses);
-                let options = SmoothOptions::new(motion.tolerance, motion.limits);
-                smooth::least_time(&poses, &options).unwrap_or(0.0)
-            }
-        };
-        // Both are exact up to rounding where they are the motion itself.
-        joints.max(tool).min(trajectory.duration())
-    }
-
-    fn within_limits(&self, trajectory: Trajectory<N>, limits: &ToolLimits) -> Trajectory<N> {
-        let samples = certificate::tool_samples(self.chain(), &trajectory);
-        let stretch = certificate::peaks(&trajectory, &samples, &self.limits, limits).stretch();
-        if stretch <= 1.0 {
-            trajectory
-        } else {
-            trajectory.stretched(stretch)
+        (start, _): (&SVector<f64, N>, &SVector<f64, N>),
+        (draft, bounds): (&Draft<N>, &MotionBounds<N>),
+        lower_bound_s: f64,
+    ) -> MoveCertificate {
+        let from = self.chain().forward(start);
+        let way = certificate::way(motion, self.chain(), &from, (draft, bounds));
+        let name = |limit| active::name(limit, &self.joint_names);
+        let spans = bounds.active(active::ACTIVE).into_iter();
+        let active = spans.map(|span| ActiveLimit {
+            limit: name(span.limit),
+            start_s: span.start,
+            end_s: span.end,
+        });
+        let limits = bounds.peaks.iter().map(|peak| LimitReport {
+            limit: name(peak.limit),
+            ratio: peak.ratio,
+            time_s: peak.time,
+        });
+        MoveCertificate {
+            duration_s: draft.trajectory.duration(),
+            lower_bound_s,
+            active: active.collect(),
+            poses: way.poses,
+            in_order: way.in_order,
+            peaks: Peaks::of(bounds),
+            limits: limits.collect(),
+            straightness_m: way.straightness_m,
+            corridor_m: way.corridor_m,
+            end_deviation_m: way.end_deviation_m,
+            end_angle_rad: way.end_angle_rad,
+            joint_margin: self.margin(bounds),
         }
     }
 
-    fn margin(&self, trajectory: &Trajectory<N>) -> f64 {
-        let (lowest, highest) = trajectory.position_range();
+    /// Bounds of a motion of the joints at all times, under the limits of a move.
+    fn bounds(&self, trajectory: &Trajectory<N>, motion: &Move) -> MotionBounds<N> {
+        let held = Held {
+            joints: &self.limits,
+            tool: &motion.limits,
+            place: match motion.shape {
+                Shape::Joint => f64::INFINITY,
+                Shape::Straight | Shape::Smooth => PLACE,
+            },
+        };
+        MotionBounds::new(trajectory, &Arm(self.chain()), &held)
+    }
+
+    /// Slows a motion down, uniformly and by as little as needed, until every limit holds; with
+    /// its bounds.
+    fn within_limits(&self, draft: Draft<N>, motion: &Move) -> (Draft<N>, MotionBounds<N>) {
+        match draft.bounds {
+            Some(bounds) => {
+                let draft = Draft {
+                    bounds: None,
+                    ..draft
+                };
+                (draft, bounds)
+            }
+            None => {
+                let bounds = self.bounds(&draft.trajectory, motion);
+                draft.bounded(bounds)
+            }
+        }
+    }
+
+    /// The same with the bounds kept for the certificate.
+    fn slowed(&self, draft: Draft<N>, motion: &Move) -> Draft<N> {
+        let (draft, bounds) = self.within_limits(draft, motion);
+        Draft {
+            bounds: Some(bounds),
+            ..draft
+        }
+    }
+
+    fn margin(&self, bounds: &MotionBounds<N>) -> f64 {
+        let [lowest, highest] = bounds.positions;
         let below = (lowest - self.limits.lower).min();
         let above = (self.limits.upper - highest).min();
         below.min(above)
@@ -272,26 +308,23 @@ const JUMP: f64 = 1e-9;
 fn check_smooth<const N: usize>(
     trajectory: &Trajectory<N>,
     start: &SVector<f64, N>,
-) -> Result<(), MotionError> {
-    let fault = |what: String| Err(MotionError::Uncertified(what));
+) -> Result<(), Fault> {
     let mut last = realtime::Sample::rest(*start);
-    for (index, piece) in trajectory.pieces().iter().enumerate() {
-        let first = piece.sample(0.0);
+    for (piece, part) in trajectory.pieces().iter().enumerate() {
+        let first = part.sample(0.0);
         let jump = (first.position - last.position).amax();
         if !jump.is_finite() || jump > JUMP {
-            return fault(format!(
-                "piece {index} begins {jump:.1e} from where the arm is"
-            ));
+            return Err(Fault::Position { piece, jump });
         }
         let jump = (first.velocity - last.velocity).amax();
         if !jump.is_finite() || jump > 1e-6 {
-            return fault(format!("the velocity jumps by {jump:.1e} at piece {index}"));
+            return Err(Fault::Velocity { piece, jump });
         }
-        last = piece.sample(piece.duration);
+        last = part.sample(part.duration);
     }
     let speed = last.velocity.amax();
     if !speed.is_finite() || speed > 1e-6 {
-        return fault(format!("it ends at a velocity of {speed:.1e}"));
+        return Err(Fault::NotAtRest { speed });
     }
     Ok(())
 }
@@ -300,33 +333,39 @@ fn check_smooth<const N: usize>(
 const STRAIGHT: f64 = 1e-5;
 /// Largest distance and angle from the last pose, m and rad.
 const ARRIVED: (f64, f64) = (1e-6, 1e-6);
+/// Largest error of the place of the tool in bounds of its way, m.
+const PLACE: f64 = 1e-7;
 
-fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), MotionError> {
-    let fault = |what: String| Err(MotionError::Uncertified(what));
-    let largest = certificate.peaks.largest();
-    if largest.is_nan() || largest > 1.0 + ROUNDING {
-        return fault(format!("a limit is exceeded {largest:.6} times"));
+/// Whether a certificate says what the command asked for.
+fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), Fault> {
+    let broken = |ratio: f64| ratio.is_nan() || ratio > 1.0 + ROUNDING;
+    if let Some(worst) = certificate.limits.iter().find(|limit| broken(limit.ratio)) {
+        return Err(Fault::Limit {
+            limit: worst.limit.clone(),
+            ratio: worst.ratio,
+            time_s: worst.time_s,
+        });
     }
-    if !certificate.in_order {
-        return fault(format!(
-            "an intermediate pose is not passed in order within {:.4} mm",
-            motion.tolerance * 1e3
-        ));
+    if motion.shape == Shape::Smooth {
+        certificate::check_passes(certificate, motion)?;
     }
-    if certificate.straightness_m.is_some_and(|off| off > STRAIGHT) {
-        return fault("the straight line is not straight within 0.01 mm".into());
+    let allowed_m = certificate::corridor(motion);
+    let leaves = |off: &f64| off.is_nan() || *off > allowed_m;
+    if let Some(off_m) = certificate.corridor_m.filter(leaves) {
+        return Err(Fault::Corridor { off_m, allowed_m });
     }
-    if certificate.end_deviation_m > ARRIVED.0 || certificate.end_angle_rad > ARRIVED.1 {
-        return fault(format!(
-            "it ends {:.6} mm off",
-            certificate.end_deviation_m * 1e3
-        ));
+    let allowed_m = STRAIGHT;
+    let bends = |off: &f64| off.is_nan() || *off > allowed_m;
+    if let Some(off_m) = certificate.straightness_m.filter(bends) {
+        return Err(Fault::Straightness { off_m, allowed_m });
     }
-    if certificate.joint_margin < -ROUNDING {
+    let (off_m, angle_rad) = (certificate.end_deviation_m, certificate.end_angle_rad);
+    if off_m.is_nan() || angle_rad.is_nan() || off_m > ARRIVED.0 || angle_rad > ARRIVED.1 {
+        return Err(Fault::End { off_m, angle_rad });
+    }
+    if certificate.joint_margin.is_nan() || certificate.joint_margin < -ROUNDING {
         let beyond = -certificate.joint_margin;
-        return fault(format!(
-            "a joint goes {beyond:.3e} beyond its position limit"
-        ));
+        return Err(Fault::Range { beyond });
     }
     Ok(())
 }

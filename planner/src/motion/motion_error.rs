@@ -1,6 +1,11 @@
 //! Why a motion cannot be made.
 
 use thiserror::Error;
+use trajectory::TimingError;
+use trajectory::otg::OtgError;
+use trajectory::smooth::SmoothError;
+
+use super::Fault;
 
 /// A move that the arm cannot make. Poses are counted from 1, joints by name.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -61,13 +66,19 @@ pub enum MotionError {
     Jog(String),
     /// The smooth path could not be made.
     #[error("no smooth path: {0}")]
-    Smooth(String),
-    /// No time law could be made.
+    Smooth(#[from] SmoothError),
+    /// No time law could be made along the way.
     #[error("the motion cannot be timed: {0}")]
-    Timing(String),
+    Timing(#[from] TimingError),
+    /// No motion from joints to joints could be made.
+    #[error("the motion cannot be timed: {0}")]
+    PointToPoint(#[from] OtgError),
+    /// The way of the joints has fewer than two points.
+    #[error("the motion cannot be timed: its way has fewer than two points")]
+    NoWay,
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]
-    Uncertified(String),
+    Uncertified(#[from] Fault),
 }
 
 impl MotionError {
@@ -85,7 +96,7 @@ impl MotionError {
             }
             Self::Jog(_) => "go the other way",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
-            Self::Timing(_) | Self::Uncertified(_) => {
+            Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
                 "please report this with the program: it is a fault of the planner"
             }
         }

@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::active::Active;
 use super::options::SmoothOptions;
 use super::pass::{self, Pass, RESOLUTION};
 use super::poly::{bernstein, halve};
 use super::span::Span;
-use crate::timing::ActiveSpan;
+use crate::active::Active;
+use crate::timing::{ActiveSpan, Limit};
 
 /// Greatest ratio of a quantity to its limit, and when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -63,6 +63,19 @@ pub struct Certificate {
     /// shorter, s.
     pub lower_bound: f64,
 }
+
+/// A limit used to this share is active.
+const ACTIVE: f64 = 0.98;
+
+/// Limits in the order of the ratios.
+const LIMITS: [Limit; 6] = [
+    Limit::ToolSpeed,
+    Limit::ToolAcceleration,
+    Limit::ToolJerk,
+    Limit::AngularSpeed,
+    Limit::AngularAcceleration,
+    Limit::AngularJerk,
+];
 
 /// Room for rounding in a ratio: 1 part in 1e9.
 const ROUNDING: f64 = 1.0 + 1e-9;
@@ -133,7 +146,7 @@ pub(crate) fn certify(
         duration: spans.last().map_or(0.0, Span::end),
         ..Certificate::default()
     };
-    let mut active = Active::default();
+    let mut active = Active::new(LIMITS.to_vec(), ACTIVE);
     for span in spans {
         active.add(span.start, &limits_of(span, options, &mut certificate));
     }

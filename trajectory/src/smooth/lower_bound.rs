@@ -1,6 +1,9 @@
 //! A time that no motion through the poses within the limits can beat.
 //!
-//! Two bounds that hold for every motion from rest to rest, whatever its shape:
+//! With tolerance and corridor zero the motion is known: straight legs from stop to stop, turned
+//! in step, each of which takes the time of the tightest limit.
+//!
+//! Otherwise two bounds that hold for every motion from rest to rest, whatever its shape:
 //!
 //! - **Length.** The speed is at most what the limits allow since the start and
 //!   until the end, so the way covered in a given time is bounded; the way is
@@ -12,8 +15,10 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::options::{SmoothError, SmoothOptions};
-use super::ramp::{self, Caps, Gate};
+use super::pass::RESOLUTION;
+use super::ramp::{self, Caps};
 use crate::line::body_turn;
+use crate::timing::least_time as rest_to_rest;
 
 /// Legs whose directions are looked along, at most.
 const DIRECTIONS: usize = 16;
@@ -45,6 +50,13 @@ pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> 
         (b.translation.vector - a.translation.vector).norm()
     };
     let turn = |a: &Isometry3<f64>, b: &Isometry3<f64>| body_turn(&a.rotation, &b.rotation).norm();
+    if options.tolerance <= RESOLUTION && options.corridor() <= RESOLUTION {
+        let leg = |pair: &[Isometry3<f64>]| {
+            rest_to_rest(way(&pair[0], &pair[1]), linear.values())
+                .max(rest_to_rest(turn(&pair[0], &pair[1]), angular.values()))
+        };
+        return poses.windows(2).map(leg).sum();
+    }
     let turned = length(poses, options.angular_tolerance(), turn);
     shortest(length(poses, options.tolerance, way), &linear)
         .max(shortest(turned, &angular))
@@ -150,9 +162,7 @@ fn turns(places: &[f64], tolerance: f64) -> Vec<f64> {
 /// Sum of the least times between places of standing still.
 fn standing_times(turns: &[f64], tolerance: f64, caps: &Caps) -> f64 {
     if let [first, goal] = turns {
-        let length = (goal - first).abs();
-        let pieces = ramp::leg(length, Gate::default(), Gate::default(), caps);
-        return pieces.map_or(0.0, |pieces| pieces.iter().map(|piece| piece.0).sum());
+        return rest_to_rest((goal - first).abs(), caps.values());
     }
     let last = turns.len() - 1;
     (1..=last)
@@ -193,6 +203,13 @@ mod tests {
     fn exact_on_a_line() {
         assert!((bound(&[[0.0, 0.0], [0.1, 0.0]], 1e-3) - 0.35).abs() < 1e-9);
         assert_eq!(bound(&[[0.0, 0.0], [0.0, 0.0]], 1e-3), 0.0);
+    }
+
+    /// With tolerance zero the legs are known, stop to stop: two of 0.35 s.
+    #[test]
+    fn exact_with_stops() {
+        let stops = bound(&[[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]], 0.0);
+        assert!((stops - 0.7).abs() < 1e-9);
     }
 
     /// There and back: two ways of 99 mm between moments of standing still.

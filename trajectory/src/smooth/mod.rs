@@ -12,7 +12,6 @@
 //! where joints need more time, the path timing stretches it, and stretching
 //! changes no geometry.
 
-mod active;
 mod approach;
 mod certificate;
 mod choose;
@@ -21,15 +20,16 @@ mod lower_bound;
 mod options;
 mod pass;
 mod plan;
-mod poly;
+pub(crate) mod poly;
 mod ramp;
 mod span;
 mod spline;
 mod windows;
 
+pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use lower_bound::least_time;
-pub use options::{SmoothError, SmoothOptions};
+pub use options::{SmoothError, SmoothOptions, angular_tolerance};
 pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};
 pub use windows::Windows;

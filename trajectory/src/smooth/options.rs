@@ -11,6 +11,21 @@ const LEVER: f64 = 0.05;
 /// Greatest default angular tolerance, rad.
 const WIDEST_ANGLE: f64 = 0.2;
 
+/// The orientation rule: how far (rad) the tool may be turned away from an intermediate pose
+/// while it passes that pose within `tolerance` (m). The angle whose arc at a lever of 50 mm is
+/// the tolerance, at most 0.2 rad; 0 where the tolerance is 0.
+///
+/// ```
+/// use trajectory::smooth::angular_tolerance;
+/// assert_eq!(angular_tolerance(0.0), 0.0);
+/// assert!((angular_tolerance(0.001) - 0.02).abs() < 1e-15);
+/// assert_eq!(angular_tolerance(0.02), 0.2);
+/// ```
+#[must_use]
+pub fn angular_tolerance(tolerance: f64) -> f64 {
+    (tolerance / LEVER).min(WIDEST_ANGLE)
+}
+
 /// What a smooth motion may do.
 ///
 /// ```
@@ -34,8 +49,8 @@ pub struct SmoothOptions {
     /// narrower than the tolerance narrows the tolerance too.
     pub corridor: Option<f64>,
     /// Greatest angle to the orientation of an intermediate pose at its
-    /// closest approach, rad; `None` means the angle whose arc at a lever of
-    /// 0.05 m is the tolerance, at most 0.2 rad.
+    /// closest approach, rad; `None` means [`angular_tolerance`] of the
+    /// tolerance.
     pub angular_tolerance: Option<f64>,
     /// Limits of the controlled point; infinity means no limit.
     pub limits: ToolLimits,
@@ -66,7 +81,7 @@ impl SmoothOptions {
     #[must_use]
     pub fn angular_tolerance(&self) -> f64 {
         self.angular_tolerance
-            .unwrap_or((self.tolerance / LEVER).min(WIDEST_ANGLE))
+            .unwrap_or_else(|| angular_tolerance(self.tolerance))
     }
 
     /// The options with each infinite limit replaced by a huge one, so that

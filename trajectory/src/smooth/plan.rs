@@ -269,4 +269,31 @@ mod tests {
             Err(SmoothError::BadTolerance { .. })
         ));
     }
+
+    /// Three legs and more, then a turn on the spot at the last point: each part of a leg that
+    /// stays where it is must not rule how fast the leg begins.
+    #[test]
+    fn a_turn_on_the_spot_at_the_end() {
+        let at = |y: f64, z: f64, angle: f64| {
+            Isometry3::new(Vector3::new(0.45, y, z), Vector3::x() * angle)
+        };
+        let way = [
+            at(-0.15, 0.3, 0.0),
+            at(-0.07, 0.3, 0.0),
+            at(0.01, 0.35, 0.0),
+            at(0.09, 0.3, 0.0),
+            at(0.09, 0.3, 0.1),
+        ];
+        for first in 0..4 {
+            for tolerance in [1e-5, 5e-4, 1e-3, 2e-2] {
+                check(&way[first..], tolerance);
+                let back: Vec<_> = way[first..].iter().rev().copied().collect();
+                check(&back, tolerance);
+            }
+        }
+        // The same turn between legs, and each pose twice.
+        check(&[way[1], way[2], way[3], way[4], at(0.2, 0.3, 0.1)], 1e-3);
+        let twice: Vec<_> = way.iter().flat_map(|pose| [*pose; 2]).collect();
+        check(&twice, 5e-4);
+    }
 }

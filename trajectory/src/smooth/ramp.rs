@@ -8,6 +8,13 @@ pub(crate) struct Caps {
     pub(crate) jerk: f64,
 }
 
+impl Caps {
+    /// Speed, acceleration, jerk.
+    pub(crate) fn values(&self) -> [f64; 3] {
+        [self.speed, self.acceleration, self.jerk]
+    }
+}
+
 /// Speed and acceleration at an end of a leg. `acceleration` is the one that
 /// leads away from the end into the leg, so it is >= 0 at both ends (seen
 /// backwards in time at the far end).

@@ -4,11 +4,12 @@ use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
 use super::bound::bound;
-use super::certificate::{ActiveSpan, Limit, LimitPeak};
+use super::certificate::{ActiveSpan, Limit, LimitPeak, order, root};
 use super::grid::Bounded;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use super::stations::ToolStation;
+use crate::active::Active;
 use crate::wide::Wide;
 use crate::{Path, ToolLimits};
 
@@ -30,15 +31,6 @@ pub(super) struct Audit {
     /// What sampled tool ratios were raised by, at most.
     pub tool_margin: f64,
     durations: Vec<f64>,
-}
-
-/// How a ratio shrinks when time is stretched: as the first, second or third power.
-pub(super) fn order(limit: Limit) -> i32 {
-    match limit {
-        Limit::JointVelocity(_) | Limit::ToolSpeed | Limit::AngularSpeed | Limit::Rate => 1,
-        Limit::JointAcceleration(_) | Limit::ToolAcceleration | Limit::AngularAcceleration => 2,
-        Limit::JointJerk(_) | Limit::ToolJerk | Limit::AngularJerk => 3,
-    }
 }
 
 impl Audit {
@@ -162,40 +154,13 @@ impl Audit {
     pub(super) fn active(&self, factor: f64) -> Vec<ActiveSpan> {
         let from = |limit: &Limit| ACTIVE * factor.powi(order(*limit));
         let least: Vec<f64> = self.limits.iter().map(from).collect();
-        // Since when a limit is active.
-        let mut open: Vec<Option<f64>> = vec![None; least.len()];
-        let mut spans = Vec::new();
+        let mut active = Active::with(self.limits.clone(), least);
         let mut clock = 0.0;
         for (row, duration) in self.rows().zip(&self.durations) {
-            for (i, ratio) in row.iter().enumerate() {
-                if *ratio >= least[i] {
-                    open[i] = open[i].or(Some(clock));
-                } else if let Some(start) = open[i].take() {
-                    let (limit, end) = (self.limits[i], clock);
-                    spans.push(ActiveSpan { limit, start, end });
-                }
-            }
+            active.add(clock, row);
             clock += duration * factor;
         }
-        for (limit, start) in self.limits.iter().zip(open) {
-            spans.extend(start.map(|start| ActiveSpan {
-                limit: *limit,
-                start,
-                end: clock,
-            }));
-        }
-        let later = |a: &ActiveSpan, b: &ActiveSpan| a.start.total_cmp(&b.start);
-        spans.sort_by(|a, b| later(a, b).then(a.limit.cmp(&b.limit)));
-        spans
-    }
-}
-
-/// Root of the order 1, 2 or 3.
-fn root(x: f64, order: i32) -> f64 {
-    match order {
-        1 => x,
-        2 => x.sqrt(),
-        _ => x.cbrt(),
+        active.finish(clock)
     }
 }
 

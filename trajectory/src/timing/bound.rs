@@ -1,56 +1,24 @@
 //! Bounds of polynomials over an interval, for all times.
 
+use crate::smooth::poly::bernstein;
+
 /// An upper bound of `|sum_k coefficients[k] t^k|` over `0 <= t <= duration`, exact to `tolerance`
 /// where it is above `floor`; at most five coefficients.
 ///
 /// # Source
 /// Convex hull property of the Bernstein form, tightened by subdivision (Farin, Curves and
 /// Surfaces for CAGD, 2002, chapter 5).
-pub(super) fn bound(coefficients: &[f64], duration: f64, (floor, tolerance): (f64, f64)) -> f64 {
-    let (points, count) = bernstein(coefficients, duration);
-    refine(points, count, (floor, tolerance), 12)
-}
-
-/// Bernstein points of the polynomial over the interval, and their number.
-fn bernstein(coefficients: &[f64], duration: f64) -> ([f64; 5], usize) {
-    const SHARE: [[[f64; 5]; 5]; 5] = shares();
-    let count = coefficients.len().min(5);
+pub(super) fn bound<const M: usize>(
+    coefficients: &[f64; M],
+    duration: f64,
+    (floor, tolerance): (f64, f64),
+) -> f64 {
     let mut points = [0.0; 5];
-    let mut power = 1.0;
-    for (k, c) in coefficients.iter().take(5).enumerate() {
-        let c = c * power;
-        power *= duration;
-        for (i, point) in points.iter_mut().enumerate().take(count).skip(k) {
-            *point += c * SHARE[count - 1][i][k];
-        }
+    let control = bernstein(coefficients, 0.0, duration);
+    for (point, c) in points.iter_mut().zip(control) {
+        *point = c;
     }
-    (points, count)
-}
-
-/// `C(i, k) / C(n, k)` for degree `n`.
-const fn shares() -> [[[f64; 5]; 5]; 5] {
-    const CHOOSE: [[f64; 5]; 5] = [
-        [1.0, 0.0, 0.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0, 0.0, 0.0],
-        [1.0, 2.0, 1.0, 0.0, 0.0],
-        [1.0, 3.0, 3.0, 1.0, 0.0],
-        [1.0, 4.0, 6.0, 4.0, 1.0],
-    ];
-    let mut table = [[[0.0; 5]; 5]; 5];
-    let mut n = 0;
-    while n < 5 {
-        let mut i = 0;
-        while i <= n {
-            let mut k = 0;
-            while k <= i {
-                table[n][i][k] = CHOOSE[i][k] / CHOOSE[n][k];
-                k += 1;
-            }
-            i += 1;
-        }
-        n += 1;
-    }
-    table
+    refine(points, M.min(5), (floor, tolerance), 12)
 }
 
 /// Splits at the turning point until the hull is tight: the parts on both sides of it rise or fall

@@ -45,6 +45,24 @@ impl fmt::Display for Limit {
     }
 }
 
+/// How a ratio shrinks when time is stretched: as the first, second or third power.
+pub(crate) fn order(limit: Limit) -> i32 {
+    match limit {
+        Limit::JointVelocity(_) | Limit::ToolSpeed | Limit::AngularSpeed | Limit::Rate => 1,
+        Limit::JointAcceleration(_) | Limit::ToolAcceleration | Limit::AngularAcceleration => 2,
+        Limit::JointJerk(_) | Limit::ToolJerk | Limit::AngularJerk => 3,
+    }
+}
+
+/// Root of the order 1, 2 or 3.
+pub(crate) fn root(x: f64, order: i32) -> f64 {
+    match order {
+        1 => x,
+        2 => x.sqrt(),
+        _ => x.cbrt(),
+    }
+}
+
 /// How near the motion comes to one limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitPeak {

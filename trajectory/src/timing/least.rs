@@ -7,10 +7,16 @@ use crate::Path;
 /// The least time (s) from rest to rest over a distance under a velocity, acceleration and jerk
 /// limit, in consistent units; infinite limits do not bind.
 ///
+/// ```
+/// let time = trajectory::timing::least_time(1.0, [2.0, 10.0, 100.0]);
+/// assert!((time - 0.8).abs() < 1e-12);
+/// ```
+///
 /// # Source
 /// Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section
 /// 3.4 (double S), for zero velocities at both ends.
-pub(super) fn least_time(distance: f64, [v, a, j]: [f64; 3]) -> f64 {
+#[must_use]
+pub fn least_time(distance: f64, [v, a, j]: [f64; 3]) -> f64 {
     let (v, a, j) = (v.min(1e100), a.min(1e50), j.min(1e60));
     let short = (32.0 * distance / j).cbrt();
     if v * j < a * a {

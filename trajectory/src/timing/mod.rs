@@ -32,7 +32,9 @@ mod tighten;
 mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
+pub(crate) use certificate::{order as limit_order, root as limit_root};
 pub use law::{Law, LawProblem};
+pub use least::least_time;
 pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 

@@ -1,8 +1,8 @@
 //! From a problem to the law that ships: solve, bound between the grid points, tighten the rows
 //! that are exceeded there, solve again.
 
-use super::audit::{self, Audit};
-use super::certificate::Limit;
+use super::audit::Audit;
+use super::certificate::{Limit, order};
 use super::grid::Bounded;
 use super::interior::Interior;
 use super::lanes::{LANE, Lane};
@@ -161,7 +161,7 @@ fn scale(problem: &mut Problem, (k, tools): (usize, &Tools), limit: Limit, facto
             }
         }
         _ => {
-            debug_assert_eq!(audit::order(limit), 1);
+            debug_assert_eq!(order(limit), 1);
             for (slot, l) in values {
                 problem.value[slot / 2][slot % 2][1][l] *= factor * factor;
             }

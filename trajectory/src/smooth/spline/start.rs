@@ -21,6 +21,11 @@ const HELD: f64 = 0.3;
 const FEWEST: f64 = 12.0;
 const MOST: f64 = 700.0;
 
+/// Ways that take less than this at full speed (s) are none.
+const STILL: f64 = 1e-12;
+/// Change of rate (1/s2) on a leg on which nothing moves.
+const FASTEST: f64 = 1e12;
+
 /// A leg measured in time at full speed: progress runs at rate 1 there.
 struct Leg<const D: usize> {
     length: f64,
@@ -141,7 +146,9 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
         let length = (0..D / 3)
             .map(|g| norms[g] / groups[g].caps[0])
             .fold(1e-12, f64::max);
+        // A part that stays where it is, as the place does in a turn on the spot, limits nothing.
         let acceleration = (0..D / 3)
+            .filter(|g| norms[*g] > STILL * groups[*g].caps[0])
             .map(|g| {
                 let unit = norms[g] / length;
                 let jerk = (groups[g].caps[2].powi(2) * norms[g]).cbrt();
@@ -151,7 +158,8 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
         legs.push(Leg {
             length,
             direction: way.map(|x| x / length),
-            acceleration,
+            // Nor is there anything to speed up where nothing moves.
+            acceleration: acceleration.min(FASTEST),
         });
     }
     legs

@@ -1,0 +1,70 @@
+//! A time that no motion within the limits can beat.
+
+use nalgebra::SVector;
+use trajectory::smooth::{self, SmoothOptions};
+use trajectory::timing::least_time;
+
+use super::Planner;
+use super::draft::Draft;
+use crate::task::{Move, Shape};
+
+impl<const N: usize> Planner<N> {
+    /// No motion between the same ends within the limits is shorter, s: of each joint alone, of
+    /// the tool alone through the poses, and of what is known of the way.
+    pub(super) fn least_time(
+        &self,
+        motion: &Move,
+        (start, end): (&SVector<f64, N>, &SVector<f64, N>),
+        draft: &Draft<N>,
+    ) -> f64 {
+        let mut poses = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        let mut options = SmoothOptions::new(motion.tolerance, motion.limits);
+        match motion.shape {
+            // Any way will do.
+            Shape::Joint => options.corridor = Some(f64::INFINITY),
+            Shape::Straight => options.tolerance = 0.0,
+            Shape::Smooth => {}
+        }
+        let tool = smooth::least_time(&poses, &options).unwrap_or(0.0);
+        // The joints of a seven-joint arm may stop elsewhere at the same poses.
+        let stops = motion.shape == Shape::Smooth && motion.tolerance == 0.0 && N <= 6;
+        let joints = if stops {
+            self.least_with_stops(motion, (start, end), draft)
+        } else {
+            self.least_of_joints(start, end)
+        };
+        // Both are exact up to rounding where they are the motion itself.
+        let least = joints.max(tool).max(draft.least);
+        least.min(draft.trajectory.duration())
+    }
+
+    /// The least time of the joint that needs most from rest to rest, s.
+    fn least_of_joints(&self, start: &SVector<f64, N>, end: &SVector<f64, N>) -> f64 {
+        let (way, limits) = ((end - start).abs(), self.limits());
+        let time = |j: usize| {
+            let all = [limits.velocity[j], limits.acceleration[j], limits.jerk[j]];
+            least_time(way[j], all)
+        };
+        (0..N).map(time).fold(0.0, f64::max)
+    }
+
+    /// The sum of the least times of all legs, from stop to stop, s.
+    fn least_with_stops(
+        &self,
+        motion: &Move,
+        (start, end): (&SVector<f64, N>, &SVector<f64, N>),
+        draft: &Draft<N>,
+    ) -> f64 {
+        let options = SmoothOptions::new(0.0, motion.limits);
+        let stops = draft.passes.iter();
+        let stops = stops.map(|time| draft.trajectory.sample(*time).position);
+        let (mut from, mut pose, mut sum) = (*start, self.chain().forward(start), 0.0);
+        for (to, next) in stops.chain([*end]).zip(&motion.poses) {
+            let tool = smooth::least_time(&[pose, *next], &options).unwrap_or(0.0);
+            sum += self.least_of_joints(&from, &to).max(tool);
+            (from, pose) = (to, *next);
+        }
+        sum
+    }
+}

@@ -1,0 +1,93 @@
+//! How smooth moves pass their poses, held against the motion itself.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+
+use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
+use planner::motion::Planner;
+use planner::robot::{load, vector};
+use planner::task::{Move, Shape};
+use trajectory::smooth::angular_tolerance;
+
+/// Numbers from -1 to 1, the same each time.
+///
+/// # Source
+/// G. Marsaglia, "Xorshift RNGs", Journal of Statistical Software 8(14), 2003.
+fn random(state: &mut u64) -> f64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    2.0 * (*state >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
+}
+
+/// A pose at most `far` (m) and `turned` (rad) from another, in each axis.
+fn near(pose: &Isometry3<f64>, (far, turned): (f64, f64), state: &mut u64) -> Isometry3<f64> {
+    let mut vector = || Vector3::from_fn(|_, _| random(state));
+    let place = pose.translation.vector + vector() * far;
+    let turn = UnitQuaternion::from_scaled_axis(vector() * turned);
+    Isometry3::from_parts(Translation3::from(place), pose.rotation * turn)
+}
+
+/// Poses in clusters that are smaller than the balls, with turns on the spot: the times of the
+/// passes never go back, and at each of them the tool is in the ball and turned as the rule says.
+#[test]
+fn passes_are_in_order_and_true() {
+    let robot = load("ur5e").unwrap();
+    let home: SVector<f64, 6> = vector(&robot.home);
+    let planner = Planner::new(
+        &robot.chain::<6>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<6>(),
+        robot.joint_names(),
+    );
+    let (mut state, mut planned) = (7, 0);
+    for round in 0..24 {
+        let tolerance = [0.0, 1e-4, 1e-3, 5e-3][round % 4];
+        let mut poses = vec![planner.chain().forward(&home)];
+        for _ in 0..3 {
+            let first = near(&poses[poses.len() - 1], (0.06, 0.1), &mut state);
+            poses.push(first);
+            for _ in 0..3 {
+                let turned = if round % 3 == 0 { 0.05 } else { 0.0 };
+                let close = near(
+                    &poses[poses.len() - 1],
+                    (0.4 * tolerance, turned),
+                    &mut state,
+                );
+                poses.push(close);
+            }
+        }
+        let motion = Move {
+            shape: Shape::Smooth,
+            poses: poses.split_off(1),
+            tolerance,
+            limits: robot.motion_limits(),
+        };
+        let Ok(found) = planner.plan(&motion, &home) else {
+            continue;
+        };
+        planned += 1;
+        let mut last = 0.0;
+        assert_eq!(found.certificate.poses.len(), motion.poses.len() - 1);
+        for (pass, pose) in found.certificate.poses.iter().zip(&motion.poses) {
+            assert!(
+                pass.time_s >= last,
+                "round {round}: {pass:?} after {last} s"
+            );
+            last = pass.time_s;
+            let joints = found.trajectory.sample(pass.time_s).position;
+            let gap = pose.inv_mul(&planner.chain().forward(&joints));
+            let (far, angle) = (gap.translation.vector.norm(), gap.rotation.angle());
+            assert!(
+                (far - pass.deviation_m).abs() < 1e-12,
+                "round {round}: {pass:?}"
+            );
+            assert!(far <= tolerance.max(2e-7), "round {round}: {pass:?}");
+            assert_eq!(pass.angular_tolerance_rad, angular_tolerance(tolerance));
+            let allowed = angular_tolerance(tolerance).max(1e-6);
+            assert!(
+                angle <= allowed && pass.angle_rad <= allowed,
+                "round {round}: {pass:?}"
+            );
+        }
+    }
+    assert!(planned >= 20, "{planned} of 24 planned");
+}

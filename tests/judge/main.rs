@@ -1,0 +1,100 @@
+//! A judge of planned programs: random programs on every shipped robot, judged from samples, URDF
+//! and robot.toml alone, with `k` and arithmetic of its own.
+//!
+//! `CANTER_JUDGE_PROGRAMS` sets the number of programs per robot, `CANTER_JUDGE_SEED` the first
+//! seed.
+
+mod kinematics;
+mod laws;
+mod programs;
+mod random;
+mod tally;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use crcl::Program;
+use planner::dry_run::{FailurePolicy, Plan, PlanOptions, plan_program};
+use planner::robot::{Robot, load};
+use system_tests::arm::Arm;
+use tally::Tally;
+
+/// Programs per robot unless the environment says otherwise.
+const PROGRAMS: u64 = 20;
+
+fn number(variable: &str, otherwise: u64) -> u64 {
+    let value = std::env::var(variable).ok();
+    value.map_or(otherwise, |text| text.parse().expect("a whole number"))
+}
+
+fn planned(robot: &Robot, program: &Program) -> Plan {
+    let options = PlanOptions {
+        rate_hz: laws::RATE,
+        on_refusal: FailurePolicy::Skip,
+        ..PlanOptions::default()
+    };
+    plan_program(robot, program, &options).expect("the robot can be planned for")
+}
+
+/// Judges one program.
+fn judge(arm: &Arm, robot: &Robot, seed: u64, tally: &mut Tally) {
+    let random = programs::program(arm, seed);
+    tally.program = format!("{} {seed}", robot.name);
+    tally.programs += 1;
+    let program: Program = random.commands.iter().cloned().collect();
+    let plan = catch_unwind(AssertUnwindSafe(|| planned(robot, &program)));
+    tally.must("no panic", plan.is_ok());
+    let Ok(plan) = plan else { return };
+    let moves = plan
+        .commands
+        .iter()
+        .filter(|command| command.certificate.is_some());
+    tally.moves += moves.count();
+    tally.refused += plan.refusals.len();
+    for refusal in &plan.refusals {
+        let text = refusal.error.to_string();
+        tally.must(
+            "a refusal has a reason with numbers that are numbers",
+            !text.contains("NaN"),
+        );
+    }
+    laws::judge(arm, &random.meanings, &plan, tally);
+    if seed.is_multiple_of(8) {
+        let again = planned(robot, &program);
+        let equal = plan.samples(0.003).eq(again.samples(0.003));
+        tally.must("the same again", equal);
+    }
+}
+
+fn judged(name: &str) -> Tally {
+    let (arm, robot) = (Arm::read(name), load(name).expect("a shipped robot"));
+    let first = number("CANTER_JUDGE_SEED", 0);
+    let mut tally = Tally::default();
+    for seed in first..first + number("CANTER_JUDGE_PROGRAMS", PROGRAMS) {
+        judge(&arm, &robot, seed, &mut tally);
+    }
+    tally
+}
+
+macro_rules! robots {
+    ($($robot:ident)*) => {
+        /// The robots that have a test of their own.
+        const NAMED: &[&str] = &[$(stringify!($robot)),*];
+        $(#[test]
+        fn $robot() {
+            let tally = judged(stringify!($robot));
+            println!("{}", tally.table());
+            assert!(tally.moves * 2 > tally.programs, "hardly a move was made");
+            assert_eq!(tally.broken(), 0, "{}", tally.table());
+        })*
+    };
+}
+
+robots! {
+    fr3 gantry iiwa14 iiwa7 irb120 irb1200_5_90 irb1200_7_70 lrmate200id panda tx2_60 ur10e ur5e
+    xarm6 xarm7
+}
+
+#[test]
+fn every_shipped_robot_is_judged() {
+    assert_eq!(planner::robot::list(), NAMED);
+}

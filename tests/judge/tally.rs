@@ -1,0 +1,90 @@
+//! Which laws were judged how often, and where one was broken.
+
+use std::collections::BTreeMap;
+
+/// Laws with how often they were judged and broken.
+#[derive(Default)]
+pub struct Tally {
+    laws: BTreeMap<&'static str, Law>,
+    /// The program that is judged, for the list of faults.
+    pub program: String,
+    /// The first faults, in words.
+    pub faults: Vec<String>,
+    pub programs: usize,
+    pub moves: usize,
+    pub refused: usize,
+}
+
+#[derive(Default)]
+struct Law {
+    judged: usize,
+    broken: usize,
+    /// Largest value over its limit.
+    worst: f64,
+}
+
+/// Faults that are kept in words.
+const KEPT: usize = 40;
+
+impl Tally {
+    /// A value may be at most its limit.
+    pub fn at_most(&mut self, law: &'static str, value: f64, limit: f64) {
+        let ratio = if limit > 0.0 { value / limit } else { 0.0 };
+        let entry = self.laws.entry(law).or_default();
+        entry.judged += 1;
+        entry.worst = entry.worst.max(ratio);
+        if value <= limit {
+            return;
+        }
+        entry.broken += 1;
+        if self.faults.len() < KEPT {
+            self.faults
+                .push(format!("{}: {law}: {value} beyond {limit}", self.program));
+        }
+    }
+
+    /// Something must be so.
+    pub fn must(&mut self, law: &'static str, holds: bool) {
+        self.at_most(law, if holds { 0.0 } else { 1.0 }, 0.5);
+    }
+
+    /// Takes in what another one counted.
+    pub fn merge(&mut self, other: Tally) {
+        for (law, counts) in other.laws {
+            let entry = self.laws.entry(law).or_default();
+            entry.judged += counts.judged;
+            entry.broken += counts.broken;
+            entry.worst = entry.worst.max(counts.worst);
+        }
+        self.faults.extend(other.faults);
+        self.programs += other.programs;
+        self.moves += other.moves;
+        self.refused += other.refused;
+    }
+
+    /// How many laws were broken.
+    pub fn broken(&self) -> usize {
+        self.laws.values().filter(|law| law.broken > 0).count()
+    }
+
+    /// A line for each law.
+    pub fn table(&self) -> String {
+        let mut table = format!(
+            "{} programs, {} moves made, {} refused\n",
+            self.programs, self.moves, self.refused
+        );
+        for (law, counts) in &self.laws {
+            let Law {
+                judged,
+                broken,
+                worst,
+            } = counts;
+            table += &format!("{law:50} judged {judged:9} broken {broken:6} worst {worst:.7}\n");
+        }
+        for fault in self.faults.iter().take(KEPT) {
+            table += fault;
+            table += "\n";
+        }
+        table
+    }
+}

@@ -1,0 +1,159 @@
+//! Bounds of what the joints do: hulls of their polynomials.
+
+use nalgebra::SVector;
+use realtime::Piece;
+
+use super::found::Found;
+use crate::extrema;
+use crate::smooth::poly::bernstein;
+use crate::timing::Limit;
+use crate::{JointLimits, Trajectory};
+
+/// What holds of the joints over a whole motion.
+pub(super) struct Joints<const N: usize> {
+    /// Every finite limit with its bound.
+    pub found: Vec<(Limit, Found)>,
+    /// Lowest and highest positions (rad, m).
+    pub positions: [SVector<f64, N>; 2],
+    /// Ratios over each piece, one column for each of `found`.
+    pub rows: Vec<f64>,
+}
+
+/// Hulls beyond the positions known by less than this (rad, m) are not looked at again.
+const POSITION: f64 = 1e-6;
+
+/// Derivatives 1 to 3 of a piece in Bernstein form.
+struct Derivatives<const N: usize> {
+    velocity: [SVector<f64, N>; 5],
+    acceleration: [SVector<f64, N>; 4],
+    jerk: [SVector<f64, N>; 3],
+}
+
+impl<const N: usize> Derivatives<N> {
+    fn of(piece: &Piece<N>) -> Self {
+        let [_, c1, c2, c3, c4, c5] = piece.coefficients;
+        let velocity = [c1, c2 * 2.0, c3 * 3.0, c4 * 4.0, c5 * 5.0];
+        let acceleration = [c2 * 2.0, c3 * 6.0, c4 * 12.0, c5 * 20.0];
+        let jerk = [c3 * 6.0, c4 * 24.0, c5 * 60.0];
+        Self {
+            velocity: bernstein(&velocity, 0.0, piece.duration),
+            acceleration: bernstein(&acceleration, 0.0, piece.duration),
+            jerk: bernstein(&jerk, 0.0, piece.duration),
+        }
+    }
+
+    /// Hull of each derivative, and the larger of its ends.
+    fn hulls(&self) -> [[SVector<f64, N>; 2]; 3] {
+        [
+            hull(&self.velocity),
+            hull(&self.acceleration),
+            hull(&self.jerk),
+        ]
+    }
+
+    /// Takes one derivative of one joint, over its limit, into a search.
+    fn search(
+        &self,
+        (order, joint): (usize, usize),
+        limit: f64,
+        when: (f64, f64),
+        found: &mut Found,
+    ) {
+        fn one<const N: usize, const M: usize>(c: &[SVector<f64, N>; M], j: usize) -> [f64; M] {
+            c.map(|c| c[j])
+        }
+        let size = |x: &f64| x.abs() / limit;
+        match order {
+            0 => found.take(&one(&self.velocity, joint), when, (0.0, &size)),
+            1 => found.take(&one(&self.acceleration, joint), when, (0.0, &size)),
+            _ => found.take(&one(&self.jerk, joint), when, (0.0, &size)),
+        }
+    }
+}
+
+/// The largest magnitude of the points, and of the ends, of each joint.
+fn hull<const N: usize, const M: usize>(control: &[SVector<f64, N>; M]) -> [SVector<f64, N>; 2] {
+    let ends = control[0].abs().sup(&control[M - 1].abs());
+    let most = control[1..M - 1]
+        .iter()
+        .fold(ends, |most, c| most.sup(&c.abs()));
+    [most, ends]
+}
+
+/// Bounds position, velocity, acceleration and jerk of every joint.
+pub(super) fn bound<const N: usize>(
+    trajectory: &Trajectory<N>,
+    limits: &JointLimits<N>,
+) -> Joints<N> {
+    let values = [limits.velocity, limits.acceleration, limits.jerk];
+    let names = [
+        Limit::JointVelocity,
+        Limit::JointAcceleration,
+        Limit::JointJerk,
+    ];
+    let columns: Vec<(usize, usize)> = (0..3)
+        .flat_map(|order| (0..N).map(move |j| (order, j)))
+        .filter(|(order, j)| values[*order][*j].is_finite())
+        .collect();
+    let mut found = vec![Found::default(); columns.len()];
+    let mut rows = Vec::with_capacity(columns.len() * trajectory.pieces().len());
+    for piece in trajectory.pieces() {
+        let hulls = Derivatives::of(piece).hulls();
+        for ((order, j), found) in columns.iter().zip(&mut found) {
+            let ([most, ends], limit) = (&hulls[*order], values[*order][*j]);
+            found.reached = found.reached.max(ends[*j] / limit);
+            rows.push(most[*j] / limit);
+        }
+    }
+    // Only pieces that may hold the largest value are looked at more closely.
+    let starts = trajectory.times();
+    for (i, piece) in trajectory.pieces().iter().enumerate() {
+        let mut derivatives = None;
+        let when = (starts[i], starts[i + 1]);
+        for (c, (order, j)) in columns.iter().enumerate() {
+            let (row, found) = (rows[i * columns.len() + c], &mut found[c]);
+            if row <= found.bound {
+                continue;
+            }
+            let derivatives = derivatives.get_or_insert_with(|| Derivatives::of(piece));
+            derivatives.search((*order, *j), values[*order][*j], when, found);
+        }
+    }
+    let limits = columns.iter().map(|(order, j)| names[*order](*j));
+    Joints {
+        found: limits.zip(found).collect(),
+        positions: positions(trajectory),
+        rows,
+    }
+}
+
+/// Lowest and highest position of each joint.
+fn positions<const N: usize>(trajectory: &Trajectory<N>) -> [SVector<f64, N>; 2] {
+    let mut lowest = SVector::<f64, N>::repeat(f64::INFINITY);
+    let mut highest = SVector::<f64, N>::repeat(f64::NEG_INFINITY);
+    let forms = trajectory.pieces().iter();
+    let forms: Vec<[SVector<f64, N>; 6]> = forms
+        .map(|piece| bernstein(&piece.coefficients, 0.0, piece.duration))
+        .collect();
+    for form in &forms {
+        lowest = lowest.inf(&form[0]).inf(&form[5]);
+        highest = highest.sup(&form[0]).sup(&form[5]);
+    }
+    for (form, piece) in forms.iter().zip(trajectory.pieces()) {
+        for j in 0..N {
+            let low = form.iter().fold(f64::INFINITY, |low, c| low.min(c[j]));
+            let high = form
+                .iter()
+                .fold(f64::NEG_INFINITY, |high, c| high.max(c[j]));
+            if low < lowest[j] - POSITION || high > highest[j] + POSITION {
+                let (low, high) = extrema::range(piece, j);
+                lowest[j] = low.min(lowest[j]);
+                highest[j] = high.max(highest[j]);
+            } else {
+                lowest[j] = low.min(lowest[j]);
+                highest[j] = high.max(highest[j]);
+            }
+        }
+    }
+    [lowest, highest]
+}
