@@ -80,15 +80,18 @@ fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
             .position(|cell| cell == name)
             .ok_or_else(|| anyhow!("line 1: there is no column {name}"))
     };
-    let numbered = |name: &str| (1..=joints).map(move |joint| format!("{name}{joint}"));
+    let numbered = |name: &str| -> Vec<String> {
+        let joints = 1..=joints;
+        joints.map(|joint| format!("{name}{joint}")).collect()
+    };
     let mut names = vec!["t_s".to_owned(), "command".to_owned()];
     for name in ["q", "dq", "ddq"] {
-        names.extend(numbered(name).collect::<Vec<_>>());
+        names.extend(numbered(name));
     }
     names.extend(["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"].map(str::to_owned));
     if header.iter().any(|cell| cell == "path_time_s") {
         names.push("path_time_s".to_owned());
-        names.extend(numbered("measured_q").collect::<Vec<_>>());
+        names.extend(numbered("measured_q"));
         names.extend(["x", "y", "z"].map(|axis| format!("measured_{axis}_m")));
     }
     let columns = names
