@@ -18,10 +18,12 @@ mod equipment;
 mod exit;
 mod failure;
 mod host_options;
+mod input;
 mod logging;
 mod mobility;
 mod moving_arm;
 mod output;
+mod output_file;
 mod pddl_file;
 mod picture;
 mod plan_report;
@@ -48,8 +50,8 @@ use crate::printer::Printer;
 
 /// Executes canonical robot commands: check, plan, run.
 ///
-/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read or
-/// parse; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
+/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read, parse
+/// or write a file; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
 /// 7 driver fault or lost; 8 done, but nobody read the output; 70 internal error.
 #[derive(Debug, Parser)]
 #[command(name = "canter", version, max_term_width = 100)]

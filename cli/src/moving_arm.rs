@@ -1,11 +1,9 @@
 //! The running engine as a plan uses it: a few commands at a time, with an operator who may stop.
 
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
 use crcl::Command;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
@@ -13,6 +11,7 @@ use plan::run::MotionFailure;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::Host;
+use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::progress::Progress;
 use crate::recording::Recording;
@@ -26,7 +25,7 @@ pub(crate) struct MovingArm {
     host: Host,
     signals: SignalThread,
     printer: Printer,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
     blame: Option<Exit>,
 }
@@ -45,12 +44,7 @@ impl MovingArm {
     ) -> Result<Self, Failure> {
         let signals = SignalThread::start(printer, "once more to brake hard")?;
         host.own("canter plan-run");
-        let create = |path: &Path| {
-            File::create(path)
-                .with_context(|| format!("cannot write {}", path.display()))
-                .map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        };
-        let sink = samples.map(create).transpose()?.map(BufWriter::new);
+        let sink = samples.map(OutputFile::create).transpose()?;
         signals.steer(&host.session);
         Ok(Self {
             host,

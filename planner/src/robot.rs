@@ -166,14 +166,32 @@ pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
     .read()
 }
 
-fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
-    let read = |file: &str| {
-        let path = folder.join(file);
-        std::fs::read_to_string(&path).map_err(|error| RobotError::Read {
-            file: path.display().to_string(),
-            message: error.to_string(),
-        })
+/// Largest file of a robot folder, bytes: a URDF of a factory has a hundredth of it.
+const LARGEST: u64 = 64 << 20;
+
+/// The text of a regular file: a pipe would wait for a writer, a device may never end.
+fn text_of(path: &Path) -> Result<String, RobotError> {
+    use std::io::Read;
+    let unreadable = |message: String| RobotError::Read {
+        file: path.display().to_string(),
+        message,
     };
+    let failed = |error: std::io::Error| unreadable(error.to_string());
+    let found = std::fs::metadata(path).map_err(failed)?;
+    if !found.is_file() || found.len() > LARGEST {
+        let expected = format!("expected a regular file of at most {LARGEST} bytes");
+        return Err(unreadable(expected));
+    }
+    let mut text = String::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(LARGEST)
+        .read_to_string(&mut text)
+        .map_err(failed)?;
+    Ok(text)
+}
+
+fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
+    let read = |file: &str| text_of(&folder.join(file));
     let (toml, urdf) = (read("robot.toml")?, read("robot.urdf")?);
     let name = folder.canonicalize().ok();
     let name = name

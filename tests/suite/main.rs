@@ -1,4 +1,4 @@
-//! All system tests as one binary: one link step instead of one a file.
+//! All system tests as one binary: one link step instead of one per file.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
@@ -11,6 +11,7 @@ mod control;
 mod documents;
 mod domains;
 mod drivers;
+mod faults;
 mod killed_plans;
 mod made_kits;
 mod plan_costs;
@@ -19,6 +20,7 @@ mod plans;
 mod runs;
 mod session;
 mod soak;
+mod world_in_use;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
 #[test]

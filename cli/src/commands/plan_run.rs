@@ -18,13 +18,13 @@ use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::HostOptions;
+use crate::input;
 use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::printer::Printer;
 use crate::robot::{RobotOption, with_joints};
-use crate::world_file;
-use crate::world_file::Database;
+use crate::world_file::{Database, refused};
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -85,21 +85,11 @@ pub(crate) struct PlanRun {
     verbose: bool,
 }
 
-fn refused(error: PlanError) -> Failure {
-    let exit = match error {
-        PlanError::Database(_) | PlanError::Stored { .. } | PlanError::Schema { .. } => {
-            Exit::Unreadable
-        }
-        _ => Exit::Refused,
-    };
-    Failure::new(exit, error)
-}
-
 impl PlanRun {
     /// Executes the plan.
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let mut robot = self.robot.load()?;
-        let source = self.plan.as_deref().map(world_file::read).transpose()?;
+        let source = self.plan.as_deref().map(input::text).transpose()?;
         let (parameters, limits) = (self.parameters()?, self.limits()?);
         let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
         let model = writer.model().map_err(refused)?;

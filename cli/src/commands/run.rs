@@ -1,8 +1,6 @@
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use engine::session::{Blame, Note};
 use planner::dry_run::FailurePolicy;
@@ -12,6 +10,7 @@ use serde_json::json;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
+use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
@@ -39,7 +38,7 @@ pub(crate) struct Run {
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
-    /// Print one JSON object for everything that happens, one a line
+    /// Print one JSON object for everything that happens, one per line
     #[arg(long)]
     json: bool,
 }
@@ -77,12 +76,11 @@ impl Run {
         {
             return Ok(Exit::Refused);
         }
-        let sink = self.samples.as_ref().map(|path| {
-            let file =
-                File::create(path).with_context(|| format!("cannot write {}", path.display()));
-            file.map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        });
-        let sink = sink.transpose()?.map(BufWriter::new);
+        let sink = self
+            .samples
+            .as_deref()
+            .map(OutputFile::create)
+            .transpose()?;
         let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
         let progress = Progress::new(printer, io::stderr().is_terminal() && !self.json);
         signals.steer(&host.session);
@@ -122,7 +120,7 @@ struct Running {
     host: Host,
     signals: SignalThread,
     printer: Printer,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
 }
 

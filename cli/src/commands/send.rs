@@ -17,7 +17,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Send a program to a running engine and wait for its end
 ///
-/// Prints one JSON object for everything that happens to it, one a line.
+/// Prints one JSON object for everything that happens to it, one per line.
 #[derive(Args, Debug)]
 pub(crate) struct Send {
     #[command(flatten)]
