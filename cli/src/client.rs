@@ -6,11 +6,16 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use ipc::{Answer, Arm, Client, ControlAnswer, ControlAsk, ControlClient, Domain, Verb};
 
+use crate::damage;
 use crate::exit::Exit;
 use crate::failure::Failure;
 
 /// How long an engine may take to answer; it answers between two periods of its main loop.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// After this time an asking client is caught in damaged segments; longer than all that it waits
+/// for by itself.
+const HANG: Duration = Duration::from_secs(15);
 
 /// How long a stop is waited for: a gentle one takes about a third of a second where the joints
 /// can.
@@ -34,9 +39,9 @@ impl DomainOption {
     /// # Errors
     /// [`Exit::NoPeer`] when its directory cannot be used.
     pub(crate) fn open(&self) -> Result<Domain, Failure> {
-        Ok(Domain::choose(self.domain.as_deref(), |name| {
-            std::env::var_os(name)
-        })?)
+        let domain = Domain::choose(self.domain.as_deref(), |name| std::env::var_os(name))?;
+        damage::watch(&domain);
+        Ok(domain)
     }
 }
 
@@ -65,8 +70,11 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
-        let client = Client::open(&self.open()?, "canter")?;
-        accepted(client.ask(verb, PATIENCE)?)
+        let arm = self.open()?;
+        let answer = damage::bounded(HANG, || {
+            Client::open(&arm, "canter").and_then(|client| client.ask(verb, PATIENCE))
+        });
+        accepted(answer?)
     }
 
     /// Asks something of the motion under way and waits until it acts; with `rest`, also until the
@@ -76,9 +84,12 @@ impl ArmOption {
     /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
     /// refuses.
     pub(crate) fn control(&self, ask: ControlAsk, rest: bool) -> Result<Exit, Failure> {
-        let client = ControlClient::open(&self.open()?)?;
+        let arm = self.open()?;
         let asked = Instant::now();
-        let mut answer = client.ask(ask, PATIENCE)?;
+        let (client, mut answer) = damage::bounded(HANG, || {
+            let client = ControlClient::open(&arm)?;
+            client.ask(ask, PATIENCE).map(|answer| (client, answer))
+        })?;
         if answer.accepted == 0 {
             let reason = anyhow::anyhow!(answer.reason());
             return Err(Failure::new(Exit::Refused, reason));

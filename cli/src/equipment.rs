@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 use plan::world::{Class, Model, pointing_down};
-use planner::robot::{EndEffector, Gripper, Robot, ToolChanger};
+use planner::end_effector::{EndEffector, Gripper, ToolChanger};
+use planner::robot::Robot;
 
 /// Opening and closing time of a gripper or tool changer that the world says nothing about (s).
 const NOMINAL_S: f64 = 0.2;

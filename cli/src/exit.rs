@@ -12,7 +12,7 @@ pub(crate) enum Exit {
     Refused = 1,
     /// The arguments make no sense.
     Usage = 2,
-    /// A file cannot be read or parsed, or a robot cannot be loaded.
+    /// A file cannot be read, parsed or written, or a robot cannot be loaded.
     Unreadable = 3,
     /// No engine or no driver answers.
     NoPeer = 4,

@@ -3,6 +3,7 @@ use std::io;
 use ipc::IpcError;
 
 use crate::exit::Exit;
+use crate::output_file::Unwritable;
 use crate::printer::Printer;
 
 /// Why a command could not do its work: the exit code and the chain of causes.
@@ -55,10 +56,18 @@ fn chain(cause: &anyhow::Error) -> String {
     text
 }
 
-/// Writing the answer failed; everything else names its exit code itself.
+/// Writing the answer or a file failed; everything else names its exit code itself.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
-        Self::new(Exit::Internal, error)
+        let named = error
+            .get_ref()
+            .is_some_and(|cause| cause.is::<Unwritable>());
+        let exit = if named || error.kind() == io::ErrorKind::StorageFull {
+            Exit::Unreadable
+        } else {
+            Exit::Internal
+        };
+        Self::new(exit, error)
     }
 }
 

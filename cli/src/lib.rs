@@ -11,17 +11,19 @@
 //! It is a library with one function so that the system tests run the same code as a process of
 //! their own; the binary `canter` is three lines.
 
-mod arm_motion;
 mod client;
 mod commands;
+mod damage;
 mod equipment;
 mod exit;
 mod failure;
 mod host_options;
+mod input;
 mod logging;
 mod mobility;
 mod moving_arm;
 mod output;
+mod output_file;
 mod pddl_file;
 mod picture;
 mod plan_report;
@@ -29,7 +31,6 @@ mod plot;
 mod printer;
 mod program;
 mod progress;
-mod recent;
 mod recording;
 mod robot;
 mod samples;
@@ -48,8 +49,8 @@ use crate::printer::Printer;
 
 /// Executes canonical robot commands: check, plan, run.
 ///
-/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read or
-/// parse; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
+/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read, parse
+/// or write a file; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
 /// 7 driver fault or lost; 8 done, but nobody read the output; 70 internal error.
 #[derive(Debug, Parser)]
 #[command(name = "canter", version, max_term_width = 100)]
@@ -82,7 +83,10 @@ pub fn main() -> ExitCode {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => failure.report(&printer),
         // The panic hook has told where; a panic is our mistake, whatever the input was.
-        Err(_) => Exit::Internal,
+        Err(_) => {
+            damage::tell();
+            Exit::Internal
+        }
     };
     let exit = match (printer.finish(), exit) {
         (1.., Exit::Done) => Exit::OutputLost,

@@ -1,18 +1,18 @@
 //! The running engine as a plan uses it: a few commands at a time, with an operator who may stop.
 
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
-use crcl::Command;
+use engine::arm_motion::Mover;
+use engine::queue::Given;
 use engine::session::{Blame, Note};
 use plan::run::MotionFailure;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::Host;
+use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::progress::Progress;
 use crate::recording::Recording;
@@ -26,7 +26,7 @@ pub(crate) struct MovingArm {
     host: Host,
     signals: SignalThread,
     printer: Printer,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
     blame: Option<Exit>,
 }
@@ -45,12 +45,7 @@ impl MovingArm {
     ) -> Result<Self, Failure> {
         let signals = SignalThread::start(printer, "once more to brake hard")?;
         host.own("canter plan-run");
-        let create = |path: &Path| {
-            File::create(path)
-                .with_context(|| format!("cannot write {}", path.display()))
-                .map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        };
-        let sink = samples.map(create).transpose()?.map(BufWriter::new);
+        let sink = samples.map(OutputFile::create).transpose()?;
         signals.steer(&host.session);
         Ok(Self {
             host,
@@ -62,16 +57,6 @@ impl MovingArm {
         })
     }
 
-    /// Joint positions of the last setpoint at the start, rad or m.
-    pub(crate) fn start(&self) -> &[f64] {
-        &self.host.session.start
-    }
-
-    /// Joint positions of the last setpoint, rad or m.
-    pub(crate) fn setpoint(&self) -> Vec<f64> {
-        self.host.session.status().setpoint
-    }
-
     /// How a process ends whose arm had a fault, if it had one.
     pub(crate) fn blame(&self) -> Option<Exit> {
         self.blame
@@ -81,19 +66,15 @@ impl MovingArm {
     ///
     /// # Errors
     /// [`MotionFailure`], with `stopped` when the operator wanted it.
-    pub(crate) fn execute(&mut self, commands: &[Command]) -> Result<(), MotionFailure> {
+    fn execute_all(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure> {
         if self.signals.count() > 0 {
             return Err(MotionFailure::stopped());
         }
-        let program: crcl::Program = commands.iter().cloned().collect();
-        let ids = self
-            .host
-            .session
-            .submit(program.commands)
-            .map_err(|error| {
-                self.read_blame();
-                MotionFailure::new(0, error.to_string())
-            })?;
+        let given = self.host.session.give(commands);
+        let ids = given.map_err(|error| {
+            self.read_blame();
+            MotionFailure::new(0, error.to_string())
+        })?;
         let Some(last) = ids.last().copied() else {
             return Ok(());
         };
@@ -129,7 +110,7 @@ impl MovingArm {
     }
 
     /// Clears a fault; whether that was possible.
-    pub(crate) fn recover(&mut self) -> bool {
+    fn clear_fault(&mut self) -> bool {
         if self.host.session.recover().is_err() {
             self.blame = None;
             return true;
@@ -184,5 +165,19 @@ fn exit_of(blame: Blame) -> Exit {
     match blame {
         Blame::Guard => Exit::Aborted,
         Blame::Driver => Exit::DriverFault,
+    }
+}
+
+impl Mover for MovingArm {
+    fn execute(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure> {
+        self.execute_all(commands)
+    }
+
+    fn setpoint(&self) -> Vec<f64> {
+        self.host.session.status().setpoint
+    }
+
+    fn recover(&mut self) -> bool {
+        self.clear_fault()
     }
 }

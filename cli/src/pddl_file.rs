@@ -6,7 +6,7 @@ use plan::pddl::ActionTable;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::world_file;
+use crate::input;
 
 /// Whether a plan is PDDL: it starts, after comments, with a parenthesis or a time.
 pub(crate) fn is_pddl(source: &str) -> bool {
@@ -26,7 +26,7 @@ pub(crate) fn action_table(more: Option<&Path>) -> Result<ActionTable, Failure> 
     let refused = |error| Failure::new(Exit::Unreadable, error);
     let table = ActionTable::own().map_err(refused)?;
     match more {
-        Some(more) => table.with(&world_file::read(more)?).map_err(refused),
+        Some(more) => table.with(&input::text(more)?).map_err(refused),
         None => Ok(table),
     }
 }

@@ -1,7 +1,5 @@
-use std::fs;
-use std::io::{self, IsTerminal, Read, Write};
+use std::io::{self, IsTerminal, Write};
 
-use anyhow::Context;
 use clap::{Args, ValueEnum};
 use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
 use planner::command_error::ErrorClass;
@@ -10,7 +8,7 @@ use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::output;
+use crate::{input, output};
 
 /// Which program, and how it is read.
 #[derive(Args, Debug)]
@@ -75,9 +73,7 @@ impl ProgramArgument {
     /// # Errors
     /// [`Exit::Unreadable`] when the file cannot be read; faults of the program are findings.
     pub(crate) fn read(&self) -> Result<ProgramFile, Failure> {
-        let bytes = bytes(&self.path)
-            .with_context(|| format!("cannot read {}", self.path))
-            .map_err(|cause| Failure::new(Exit::Unreadable, cause))?;
+        let bytes = input::bytes(&self.path)?;
         let name = if self.path == "-" {
             "standard input"
         } else {
@@ -125,15 +121,6 @@ impl ProgramArgument {
 /// The time of a clock that never jumps (s).
 fn seconds() -> f64 {
     scheduling::now_ns() as f64 * 1e-9
-}
-
-fn bytes(path: &str) -> io::Result<Vec<u8>> {
-    if path == "-" {
-        let mut bytes = Vec::new();
-        io::stdin().lock().read_to_end(&mut bytes)?;
-        return Ok(bytes);
-    }
-    fs::read(path)
 }
 
 impl ProgramFile {

@@ -1,10 +1,9 @@
-use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 
-use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::input;
 
 /// A row of numbers and the line of the file that it is from.
 #[derive(Debug, PartialEq)]
@@ -17,17 +16,10 @@ pub(crate) struct Row {
 /// header and left out. Every row has one finite number for each of the `columns`.
 ///
 /// # Errors
-/// [`Exit::Unreadable`], with the line, the column, what was expected and what came.
+/// [`Exit::Unreadable`](crate::exit::Exit::Unreadable), with the line, the column, what was expected and what came.
 pub(crate) fn read(path: &str, columns: &[&str]) -> Result<Vec<Row>, Failure> {
-    let source: Box<dyn Read> = if path == "-" {
-        Box::new(io::stdin())
-    } else {
-        let file = File::open(path).with_context(|| format!("cannot read {path}"));
-        Box::new(file.map_err(|cause| Failure::new(Exit::Unreadable, cause))?)
-    };
-    parse(source, columns)
-        .with_context(|| format!("cannot read {path}"))
-        .map_err(|cause| Failure::new(Exit::Unreadable, cause))
+    let source = input::lines(path)?;
+    input::unreadable(path, parse(source, columns))
 }
 
 fn parse(source: impl Read, columns: &[&str]) -> anyhow::Result<Vec<Row>> {

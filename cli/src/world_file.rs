@@ -8,6 +8,7 @@ use tempfile::TempDir;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::input;
 
 /// Reads a workstation file (TOML, JSON, NIST's XML) or a database, by its extension.
 pub(crate) fn load(path: &Path) -> Result<Model, Failure> {
@@ -18,11 +19,12 @@ pub(crate) fn load(path: &Path) -> Result<Model, Failure> {
         )
     };
     let Some(import) = importer(path) else {
+        input::unreadable(&path.display().to_string(), input::check_regular(path))?;
         return Reader::open(path)
             .and_then(|reader| reader.model())
             .map_err(unreadable);
     };
-    import(&read(path)?).map_err(unreadable)
+    import(&input::text(path)?).map_err(unreadable)
 }
 
 type Importer = fn(&str) -> Result<Model, PlanError>;
@@ -42,14 +44,17 @@ pub(crate) fn is_workstation_file(path: &Path) -> bool {
     importer(path).is_some()
 }
 
-/// The text of a file.
-pub(crate) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| {
-        Failure::new(
-            Exit::Unreadable,
-            anyhow::anyhow!("{}: {error}", path.display()),
-        )
-    })
+/// What an error of a world or a plan means for the process.
+pub(crate) fn refused(error: PlanError) -> Failure {
+    let exit = match error {
+        PlanError::Database(_)
+        | PlanError::File { .. }
+        | PlanError::Lost { .. }
+        | PlanError::Schema { .. }
+        | PlanError::Stored { .. } => Exit::Unreadable,
+        _ => Exit::Refused,
+    };
+    Failure::new(exit, error)
 }
 
 /// A database for one run.
@@ -65,7 +70,8 @@ impl Database {
     /// `keep`, or in one that goes away. The last run of a database is copied as well.
     ///
     /// # Errors
-    /// [`Exit::Unreadable`]: no such world, or a file of the name `keep` exists.
+    /// [`Exit::Unreadable`]: no such world, or a file of the name `keep` exists. [`Exit::Refused`]:
+    /// another process writes the database.
     pub(crate) fn open(
         world: &Path,
         copy: bool,
@@ -78,8 +84,7 @@ impl Database {
                 return Err(unreadable(missing));
             }
             let (path, _folder) = (world.to_owned(), None);
-            let writer =
-                Writer::open(&path, Durability::Full).map_err(|error| unreadable(error.into()))?;
+            let writer = Writer::open(&path, Durability::Full).map_err(refused)?;
             return Ok((Self { path, _folder }, writer));
         }
         let (path, _folder) = if let Some(keep) = keep {
@@ -100,12 +105,12 @@ impl Database {
 /// A new database with the world, and the last run, of another or of a workstation file.
 fn copied(world: &Path, path: &Path) -> Result<Writer, Failure> {
     let unreadable = |error: PlanError| Failure::new(Exit::Unreadable, error);
-    let model = load(world)?;
-    let run = if is_workstation_file(world) {
-        None
+    let (model, run) = if is_workstation_file(world) {
+        (load(world)?, None)
     } else {
+        input::unreadable(&world.display().to_string(), input::check_regular(world))?;
         let reader = Reader::open(world).map_err(unreadable)?;
-        reader.last_run().map_err(unreadable)?
+        reader.snapshot().map_err(unreadable)?
     };
     let mut writer = Writer::open(path, Durability::Process).map_err(unreadable)?;
     writer.replace(&model).map_err(unreadable)?;

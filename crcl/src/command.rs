@@ -127,6 +127,9 @@ pub enum Command {
     },
 }
 
+/// The longest time that a command accepts, s: eleven days.
+pub const LONGEST_S: f64 = 1e6;
+
 /// What an argument means; decides its type, its range and how it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ArgumentKind {
@@ -136,7 +139,7 @@ pub enum ArgumentKind {
     Flag,
     /// A text in double quotes.
     Text,
-    /// A time (s), not negative.
+    /// A time (s), not negative, at most [`LONGEST_S`].
     Seconds,
     /// Length units per second, not negative.
     Speed,
@@ -202,6 +205,10 @@ impl ArgumentKind {
         match self {
             Self::Percent => value::percent(self.noun(), number),
             Self::Flag => value::finite(self.noun(), number),
+            Self::Seconds => {
+                let seconds = value::not_negative(self.noun(), number)?;
+                value::within(self.noun(), seconds, LONGEST_S)
+            }
             _ => value::not_negative(self.noun(), number),
         }
     }

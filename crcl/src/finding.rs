@@ -247,6 +247,8 @@ pub mod code {
         UNKNOWN_FRAME = "crcl::unknown-frame";
         /// A quantity below zero that cannot be.
         NEGATIVE = "crcl::negative-value";
+        /// A number larger than the largest that is accepted.
+        TOO_LARGE = "crcl::too-large";
         /// A percentage outside 0 to 100.
         PERCENT = "crcl::percent-out-of-range";
         /// A percentage that looks like a fraction.

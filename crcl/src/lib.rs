@@ -18,9 +18,9 @@ mod units;
 mod value;
 
 pub use check::{CheckOptions, check};
-pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, Standing};
+pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, LONGEST_S, Standing};
 pub use finding::{Finding, Note, Omitted, Severity, code};
-pub use pose::{ORTHOGONALITY, Pose, PosePart};
+pub use pose::{LARGEST_ANGLE, LARGEST_COORDINATE, ORTHOGONALITY, Pose, PosePart};
 pub use program::{Located, Program, ReadOptions, Reading};
 pub use report::{Look, NoteRecord, Record, Report, records, render};
 pub use source::Source;

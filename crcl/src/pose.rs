@@ -4,13 +4,21 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::AngleUnit;
-use crate::value::{ValueError, finite};
+use crate::value::{ValueError, finite, within};
 
 /// How far the axes of a pose may be from perpendicular: `1 - |x cross z|` of the unit axes.
 ///
 /// # Source
 /// The rule of NIST's kitting viewer (2013): the cross product has length 1 within 1e-7.
 pub const ORTHOGONALITY: f64 = 1e-7;
+
+/// The largest coordinate that is accepted, in length units of the program. No arm reaches a
+/// thousandth of it, and its square is far from the largest number.
+pub const LARGEST_COORDINATE: f64 = 1e9;
+
+/// The largest roll, pitch or yaw that is accepted, in angle units of the program. The digits of a
+/// larger number no longer say where in a turn it is.
+pub const LARGEST_ANGLE: f64 = 1e6;
 
 /// Where the controlled point is to be and how it is turned, in raw numbers of the program: the
 /// length and angle units in force when the command is executed give them their meaning.
@@ -68,7 +76,11 @@ impl Pose {
         let mut keep = |part, result: Result<(), ValueError>| {
             faults.extend(result.err().map(|error| (part, error)));
         };
-        keep(PosePart::Point, all_finite("a coordinate", &self.point()));
+        let point = self.point();
+        keep(
+            PosePart::Point,
+            all_within("a coordinate", &point, LARGEST_COORDINATE),
+        );
         match *self {
             Self::Axes { z_axis, x_axis, .. } => {
                 let (z, x) = (direction('Z', z_axis), direction('X', x_axis));
@@ -83,7 +95,7 @@ impl Pose {
             } => {
                 keep(
                     PosePart::Angles,
-                    all_finite("an angle", &[roll, pitch, yaw]),
+                    all_within("an angle", &[roll, pitch, yaw], LARGEST_ANGLE),
                 );
             }
         }
@@ -151,6 +163,12 @@ fn all_finite(quantity: &'static str, numbers: &[f64; 3]) -> Result<(), ValueErr
     numbers
         .iter()
         .try_for_each(|&number| finite(quantity, number).map(drop))
+}
+
+fn all_within(quantity: &'static str, numbers: &[f64; 3], most: f64) -> Result<(), ValueError> {
+    numbers
+        .iter()
+        .try_for_each(|&number| within(quantity, number, most).map(drop))
 }
 
 /// The unit vector along an axis; scaled first, so that no size over- or underflows.

@@ -1,4 +1,4 @@
-//! Why a value cannot be meant: the range rules of the language, the same for text, JSON and
+//! Why a value is refused: the range rules of the language, the same for text, JSON and
 //! commands made in memory.
 
 use thiserror::Error;
@@ -18,15 +18,25 @@ pub enum ValueError {
         value: f64,
     },
     /// A number is below zero that cannot be.
-    #[error("{quantity} cannot be negative, got {value}")]
+    #[error("{quantity} cannot be negative, got {}", short(*value))]
     Negative {
         /// What the number means.
         quantity: &'static str,
         /// The number.
         value: f64,
     },
+    /// A number is larger than the largest that is accepted.
+    #[error("{quantity} must be at most {most}, got {}", short(*value))]
+    TooLarge {
+        /// What the number means.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+        /// The largest magnitude that is accepted.
+        most: f64,
+    },
     /// A percentage is outside 0 to 100.
-    #[error("{quantity} must be 0 to 100 percent, got {value}")]
+    #[error("{quantity} must be 0 to 100 percent, got {}", short(*value))]
     Percent {
         /// What the number means.
         quantity: &'static str,
@@ -50,6 +60,15 @@ pub enum ValueError {
     NoPoses,
 }
 
+/// A number in a message: with an exponent where the digits would fill the line.
+fn short(value: f64) -> String {
+    if value != 0.0 && !(1e-9..1e12).contains(&value.abs()) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
 /// Enough digits of an angle to tell it from 90 degrees, and no more.
 fn angle(degrees: f64) -> String {
     let off = (degrees - 90.0).abs();
@@ -67,6 +86,7 @@ impl ValueError {
         match self {
             Self::NotFinite { .. } => code::NOT_FINITE,
             Self::Negative { .. } => code::NEGATIVE,
+            Self::TooLarge { .. } => code::TOO_LARGE,
             Self::Percent { .. } => code::PERCENT,
             Self::ZeroAxis { .. } => code::ZERO_AXIS,
             Self::NotOrthogonal { .. } => code::NOT_ORTHOGONAL,
@@ -79,6 +99,7 @@ impl ValueError {
         match self {
             Self::NotFinite { .. } => "write a plain decimal number",
             Self::Negative { .. } => "write zero or more",
+            Self::TooLarge { .. } => "check the number and its unit",
             Self::Percent { .. } => "100 is all that the robot can do, 50 is half of it",
             Self::ZeroAxis { .. } => {
                 "an axis is a direction, such as {0, 0, -1} for straight down; \
@@ -109,6 +130,20 @@ pub(crate) fn not_negative(quantity: &'static str, value: f64) -> Result<f64, Va
         Ok(value)
     } else {
         Err(ValueError::Negative { quantity, value })
+    }
+}
+
+/// Checks that a number is finite and that its magnitude is at most `most`.
+pub(crate) fn within(quantity: &'static str, value: f64, most: f64) -> Result<f64, ValueError> {
+    let value = finite(quantity, value)?;
+    if value.abs() <= most {
+        Ok(value)
+    } else {
+        Err(ValueError::TooLarge {
+            quantity,
+            value,
+            most,
+        })
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crcl::ReadOptions;
-use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, Request, StatusWriter, Verb};
+use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
 use servo::{Control, ExecutorError};
@@ -17,6 +17,9 @@ const REPORT: Duration = Duration::from_millis(100);
 
 /// How many notes are kept for clients that ask.
 const KEPT: usize = 512;
+
+/// How long the notes of one answer may be together (bytes).
+const NOTES: usize = ipc::LONGEST_ANSWER * 3 / 4;
 
 /// The channels of an arm's clients: who holds them is the only engine of the arm.
 #[derive(Debug)]
@@ -90,14 +93,7 @@ impl<D> Host<D> {
             name: name.to_owned(),
             process: std::process::id(),
         };
-        // Nobody owns an arm that was just taken into service.
-        let _ = self.ownership.admit(
-            &Request {
-                client,
-                ask: Verb::Recover,
-            },
-            true,
-        );
+        self.ownership.give(client);
     }
 
     /// Whether a client has asked for the end.
@@ -110,10 +106,16 @@ impl<D> Host<D> {
     /// # Errors
     /// [`IpcError`] when shared memory fails.
     pub fn turn(&mut self) -> Result<Option<Note>, IpcError> {
-        while self.serve()? {}
+        // One batch in a turn: whoever floods us does not keep us from the signals. A client that
+        // cannot be reached, or a report that cannot be sent, is no reason to leave a moving arm.
+        if let Err(error) = self.serve() {
+            tracing::debug!("{error}");
+        }
         if self.reported.is_none_or(|at| at.elapsed() >= REPORT) {
             self.reported = Some(Instant::now());
-            self.channels.status.write(&self.session.status())?;
+            if let Err(error) = self.channels.status.write(&self.session.status()) {
+                tracing::debug!("{error}");
+            }
         }
         let note = self.session.note(Duration::from_millis(5));
         if let Some(note) = &note {
@@ -127,7 +129,7 @@ impl<D> Host<D> {
         Ok(note)
     }
 
-    fn serve(&mut self) -> Result<bool, IpcError> {
+    fn serve(&mut self) -> Result<usize, IpcError> {
         let Self {
             session,
             channels,
@@ -146,12 +148,7 @@ impl<D> Host<D> {
             }
             match request.ask {
                 Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
-                Verb::Notes { since } => {
-                    let later = notes
-                        .iter()
-                        .filter(|note| note["number"].as_u64() > Some(since));
-                    Answer::accept(json!({"notes": later.collect::<Vec<_>>()}))
-                }
+                Verb::Notes { since } => later(notes, since),
                 Verb::Shutdown => {
                     *shutdown = true;
                     Answer::accept(Value::Null)
@@ -170,6 +167,45 @@ impl<D> Host<D> {
             }
         })
     }
+}
+
+/// The notes after number `since`, as many as one answer holds; the client asks again for more.
+fn later(notes: &VecDeque<Value>, since: u64) -> Answer {
+    let mut room = NOTES;
+    let later = notes
+        .iter()
+        .filter(|note| note["number"].as_u64() > Some(since));
+    let page = later.map_while(|note| {
+        let length = note.to_string().len();
+        let first = room == NOTES;
+        let fits = room.checked_sub(length);
+        room = fits.unwrap_or(0);
+        match fits {
+            Some(_) => Some(note.clone()),
+            None if first => Some(cut(note)),
+            None => None,
+        }
+    });
+    Answer::accept(json!({"notes": page.collect::<Vec<_>>()}))
+}
+
+/// A note whose long texts are cut.
+fn cut(note: &Value) -> Value {
+    const LONGEST_TEXT: usize = 500;
+    let mut note = note.clone();
+    for value in note["note"]
+        .as_object_mut()
+        .into_iter()
+        .flat_map(serde_json::Map::values_mut)
+    {
+        if let Some(text) = value.as_str()
+            && text.chars().count() > LONGEST_TEXT
+        {
+            let kept: String = text.chars().take(LONGEST_TEXT).collect();
+            *value = Value::String(format!("{kept} (cut)"));
+        }
+    }
+    note
 }
 
 /// Takes a program of a client: all its commands or none.
@@ -191,7 +227,11 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
         return Answer::refuse(text.trim_end());
     }
     match session.submit(reading.program.commands) {
-        Ok(ids) => Answer::accept(json!({"ids": ids})),
+        Ok(ids) => Answer::accept(json!({
+            "first": ids.first(),
+            "last": ids.last(),
+            "commands": ids.len(),
+        })),
         Err(full) => Answer::refuse(full.to_string()),
     }
 }

@@ -3,14 +3,16 @@
 //!
 //! A command leaves the [`queue`] and is planned by the planner's thread of the [`session`], which
 //! hands the pieces to the servo thread. The [`host`] answers the requests of other processes.
-//! [`doctor`] looks at what all this needs of the machine.
+//! [`arm_motion`] lets a kitting plan move an arm. [`doctor`] looks at what all this needs of the machine.
 //!
 //! This crate never plans by itself, never names iceoryx2, prints nothing and reads no environment
 //! variable.
 #![forbid(unsafe_code)]
 
+pub mod arm_motion;
 pub mod control;
 pub mod doctor;
 pub mod host;
 pub mod queue;
+mod recent;
 pub mod session;

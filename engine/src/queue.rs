@@ -3,17 +3,34 @@
 use std::collections::VecDeque;
 
 use crcl::Located;
+use planner::controller::AnyStep;
 use thiserror::Error;
 
+/// A command that is to be executed, planned already or not.
+#[derive(Debug)]
+pub struct Given {
+    /// The command and where it stood.
+    pub located: Located,
+    /// How it is executed, if it was planned before.
+    pub planned: Option<AnyStep>,
+}
+
+impl From<Located> for Given {
+    fn from(located: Located) -> Self {
+        let planned = None;
+        Self { located, planned }
+    }
+}
+
 /// A command with its number in the life of the queue.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Queued {
     /// Number of the command, counted from 1 over the life of the queue.
     pub id: u32,
     /// How many aborts there were when it was given: a later one drops it.
     pub age: u32,
-    /// The command and where it stood.
-    pub located: Located,
+    /// The command.
+    pub given: Given,
 }
 
 /// Why a command was not taken.
@@ -29,7 +46,7 @@ pub struct Full {
 /// ```
 /// use engine::queue::Queue;
 /// let mut queue = Queue::new(1);
-/// let command = |command| crcl::Located { command, span: 0..0, line: 1, column: 1 };
+/// let command = |command| crcl::Located { command, span: 0..0, line: 1, column: 1 }.into();
 /// assert_eq!(queue.push(command(crcl::Command::InitCanon), 0), Ok(1));
 /// assert!(queue.push(command(crcl::Command::OpenGripper), 0).is_err());
 /// assert_eq!(queue.pop().map(|queued| queued.id), Some(1));
@@ -56,7 +73,7 @@ impl Queue {
     ///
     /// # Errors
     /// [`Full`], and the queue is as before.
-    pub fn push(&mut self, located: Located, age: u32) -> Result<u32, Full> {
+    pub fn push(&mut self, given: Given, age: u32) -> Result<u32, Full> {
         if self.commands.len() >= self.capacity {
             return Err(Full {
                 capacity: self.capacity,
@@ -64,7 +81,7 @@ impl Queue {
         }
         let id = self.next_id;
         self.next_id += 1;
-        self.commands.push_back(Queued { id, age, located });
+        self.commands.push_back(Queued { id, age, given });
         Ok(id)
     }
 

@@ -15,7 +15,7 @@ use iceoryx2::service::port_factory::request_response::PortFactory;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 
 use crate::node::{Shared, control_exchange, inhabitants, join};
-use crate::{Arm, IpcError, PROTOCOL, bytes_of, text_of};
+use crate::{Arm, IpcError, PROTOCOL, RequestId, bytes_of, room, text_of};
 
 /// The kind of service of an arm.
 const KIND: &str = "control";
@@ -49,7 +49,7 @@ pub enum ControlAsk {
 /// A request on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.Control.1")]
+#[type_name("canter.Control.2")]
 pub struct ControlRequest {
     /// Protocol version.
     pub protocol: u32,
@@ -60,7 +60,9 @@ pub struct ControlRequest {
     /// Process number of the client.
     pub process: u32,
     /// For later; 0.
-    pub reserved: [u32; 3],
+    pub reserved: u32,
+    /// When it asked (ns since 1970); with the process number this tells requests apart.
+    pub asked_ns: u64,
 }
 
 impl ControlRequest {
@@ -76,12 +78,14 @@ impl ControlRequest {
             ControlAsk::Abort => (6, 0.0),
             ControlAsk::Recover => (7, 0.0),
         };
+        let id = RequestId::new();
         Self {
             protocol: PROTOCOL,
             kind,
             share,
-            process: std::process::id(),
-            reserved: [0; 3],
+            process: id.process,
+            reserved: 0,
+            asked_ns: id.asked_ns,
         }
     }
 
@@ -115,7 +119,7 @@ impl ControlRequest {
 /// An answer on the wire: what was reached when the order acted.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.Controlled.1")]
+#[type_name("canter.Controlled.2")]
 pub struct ControlAnswer {
     /// Protocol version.
     pub protocol: u32,
@@ -133,6 +137,12 @@ pub struct ControlAnswer {
     pub tick: u64,
     /// Share of the planned speed in that period; 0 at rest.
     pub path_rate: f64,
+    /// Process number of the client that asked.
+    pub process: u32,
+    /// For later; 0.
+    pub reserved: u32,
+    /// When it asked, as in the request.
+    pub asked_ns: u64,
     /// Why it is refused, UTF-8, filled up with 0.
     pub reason: [u8; 192],
 }
@@ -149,6 +159,9 @@ impl ControlAnswer {
             fault: 0,
             tick: 0,
             path_rate: 0.0,
+            process: 0,
+            reserved: 0,
+            asked_ns: 0,
             reason: bytes_of(reason),
         }
     }
@@ -178,9 +191,14 @@ pub struct Controlled {
 }
 
 impl Controlled {
-    /// Answers; says whether iceoryx2 took the answer.
+    /// Answers, with the number of the request; says whether iceoryx2 took the answer.
     pub fn answer(&self, answer: ControlAnswer) -> bool {
-        self.active.send_copy(answer).is_ok()
+        let numbered = ControlAnswer {
+            process: self.request.process,
+            asked_ns: self.request.asked_ns,
+            ..answer
+        };
+        self.active.send_copy(numbered).is_ok()
     }
 }
 
@@ -204,6 +222,7 @@ impl ControlServer {
                 },
                 other => failed(arm, "opening the control channel", &other),
             })?;
+        room::reserve(arm.domain())?;
         Ok(Self {
             server,
             _node: node,
@@ -242,6 +261,7 @@ impl ControlClient {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|cause| failed(arm, "opening the control channel", &cause))?;
+        room::reserve(arm.domain())?;
         Ok(Self {
             arm: arm.clone(),
             port,
@@ -255,9 +275,10 @@ impl ControlClient {
     /// [`IpcError::NoAnswer`] without an engine.
     pub fn ask(&self, ask: ControlAsk, timeout: Duration) -> Result<ControlAnswer, IpcError> {
         let end = Instant::now() + timeout;
+        let request = ControlRequest::new(ask);
         let pending = self
             .port
-            .send_copy(ControlRequest::new(ask))
+            .send_copy(request)
             .map_err(|cause| failed(&self.arm, "asking the engine", &cause))?;
         loop {
             // Asked before the look: an answer that came just before the end is still read.
@@ -266,7 +287,13 @@ impl ControlClient {
                 .receive()
                 .map_err(|cause| failed(&self.arm, "asking the engine", &cause))?;
             match answer {
-                Some(answer) => return Ok(*answer),
+                Some(answer)
+                    if (answer.process, answer.asked_ns) == (request.process, request.asked_ns) =>
+                {
+                    return Ok(*answer);
+                }
+                // An answer to somebody else.
+                Some(_) => {}
                 None if over => break,
                 None => sleep(LOOK),
             }

@@ -7,7 +7,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, Node};
 
 use crate::node::{Shared, exchange, inhabitants, join, topic};
-use crate::{Arm, Hello, HelloAck, IpcError, Setpoint, State};
+use crate::{Arm, Hello, HelloAck, IpcError, Setpoint, State, room};
 
 /// The driver's end: receives setpoints, sends states, answers handshakes. There is one for each
 /// arm among all processes. It stays in the thread that opened it.
@@ -72,6 +72,7 @@ impl DriverLink {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|cause| fail("opening the handshake", format!("{cause:?}")))?;
+        room::reserve(arm.domain())?;
         Ok(Self {
             arm: arm.clone(),
             states,

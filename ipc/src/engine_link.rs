@@ -9,7 +9,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, Node};
 
 use crate::node::{Shared, exchange, inhabitants, join, topic};
-use crate::{Arm, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint, State, Verdict, text_of};
+use crate::{Arm, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint, State, Verdict, room, text_of};
 
 /// The engine's end: sends setpoints, receives states, opens sessions. There is one for each arm
 /// among all processes. It stays in the thread that opened it.
@@ -59,6 +59,7 @@ impl EngineLink {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|cause| fail("opening the handshake", format!("{cause:?}")))?;
+        room::reserve(arm.domain())?;
         Ok(Self {
             arm: arm.clone(),
             setpoints,

@@ -46,7 +46,7 @@ pub enum IpcError {
     /// The service exists, but was made by another version of iceoryx2 or is broken.
     #[error(
         "{service}: made by another version of iceoryx2 than 0.9.3, or left broken by a crash; \
-         stop all engines and drivers of this arm and run `canter doctor`"
+         stop all engines and drivers of this arm and run `canter doctor --repair`"
     )]
     OtherLibrary {
         /// The service.
@@ -63,7 +63,10 @@ pub enum IpcError {
         operation: &'static str,
     },
     /// Anything else, with the name that iceoryx2 gives it.
-    #[error("{service}: {operation} failed ({cause})")]
+    #[error(
+        "{service}: {operation} failed ({cause}); if it stays so, end the engines and drivers \
+         there and run `canter doctor --repair`"
+    )]
     Failed {
         /// The service.
         service: String,
@@ -81,6 +84,50 @@ pub enum IpcError {
         role: &'static str,
         /// How long was waited (ms).
         waited_ms: u64,
+    },
+    /// There is too little room in shared memory.
+    #[error(
+        "{place} has {found} bytes left, {needed} are needed; remove what fills it \
+         (`ls -lS {place}`, `canter doctor`) or give it more (mount -o remount,size=256m {place}); \
+         SIGINT to the engine stops the arm meanwhile"
+    )]
+    NoRoom {
+        /// The file system.
+        place: &'static str,
+        /// What must be free (bytes).
+        needed: u64,
+        /// What is free (bytes).
+        found: u64,
+    },
+    /// A segment is not what iceoryx2 makes.
+    #[error(
+        "{segment}: damaged shared memory ({cause}); end the engines and drivers of {}, then \
+         `canter doctor --repair`", directory.display()
+    )]
+    Damaged {
+        /// The directory of the domain.
+        directory: std::path::PathBuf,
+        /// The segment.
+        segment: String,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// What shall be removed is in use.
+    #[error("{} is in use by {processes}; end them first", directory.display())]
+    InUse {
+        /// The directory of the domain.
+        directory: std::path::PathBuf,
+        /// The processes that use it.
+        processes: String,
+    },
+    /// The engine took a request and did not say what became of it.
+    #[error(
+        "{arm}: the engine took the request and then said nothing; \
+         `canter status` shows whether it lives and what it does"
+    )]
+    NoWord {
+        /// The arm.
+        arm: String,
     },
     /// The driver refused the handshake.
     #[error("{arm}: driver {driver:?} refused: {reason}")]

@@ -15,7 +15,9 @@
 
 mod arm;
 mod client;
+mod client_server;
 mod control;
+mod damage;
 mod domain;
 mod driver_link;
 mod engine_link;
@@ -23,15 +25,20 @@ mod error;
 mod hello;
 mod node;
 mod observer;
+mod ownership;
 mod probe;
+mod repair;
+mod request;
+mod room;
 mod setpoint;
 mod state;
+mod status;
+mod ticket;
 mod tool;
 
 pub use arm::{Arm, model_hash};
-pub use client::{
-    Answer, Client, ClientServer, Identity, Ownership, Request, StatusReader, StatusWriter, Verb,
-};
+pub use client::Client;
+pub use client_server::ClientServer;
 pub use control::{
     ControlAnswer, ControlAsk, ControlClient, ControlRequest, ControlServer, Controlled,
 };
@@ -40,11 +47,17 @@ pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::EngineLink;
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
-pub use node::{NodeCount, count_nodes, remove_dead_nodes};
+pub use node::{NodeCount, count_nodes, look_at_services, remove_dead_nodes};
 pub use observer::Observer;
+pub use ownership::Ownership;
 pub use probe::Probe;
+pub use repair::{Inhabitant, inhabitants_of, repair};
+pub use request::{Answer, Identity, LONGEST_ANSWER, Request, Verb};
+pub use room::{ROOM_NEEDED, room_left};
 pub use setpoint::{Setpoint, SetpointFlags};
 pub use state::{DriverState, FaultCode, State};
+pub use status::{StatusReader, StatusWriter};
+pub use ticket::RequestId;
 pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
 
 /// How many joints fit into a message.

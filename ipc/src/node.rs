@@ -12,7 +12,7 @@ use iceoryx2::service::builder::request_response::{
 };
 use iceoryx2::service::port_factory::{publish_subscribe, request_response};
 
-use crate::{Arm, Domain, IpcError, PROTOCOL};
+use crate::{Arm, Domain, IpcError, PROTOCOL, damage, room};
 
 /// The kind of service: shared memory between processes, ports that stay in their thread.
 pub(crate) type Shared = ipc::Service;
@@ -44,6 +44,8 @@ fn configuration(domain: &Domain) -> Result<Config, IpcError> {
 /// who find the place taken.
 pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
     set_log_level(LogLevel::Fatal);
+    room::look()?;
+    damage::look(arm.domain())?;
     let config = configuration(arm.domain())?;
     Node::<Shared>::try_cleanup_dead_nodes(&config);
     let fail = |cause: String| IpcError::Failed {
@@ -101,6 +103,26 @@ pub fn count_nodes(domain: &Domain) -> Result<NodeCount, IpcError> {
 pub fn remove_dead_nodes(domain: &Domain) -> Result<(u64, u64), IpcError> {
     let result = Node::<Shared>::try_cleanup_dead_nodes(&configuration(domain)?);
     Ok((result.cleanups, result.failed_cleanups))
+}
+
+/// Reads what iceoryx2 keeps of every service in `domain`; gives how many there are. Damaged
+/// segments may end the process: ask in one that may end.
+///
+/// # Errors
+/// [`IpcError::Damaged`], or [`IpcError::Failed`] when the list cannot be read.
+pub fn look_at_services(domain: &Domain) -> Result<usize, IpcError> {
+    damage::look(domain)?;
+    let (config, mut count) = (configuration(domain)?, 0);
+    Shared::list(&config, |_| {
+        count += 1;
+        CallbackProgression::Continue
+    })
+    .map_err(|cause| IpcError::Failed {
+        service: domain.directory().display().to_string(),
+        operation: "listing the services",
+        cause: format!("{cause:?}"),
+    })?;
+    Ok(count)
 }
 
 /// The name of a service of `arm`, in iceoryx2's type.
@@ -247,7 +269,7 @@ where
         CallbackProgression::Continue
     });
     if names.is_empty() {
-        "another process".to_owned()
+        "a process that is gone (`canter doctor --repair` makes it free)".to_owned()
     } else {
         names.join(", ")
     }

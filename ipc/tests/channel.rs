@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use ipc::{
     Answer, Arm, Client, ClientServer, Clock, Domain, DriverLink, EngineLink, Hello, HelloAck,
-    Identity, IpcError, Ownership, Request, Setpoint, State, StatusReader, StatusWriter, Verb,
-    Verdict,
+    Identity, IpcError, Ownership, Request, RequestId, Setpoint, State, StatusReader, StatusWriter,
+    Verb, Verdict,
 };
 
 fn arm(name: &str) -> Arm {
@@ -168,7 +168,7 @@ fn clients_ask_and_everybody_reads_the_status() {
         Verb::Submit { program, .. } => Answer::accept(serde_json::json!(program.len())),
         other => Answer::refuse(format!("{other:?}")),
     };
-    while !server.serve(handle).unwrap() {
+    while server.serve(handle).unwrap() == 0 {
         thread::sleep(Duration::from_millis(1));
     }
     assert_eq!(
@@ -192,6 +192,10 @@ fn one_client_commands_at_a_time() {
         process: u32::MAX,
     };
     let ask = |client: &Identity, ask: Verb| Request {
+        id: RequestId {
+            process: client.process,
+            asked_ns: 1,
+        },
         client: client.clone(),
         ask,
     };
@@ -220,13 +224,125 @@ fn the_last_answer_of_an_engine_that_leaves_is_read() {
             let client = Client::open(&asking, "test").unwrap();
             client.ask(Verb::Shutdown, Duration::from_secs(5))
         });
-        while !server
+        while server
             .serve(|_| Answer::accept(serde_json::Value::Null))
             .unwrap()
+            == 0
         {
             thread::yield_now();
         }
         drop(server);
         assert!(client.join().unwrap().unwrap().accepted);
     }
+}
+
+/// Who gave up has asked nothing: an engine that comes to it later does not do it.
+#[test]
+fn a_request_without_an_answer_is_withdrawn() {
+    let arm = arm("withdrawn");
+    let server = ClientServer::open(&arm).unwrap();
+    let client = Client::open(&arm, "test").unwrap();
+    let gave_up = client.ask(Verb::Shutdown, Duration::from_millis(30));
+    assert!(
+        matches!(gave_up, Err(IpcError::NoAnswer { .. })),
+        "{gave_up:?}"
+    );
+    let mut asked = Vec::new();
+    server
+        .serve(|request| {
+            asked.push(request.ask);
+            Answer::accept(serde_json::Value::Null)
+        })
+        .unwrap();
+    assert_eq!(asked, [], "nothing is left to be done");
+
+    // To stop is done all the same.
+    let gave_up = client.ask(Verb::Stop { fast: true }, Duration::from_millis(30));
+    assert!(
+        matches!(gave_up, Err(IpcError::NoAnswer { .. })),
+        "{gave_up:?}"
+    );
+}
+
+/// An engine that has taken a request and is slow is waited for.
+#[test]
+fn a_request_that_was_taken_is_waited_for() {
+    let arm = arm("taken-late");
+    let server = ClientServer::open(&arm).unwrap();
+    let asking = arm.clone();
+    let client = thread::spawn(move || {
+        let client = Client::open(&asking, "test").unwrap();
+        client.ask(Verb::Shutdown, Duration::from_millis(200))
+    });
+    let slow = |_: Request| {
+        thread::sleep(Duration::from_millis(600));
+        Answer::accept(serde_json::Value::Null)
+    };
+    while server.serve(slow).unwrap() == 0 {
+        thread::yield_now();
+    }
+    assert!(client.join().unwrap().unwrap().accepted);
+}
+
+/// The answer to a request that timed out reaches nobody, whoever asks next.
+#[test]
+fn an_answer_reaches_only_who_asked() {
+    let arm = arm("numbered");
+    let server = ClientServer::open(&arm).unwrap();
+    let echo = |request: Request| Answer::accept(serde_json::to_value(&request.ask).unwrap());
+    for _ in 0..20 {
+        let client = Client::open(&arm, "test").unwrap();
+        let gave_up = client.ask(Verb::Status, Duration::ZERO);
+        assert!(gave_up.is_err());
+        drop(client);
+        let asking = arm.clone();
+        let next = thread::spawn(move || {
+            let client = Client::open(&asking, "test").unwrap();
+            client.ask(Verb::Notes { since: 7 }, Duration::from_secs(5))
+        });
+        while !next.is_finished() {
+            server.serve(echo).unwrap();
+        }
+        let answer = next.join().unwrap().unwrap();
+        assert_eq!(answer.body["verb"], "notes", "{answer:?}");
+    }
+}
+
+/// A client that asks without a pause does not keep others from their turn, nor the engine in it.
+#[test]
+fn every_client_has_its_turn() {
+    let arm = arm("flood");
+    let server = ClientServer::open(&arm).unwrap();
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let flood = || {
+            let client = Client::open(&arm, "flood").unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                // Nobody waits for the answers.
+                let _ = client.ask(Verb::Status, Duration::ZERO);
+            }
+        };
+        scope.spawn(flood);
+        scope.spawn(flood);
+        let quiet = scope.spawn(|| {
+            let client = Client::open(&arm, "quiet").unwrap();
+            let answers = (0..20).map(|since| {
+                let answer = client.ask(Verb::Notes { since }, Duration::from_secs(20));
+                answer.unwrap().accepted
+            });
+            answers.filter(|accepted| *accepted).count()
+        });
+        let mut most = 0;
+        while !quiet.is_finished() {
+            let served = server.serve(|_| {
+                // As long as a status takes.
+                thread::sleep(Duration::from_micros(200));
+                Answer::accept(serde_json::Value::Null)
+            });
+            most = most.max(served.unwrap());
+        }
+        stop.store(true, Ordering::Relaxed);
+        assert_eq!(quiet.join().unwrap(), 20);
+        assert!(most <= 32, "{most} in a turn");
+    });
 }

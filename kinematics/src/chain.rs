@@ -4,7 +4,7 @@ use crate::arith::{Arith, Build, Op, Plain};
 use crate::links::{Line, Links, Reached};
 use crate::urdf::{JointKind, Model};
 use crate::wide::{F4, transposed};
-use nalgebra::{ArrayStorage, Isometry3, SMatrix, SVector, Vector3};
+use nalgebra::{ArrayStorage, Isometry3, Point3, SMatrix, SVector, Vector3};
 
 /// `a x b` of vectors in the first three lanes.
 #[inline(always)]
@@ -104,6 +104,22 @@ impl<const N: usize> Chain<N> {
     #[must_use]
     pub fn reference_from_base(&self) -> &Isometry3<f64> {
         &self.reference_from_base
+    }
+
+    /// A ball that holds every position of the tool, whatever the joints do: its middle, in the
+    /// frame that poses are given in, and its radius (m). It is larger than what the arm reaches,
+    /// and costs a few additions; infinite where a sliding joint has no limits.
+    #[must_use]
+    pub fn reach_ball(&self) -> (Point3<f64>, f64) {
+        let stroke = |i: usize| {
+            if self.prismatic[i] {
+                self.lower[i].abs().max(self.upper[i].abs())
+            } else {
+                0.0
+            }
+        };
+        let (middle, radius) = self.links.ball(stroke);
+        (middle.into(), radius)
     }
 
     /// Lower joint limits, rad or m; minus infinity for continuous joints.

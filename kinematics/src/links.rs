@@ -45,6 +45,17 @@ pub(crate) struct Reached<A: Arith, const N: usize> {
 }
 
 impl<const N: usize> Links<N> {
+    /// A ball that holds every position of the end: its middle and its radius (m). `stroke` says
+    /// how far a sliding joint goes from zero at most.
+    pub(crate) fn ball(&self, stroke: impl Fn(usize) -> f64) -> ([f64; 3], f64) {
+        let shifts = self.shift.iter().map(|[x, y]| x.hypot(*y));
+        let strokes = (0..N).map(|i| (1.0 - self.turns[i]) * stroke(i));
+        let [x, y, z, _] = self.last.p.0;
+        let end = (x * x + y * y + z * z).sqrt();
+        let [x, y, z, _] = self.first.p.0;
+        ([x, y, z], shifts.chain(strokes).sum::<f64>() + end)
+    }
+
     /// The links of a model with `N` joints, from its base to its flange.
     pub(crate) fn of(model: &Model) -> Self {
         let mut place = Isometry3::identity();

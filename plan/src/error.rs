@@ -33,6 +33,27 @@ pub enum PlanError {
         /// What the operating system says.
         source: std::io::Error,
     },
+    /// Another process writes the database.
+    #[error(
+        "world database {database} is in use by {holder}; wait until it has ended, or work in a copy"
+    )]
+    InUse {
+        /// Path of the database.
+        database: String,
+        /// Program, subcommand and process id of the holder.
+        holder: String,
+    },
+    /// A file of the database was taken away or changed while it was in use.
+    #[error(
+        "{path} {what} while this process used it; nothing more is written, and what the arm did \
+         since the last commit is not recorded; restore the file or begin with a new database"
+    )]
+    Lost {
+        /// Path of the file.
+        path: String,
+        /// What happened to it.
+        what: &'static str,
+    },
     /// A file of a workstation cannot be understood.
     #[error("workstation file: {0}")]
     Import(String),

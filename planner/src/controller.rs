@@ -1,5 +1,7 @@
 //! One arm on its way through a program: modes, planner and the pose reached so far.
 
+use std::any::Any;
+
 use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
@@ -23,6 +25,47 @@ pub struct Step<const N: usize> {
     pub ticks: u64,
 }
 
+/// A step that was planned before its turn came, with what it stands on and what it leaves behind.
+#[derive(Clone, Debug)]
+pub struct PlannedStep<const N: usize> {
+    /// The step itself.
+    pub step: Step<N>,
+    /// Joints at its start, at rest.
+    start: SVector<f64, N>,
+    /// Modes before it.
+    before: Modal,
+    /// Modes after it.
+    after: Modal,
+    /// Servo rate that its length is counted in (Hz).
+    rate_hz: f64,
+}
+
+/// A planned step of a robot with any number of joints.
+#[derive(Debug)]
+pub struct AnyStep(Box<dyn Any + Send>);
+
+impl AnyStep {
+    /// The step, for a robot of `N` joints; none for one of a robot with another number.
+    #[must_use]
+    pub fn into_step<const N: usize>(self) -> Option<PlannedStep<N>> {
+        self.0.downcast().ok().map(|step| *step)
+    }
+}
+
+impl<const N: usize> From<PlannedStep<N>> for AnyStep {
+    fn from(step: PlannedStep<N>) -> Self {
+        Self(Box::new(step))
+    }
+}
+
+impl<const N: usize> PlannedStep<N> {
+    /// Joints at the start, at rest (rad, m).
+    #[must_use]
+    pub fn start(&self) -> &SVector<f64, N> {
+        &self.start
+    }
+}
+
 /// Resolves and plans commands one after the other, each from where the one
 /// before it ends. Nothing in here moves an arm.
 #[derive(Clone, Debug)]
@@ -34,6 +77,7 @@ pub struct Controller<const N: usize> {
     planner: Planner<N>,
     joints: SVector<f64, N>,
     rate_hz: f64,
+    plans: u64,
 }
 
 impl<const N: usize> Controller<N> {
@@ -67,6 +111,7 @@ impl<const N: usize> Controller<N> {
             planner,
             joints,
             rate_hz,
+            plans: 0,
         })
     }
 
@@ -125,6 +170,7 @@ impl<const N: usize> Controller<N> {
         let task = self.modal.resolve(command, &flange)?;
         let step = match task {
             Task::Move(motion) => {
+                self.plans += 1;
                 let planned = self.planner.plan(&motion, &self.joints).map_err(|error| {
                     CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
                 })?;
@@ -157,6 +203,61 @@ impl<const N: usize> Controller<N> {
             },
         };
         Ok(step)
+    }
+
+    /// What a command means here and now; nothing is planned and nothing changes.
+    ///
+    /// # Errors
+    /// A [`CommandError`] for a command that is out of order or out of range.
+    pub fn resolve(&self, command: &crcl::Command) -> Result<Task, CommandError> {
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        self.modal.clone().resolve(command, &flange)
+    }
+
+    /// A pose of the controlled point in the workstation (m) as the program would write it now.
+    #[must_use]
+    pub fn written(&self, workstation_from_tool: &Isometry3<f64>) -> crcl::Pose {
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        self.modal.written(workstation_from_tool, &flange)
+    }
+
+    /// As [`Self::step`]; the step can be executed later, by [`Self::follow`].
+    ///
+    /// # Errors
+    /// A [`CommandError`]; the controller is then as before.
+    pub fn step_ahead(&mut self, command: &crcl::Command) -> Result<PlannedStep<N>, CommandError> {
+        let (start, before) = (self.joints, self.modal.clone());
+        let step = self.step(command)?;
+        let after = self.modal.clone();
+        Ok(PlannedStep {
+            step,
+            start,
+            before,
+            after,
+            rate_hz: self.rate_hz,
+        })
+    }
+
+    /// Takes a step that was planned before, without planning it again. Says whether that was
+    /// possible: only for a controller of the same robot whose joints, modes and servo rate are
+    /// exactly those that the step was planned for. Otherwise the controller is as before.
+    pub fn follow(&mut self, planned: &PlannedStep<N>) -> bool {
+        let same = self.joints == planned.start && self.modal == planned.before;
+        if !same || self.rate_hz.to_bits() != planned.rate_hz.to_bits() {
+            return false;
+        }
+        self.modal = planned.after.clone();
+        if let Some(motion) = &planned.step.planned {
+            self.joints = motion.end;
+        }
+        self.change_tool();
+        true
+    }
+
+    /// How many moves this controller has planned, refused ones included.
+    #[must_use]
+    pub fn plans(&self) -> u64 {
+        self.plans
     }
 
     /// Whole servo periods that hold a time, rounded up.

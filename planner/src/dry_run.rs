@@ -4,10 +4,9 @@ use crcl::{LengthUnit, Program};
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
-use trajectory::Trajectory;
 
 use crate::command_error::CommandError;
-use crate::controller::{Controller, Step};
+use crate::controller::{AnyStep, Controller, PlannedStep};
 use crate::motion::MoveCertificate;
 use crate::robot::{Robot, RobotError, vector};
 use crate::with_dof;
@@ -96,6 +95,14 @@ pub struct PlannedCommand {
     motion: Box<dyn Motion>,
 }
 
+impl PlannedCommand {
+    /// The step itself, to be executed.
+    #[must_use]
+    pub fn into_step(self) -> AnyStep {
+        self.motion.into_step()
+    }
+}
+
 /// State of the arm at one time of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSample {
@@ -124,6 +131,10 @@ pub struct Plan {
     pub robot: String,
     /// Number of joints.
     pub dof: usize,
+    /// Joint positions at the start (rad, m).
+    pub start: Vec<f64>,
+    /// How many moves were planned, refused ones included.
+    pub plans: u64,
     /// Length of the program, s.
     pub duration_s: f64,
     /// Time that planning took, s.
@@ -197,6 +208,8 @@ fn plan_with<const N: usize>(
         schema: 1,
         robot: robot.name.clone(),
         dof: N,
+        start: controller.joints().as_slice().to_vec(),
+        plans: 0,
         duration_s: 0.0,
         planning_s: 0.0,
         commands: Vec::with_capacity(program.commands.len()),
@@ -205,10 +218,9 @@ fn plan_with<const N: usize>(
     let mut ticks = 0;
     for (index, located) in program.commands.iter().enumerate() {
         let started = (options.clock)();
-        let before = *controller.joints();
-        match controller.step(&located.command) {
-            Ok(step) => {
-                let mut command = planned_command(&controller, step, before, options.rate_hz);
+        match controller.step_ahead(&located.command) {
+            Ok(planned) => {
+                let mut command = planned_command(&controller, planned, options.rate_hz);
                 command.index = index;
                 command.line = located.line;
                 command.name = located.command.name();
@@ -225,6 +237,7 @@ fn plan_with<const N: usize>(
             }
         }
     }
+    plan.plans = controller.plans();
     plan.duration_s = ticks as f64 / options.rate_hz;
     plan.planning_s = (options.clock)() - begin;
     Ok(plan)
@@ -243,22 +256,13 @@ fn refusal(index: usize, located: &crcl::Located, error: CommandError) -> Refusa
 
 fn planned_command<const N: usize>(
     controller: &Controller<N>,
-    step: Step<N>,
-    before: SVector<f64, N>,
+    planned: PlannedStep<N>,
     rate_hz: f64,
 ) -> PlannedCommand {
+    let step = &planned.step;
     let poses = match &step.task {
         crate::task::Task::Move(motion) => motion.poses.clone(),
         _ => Vec::new(),
-    };
-    let (trajectory, certificate) = match step.planned {
-        Some(planned) => (planned.trajectory, Some(planned.certificate)),
-        None => (Trajectory::new(Vec::new()), None),
-    };
-    let motion = ArmMotion {
-        trajectory,
-        rest: before,
-        chain: *controller.chain(),
     };
     PlannedCommand {
         index: 0,
@@ -267,9 +271,15 @@ fn planned_command<const N: usize>(
         start_s: 0.0,
         duration_s: step.ticks as f64 / rate_hz,
         planning_s: 0.0,
-        certificate,
+        certificate: step
+            .planned
+            .as_ref()
+            .map(|planned| planned.certificate.clone()),
         poses,
-        motion: Box::new(motion),
+        motion: Box::new(ArmMotion {
+            chain: *controller.chain(),
+            planned,
+        }),
     }
 }
 
@@ -277,21 +287,25 @@ fn planned_command<const N: usize>(
 trait Motion: std::fmt::Debug + Send {
     /// State `t` s after the start; at rest after the end.
     fn sample(&self, t: f64) -> PlanSample;
+
+    /// The step that moves so.
+    fn into_step(self: Box<Self>) -> AnyStep;
 }
 
 #[derive(Debug)]
 struct ArmMotion<const N: usize> {
-    trajectory: Trajectory<N>,
-    rest: SVector<f64, N>,
+    planned: PlannedStep<N>,
     chain: Chain<N>,
 }
 
 impl<const N: usize> Motion for ArmMotion<N> {
     fn sample(&self, t: f64) -> PlanSample {
-        let joints = if self.trajectory.pieces().is_empty() {
-            realtime::Sample::rest(self.rest)
-        } else {
-            self.trajectory.sample(t.min(self.trajectory.duration()))
+        let joints = match &self.planned.step.planned {
+            Some(planned) if !planned.trajectory.pieces().is_empty() => {
+                let trajectory = &planned.trajectory;
+                trajectory.sample(t.min(trajectory.duration()))
+            }
+            _ => realtime::Sample::rest(*self.planned.start()),
         };
         let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
         PlanSample {
@@ -303,6 +317,10 @@ impl<const N: usize> Motion for ArmMotion<N> {
             dddq: list(&joints.jerk),
             workstation_from_tool: self.chain.forward(&joints.position),
         }
+    }
+
+    fn into_step(self: Box<Self>) -> AnyStep {
+        self.planned.into()
     }
 }
 

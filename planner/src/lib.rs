@@ -2,7 +2,8 @@
 //!
 //! A command loses its modes in [`modal`] and is planned whole in [`motion`]. The [`controller`]
 //! holds both together and knows where the arm is after each command; the [`dry_run`] and a real
-//! run both stand on it. [`recorded`] judges a recorded motion by the program that was to be done.
+//! run both stand on it. [`way`] plans the commands of a plan, which leave the way open. [`recorded`]
+//! judges a recorded motion by the program that was to be done.
 //!
 //! This crate is a pure function of robot, program and start: it never starts a thread, reads a
 //! clock, touches shared memory, prints, or reads an environment variable. Only [`robot`] reads
@@ -13,9 +14,11 @@ pub mod command_error;
 pub mod controller;
 mod dof;
 pub mod dry_run;
+pub mod end_effector;
 pub mod modal;
 pub mod motion;
 pub mod recorded;
 pub mod robot;
 pub mod task;
 pub mod tooling;
+pub mod way;

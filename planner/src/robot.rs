@@ -18,6 +18,7 @@ use kinematics::{Chain, Model, UrdfError};
 use nalgebra::{Isometry3, SVector};
 use std::path::Path;
 
+use crate::end_effector::{EndEffector, Gripper, ToolChanger};
 use crate::tooling::{Holder, Tooling};
 
 /// Limits of the joints, root first: rad for turning joints, m for sliding ones.
@@ -54,37 +55,6 @@ pub struct ToolLimits {
     pub angular_jerk: f64,
     /// Where these come from.
     pub source: String,
-}
-
-/// How long a gripper takes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gripper {
-    /// Time to open, s.
-    pub opening: f64,
-    /// Time to close, s.
-    pub closing: f64,
-}
-
-/// Something that the flange can carry.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EndEffector {
-    /// Name.
-    pub name: String,
-    /// Pose of the tool centre point in the flange.
-    pub flange_from_tcp: Isometry3<f64>,
-    /// Present when it opens and closes.
-    pub gripper: Option<Gripper>,
-    /// Where it is kept in the changing station, in the workstation.
-    pub workstation_from_holder: Option<Isometry3<f64>>,
-}
-
-/// The part of the flange that takes end effectors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToolChanger {
-    /// Time to let go, s.
-    pub opening: f64,
-    /// Time to take hold, s.
-    pub closing: f64,
 }
 
 /// A robot as the planner needs it. All vectors have one entry a joint.
@@ -166,14 +136,32 @@ pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
     .read()
 }
 
-fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
-    let read = |file: &str| {
-        let path = folder.join(file);
-        std::fs::read_to_string(&path).map_err(|error| RobotError::Read {
-            file: path.display().to_string(),
-            message: error.to_string(),
-        })
+/// Largest file of a robot folder, bytes: a URDF of a factory has a hundredth of it.
+const LARGEST: u64 = 64 << 20;
+
+/// The text of a regular file: a pipe would wait for a writer, a device may never end.
+fn text_of(path: &Path) -> Result<String, RobotError> {
+    use std::io::Read;
+    let unreadable = |message: String| RobotError::Read {
+        file: path.display().to_string(),
+        message,
     };
+    let failed = |error: std::io::Error| unreadable(error.to_string());
+    let found = std::fs::metadata(path).map_err(failed)?;
+    if !found.is_file() || found.len() > LARGEST {
+        let expected = format!("expected a regular file of at most {LARGEST} bytes");
+        return Err(unreadable(expected));
+    }
+    let mut text = String::new();
+    let file = std::fs::File::open(path).map_err(failed)?;
+    file.take(LARGEST)
+        .read_to_string(&mut text)
+        .map_err(failed)?;
+    Ok(text)
+}
+
+fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
+    let read = |file: &str| text_of(&folder.join(file));
     let (toml, urdf) = (read("robot.toml")?, read("robot.urdf")?);
     let name = folder.canonicalize().ok();
     let name = name

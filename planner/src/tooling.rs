@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::command_error::{CommandError, ErrorClass};
-use crate::robot::{EndEffector, ToolChanger};
+use crate::end_effector::{EndEffector, ToolChanger};
 use crate::task::ToolAction;
 
 /// A place of the tool changing station.
@@ -194,7 +194,7 @@ mod tests {
         let gripper = EndEffector {
             name: "gripper".into(),
             flange_from_tcp: Isometry3::translation(0.0, 0.0, 0.1),
-            gripper: Some(crate::robot::Gripper {
+            gripper: Some(crate::end_effector::Gripper {
                 opening: 0.2,
                 closing: 0.2,
             }),

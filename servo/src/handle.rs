@@ -1,47 +1,17 @@
-//! Starting and ending the real-time thread, and what it reports.
+//! Starting and ending the real-time thread.
 
 use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
 
-use rtrb::Consumer;
-
 use super::config::{ExecutorConfig, ExecutorError};
-use super::event::{Event, Recorded};
 use super::feed::Feeder;
+use super::monitor::Monitor;
 use super::remote::Remote;
 use super::runner::Runner;
 use super::thread;
 
 /// Stack of the real-time thread (bytes).
 const STACK: usize = 4 << 20;
-
-/// The reader's end: what happened, and what was published and measured.
-#[derive(Debug)]
-pub struct Monitor<const N: usize> {
-    pub(super) events: Consumer<Event>,
-    pub(super) samples: Consumer<Recorded<N>>,
-    pub(super) seen: u64,
-}
-
-impl<const N: usize> Monitor<N> {
-    /// The oldest event that was not read yet.
-    pub fn event(&mut self) -> Option<Event> {
-        let event = self.events.pop().ok();
-        self.seen += u64::from(event.is_some());
-        event
-    }
-
-    /// How many events were read, for [`super::Feeder::settle`].
-    pub fn seen(&self) -> u64 {
-        self.seen
-    }
-
-    /// The oldest sample that was not read yet; none without [`ExecutorConfig::record`]. In
-    /// lock-step the thread waits for the reader, by the clock it drops what has no room.
-    pub fn sample(&mut self) -> Option<Recorded<N>> {
-        self.samples.pop().ok()
-    }
-}
 
 /// A running real-time thread. Dropping it stops the arm on the path, says goodbye to the driver
 /// and ends the thread.

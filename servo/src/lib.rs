@@ -19,20 +19,24 @@
 )]
 
 mod config;
+mod control;
 mod event;
 mod feed;
 mod handle;
 mod histogram;
+mod monitor;
 mod orders;
 mod remote;
 mod runner;
 mod thread;
 
 pub use config::{ExecutorConfig, ExecutorError};
+pub use control::Control;
 pub use event::{Event, Fault, Recorded};
 pub use feed::{Feeder, Full, ToolOrder};
-pub use handle::{Executor, Monitor};
+pub use handle::Executor;
 pub use histogram::Histogram;
+pub use monitor::Monitor;
 pub use orders::{NoFault, Progress, Steering};
-pub use remote::{Control, Counters, Measured, Remote};
+pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use realtime::{Demand, Manner};
 use thiserror::Error;
 
-use super::remote::Control;
+use super::control::Control;
 
 /// How the arm shall behave, as two bits of the word of orders.
 const RUN: u64 = 0;

@@ -14,7 +14,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::config::ExecutorConfig;
 use super::event::{Event, Fault, Recorded};
 use super::feed::{Feeder, Item, ToolOrder, Work};
-use super::handle::Monitor;
+use super::monitor::Monitor;
 use super::orders::{Asked, Progress};
 use super::remote::{Measured, Remote, Shared};
 

@@ -11,11 +11,11 @@ use crate::repository::root;
 pub struct Arm {
     chain: k::SerialChain<f64>,
     workstation_from_base: Isometry3<f64>,
-    /// Lower and upper position limit, largest velocity, one a joint.
+    /// Lower and upper position limit, largest velocity, one per joint.
     pub joints: Vec<[f64; 3]>,
-    /// Largest acceleration, one a joint.
+    /// Largest acceleration, one per joint.
     pub acceleration: Vec<f64>,
-    /// Largest jerk, one a joint.
+    /// Largest jerk, one per joint.
     pub jerk: Vec<f64>,
     /// Largest speed of the controlled point, m/s.
     pub tool_speed: f64,

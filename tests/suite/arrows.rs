@@ -29,6 +29,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
     (
         "engine",
         &[
+            "plan",
             "planner",
             "servo",
             "crcl",

@@ -171,3 +171,164 @@ fn bytes_that_are_no_program() {
         assert!(all.len() < 60_000, "{what}: {} bytes are said", all.len());
     }
 }
+
+/// A disk that is full: the file is named, and it is no internal error.
+#[test]
+fn a_full_disk_is_named() {
+    let program = "examples/pick_and_place.canon";
+    let arm = format!("full{}/arm", std::process::id());
+    let full = ["--robot", "ur5e", "--samples", "/dev/full"];
+    let run = ["run", program, "--lock-step", "--arm", &arm];
+    for arguments in [&["plan", program][..], &run] {
+        let ran = canter(arguments.iter().chain(&full));
+        assert_eq!(ran.code, 3, "{arguments:?}: {}", ran.stderr);
+        let named = ran.stderr.contains("cannot write /dev/full");
+        assert!(named, "{arguments:?}: {}", ran.stderr);
+    }
+}
+
+/// A robot that is refused leaves no folder behind.
+#[test]
+fn a_refused_robot_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    // Nine joints: one more than are driven.
+    let joint = |number: usize| {
+        format!(
+            "<link name=\"l{number}\"/><joint name=\"j{number}\" type=\"revolute\">\
+             <parent link=\"{}\"/><child link=\"l{number}\"/><origin xyz=\"0 0 0.1\"/>\
+             <axis xyz=\"0 {} {}\"/><limit lower=\"-1\" upper=\"1\" velocity=\"1\" effort=\"1\"/>\
+             </joint>",
+            if number == 0 {
+                "base".to_owned()
+            } else {
+                format!("l{}", number - 1)
+            },
+            number % 2,
+            1 - number % 2,
+        )
+    };
+    let joints: String = (0..9).map(joint).collect();
+    let file = folder.path().join("nine.urdf");
+    std::fs::write(
+        &file,
+        format!("<robot name=\"nine\"><link name=\"base\"/>{joints}</robot>"),
+    )
+    .unwrap();
+    let ran = canter(["robots", "import", file.to_str().unwrap()]);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("9 movable joints"), "{}", ran.stderr);
+    assert!(!folder.path().join("nine").exists());
+}
+
+/// Poses at kilometres are refused as soon as those out of reach: no curve is laid to them.
+#[test]
+fn far_poses_are_refused_at_once() {
+    let pose = |x: f64, y: f64| format!("{{{{{x}, {y}, 250}}, {{0,0,-1}}, {{1,0,0}}}}");
+    // Metres forgotten, ten kilometres, a hundred thousand; straight and smooth, first and later.
+    let mut program = "InitCanon()\nMoveTo({{450, 0, 250}, {0,0,-1}, {1,0,0}})\n".to_owned();
+    program += "SetLengthUnits(\"meter\")\nSetIntermediatePointTolerance(0.02)\n";
+    let moves = [
+        format!(
+            "MoveSmoothlyTo({{{}, {}}}, 2)\n",
+            pose(450.0, -100.0),
+            pose(450.0, 100.0)
+        ),
+        format!("MoveStraightTo({})\n", pose(450.0, 10.0)),
+        format!("MoveStraightTo({})\n", pose(1e4, 0.0)),
+        format!("MoveSmoothlyTo({{{}}}, 1)\n", pose(1e8, 0.0)),
+        format!("MoveTo({})\n", pose(1e4, 0.0)),
+    ];
+    program += &moves.concat();
+    program += "EndCanon(0)\n";
+    let ran = canter_reading(["check", "-", "--robot", "ur5e"], program.as_bytes());
+    assert_eq!(ran.code, 1, "{}{}", ran.stdout, ran.stderr);
+    let said = ran.stdout.matches("pose 1 is out of reach by ").count();
+    assert_eq!(said, moves.len(), "{}", ran.stdout);
+    for word in ["NaN", "inf "] {
+        assert!(!ran.stdout.contains(word), "{}", ran.stdout);
+    }
+}
+
+/// Runs `canter` with a file as standard input; it must end by itself.
+fn ended(arguments: &[&str], input: &str) -> Ran {
+    let mut child = crate::canter::command(arguments)
+        .stdin(std::fs::File::open(input).unwrap())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(120);
+    while child.try_wait().unwrap().is_none() {
+        if std::time::Instant::now() > deadline {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            panic!("{arguments:?} does not end");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    crate::canter::ran(child.wait_with_output().unwrap())
+}
+
+/// Where a file is expected, a pipe is not waited for and a device is not read until memory ends.
+#[test]
+fn pipes_and_devices_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = |name: &str| {
+        let path = folder.path().join(name).to_str().unwrap().to_owned();
+        let status = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(status.unwrap().success());
+        path
+    };
+    let (fifo, world, xml) = (made("fifo"), made("world.db"), made("world.xml"));
+    let database = folder.path().join("new.db").to_str().unwrap().to_owned();
+    let (zero, robot) = ("/dev/zero", ["--robot", "ur5e"]);
+    let program = "examples/pick_and_place.canon";
+    let plan = "examples/kitting/one-kit.pddl";
+    let cases: Vec<Vec<&str>> = vec![
+        vec!["check", &fifo],
+        vec!["check", zero],
+        vec!["plan", &fifo, robot[0], robot[1]],
+        vec!["run", zero, robot[0], robot[1]],
+        vec!["convert", &fifo],
+        vec!["send", &fifo],
+        vec!["verify", zero, program, robot[0], robot[1]],
+        vec!["fk", "--joints", &fifo, robot[0], robot[1]],
+        vec!["ik", "--poses", zero, robot[0], robot[1]],
+        vec!["plan-check", &fifo],
+        vec!["plan-check", plan, "--actions", &fifo],
+        vec![
+            "plan-check",
+            "examples/kitting/kit-abc.plan",
+            "--world",
+            &world,
+        ],
+        vec!["plan-run", zero, "--world", &world, robot[0], robot[1]],
+        vec!["plan-run", plan, "--world", &world, robot[0], robot[1]],
+        vec!["world", "show", &world],
+        vec!["world", "show", &xml],
+        vec!["world", "import", &xml, &database],
+        vec!["world", "import", crate::plans::WORLD, &world],
+        vec!["bench", "motion", &fifo],
+    ];
+    for case in cases {
+        let ran = ended(&case, "/dev/null");
+        assert_eq!(
+            (ran.code, ran.stdout.as_str()),
+            (3, ""),
+            "{case:?}: {}",
+            ran.stderr
+        );
+        assert!(
+            ran.stderr.contains("regular file"),
+            "{case:?}: {}",
+            ran.stderr
+        );
+    }
+    // Standard input may be anything, but not without end.
+    let ran = ended(&["check", "-"], zero);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("at most 256 MiB"), "{}", ran.stderr);
+    let ran = ended(&["fk", "--joints", "-", robot[0], robot[1]], zero);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("lines of at most"), "{}", ran.stderr);
+}

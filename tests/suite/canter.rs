@@ -45,7 +45,8 @@ pub(crate) fn canter_reading<S: AsRef<OsStr>>(
     ran(child.wait_with_output().unwrap())
 }
 
-fn ran(output: std::process::Output) -> Ran {
+/// What a process left.
+pub(crate) fn ran(output: std::process::Output) -> Ran {
     Ran {
         code: output.status.code().unwrap(),
         stdout: String::from_utf8(output.stdout).unwrap(),

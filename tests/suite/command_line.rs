@@ -190,3 +190,16 @@ fn a_program_is_converted_there_and_back() {
     let schema: serde_json::Value = serde_json::from_str(&canter(["schema"]).stdout).unwrap();
     assert_eq!(schema["title"], "Canonical robot program");
 }
+
+/// Log lines have no colours where nobody sees them.
+#[test]
+fn piped_logs_have_no_colours() {
+    let ran = crate::canter::command(["robots", "list"])
+        .env("CANTER_LOG", "debug")
+        .env_remove("NO_COLOR")
+        .output()
+        .unwrap();
+    let said = String::from_utf8(ran.stderr).unwrap();
+    assert!(said.contains("DEBUG"), "{said}");
+    assert!(!said.contains('\u{1b}'), "{said:?}");
+}

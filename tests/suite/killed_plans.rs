@@ -150,7 +150,7 @@ fn a_pddl_run_goes_on_where_it_was() {
 }
 
 /// Waits until a run has done some statements and another is under way.
-fn moving(database: &str, statements: usize) {
+pub(crate) fn moving(database: &str, statements: usize) {
     let deadline = Instant::now() + Duration::from_secs(300);
     while Instant::now() < deadline {
         let shown = canter(["world", "show", database]).stdout;

@@ -1,4 +1,4 @@
-//! All system tests as one binary: one link step instead of one a file.
+//! All system tests as one binary: one link step instead of one per file.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
@@ -6,19 +6,24 @@ mod arrows;
 mod bad_inputs;
 mod benchmarks;
 mod canter;
+mod circles;
 mod command_line;
 mod control;
 mod documents;
 mod domains;
 mod drivers;
+mod faults;
 mod killed_plans;
 mod made_kits;
 mod plan_costs;
 mod planned_motions;
+mod planned_once;
 mod plans;
 mod runs;
 mod session;
+mod shared_memory;
 mod soak;
+mod world_in_use;
 
 /// Every file of this folder is a module above: a forgotten one would never run.
 #[test]

@@ -1,4 +1,4 @@
-//! What orders cost that are left to the executor, and what a kit costs, by the real command.
+//! The cost of choosing orders, and of a kit, measured with the real command.
 //!
 //! `CANTER_LAYOUTS` sets the number of layouts, `CANTER_KITS` that of kits.
 

@@ -1,7 +1,4 @@
 //! `canter plan-run`, `plan-check` and `world` as real processes, with the example workstation.
-//!
-//! The plan of the original document and NIST's PDDL plans are used where the folder of
-//! specifications lies beside the repository; our own plans everywhere.
 
 use std::path::{Path, PathBuf};
 
@@ -26,23 +23,6 @@ pub(crate) fn own() -> Work {
         plan: PLAN.into(),
         world: WORLD,
     }
-}
-
-/// A file of the folder of specifications; none without the folder.
-fn shared(path: &str) -> Option<PathBuf> {
-    let path = repository::root().join("../shared").join(path);
-    path.exists().then_some(path)
-}
-
-/// The plan of the original document: from below its dashed line to its end, unchanged.
-pub(crate) fn document(folder: &Path) -> Option<Work> {
-    let text = std::fs::read_to_string(shared("spec/seeds/kitting-process-plan.txt")?).unwrap();
-    let dashes = text.find("-----").unwrap();
-    let end = dashes + text[dashes..].find('\n').unwrap();
-    let plan = folder.join("document.plan");
-    std::fs::write(&plan, &text[end..]).unwrap();
-    let world = "examples/kitting/workstation-kitABCPlan.toml";
-    Some(Work { plan, world })
 }
 
 /// A number from the environment.
@@ -142,27 +122,6 @@ fn plans_are_checked() {
     );
     let found_own = found;
     let folder = tempfile::tempdir().unwrap();
-    if let Some(work) = document(folder.path()) {
-        let ran = canter([
-            "plan-check",
-            work.plan.to_str().unwrap(),
-            "--json",
-            "--world",
-            work.world,
-        ]);
-        let found = report(&ran);
-        let names = [
-            "requirements",
-            "parameters",
-            "variables",
-            "statements",
-            "warnings",
-            "errors",
-        ];
-        let counts = names.map(|name| count(&found, name));
-        assert_eq!(counts, [5, 1, 17, 97, 13, 0], "{found}");
-        assert_eq!(ran.code, 0);
-    }
     // The same plan in its other forms.
     for form in ["block", "json"] {
         let other = folder.path().join(form);
@@ -312,37 +271,27 @@ fn a_place_out_of_reach_changes_nothing() {
     assert_eq!(supply, 9, "a tray and eight parts");
 }
 
-/// NIST's PDDL plans: to their goal in thought, or to the step and the precondition that is false;
-/// the plan of June 2012 on the arm, in lock-step.
+/// A PDDL plan on the arm, in lock-step.
 #[test]
-fn pddl_plans_run() {
+fn a_pddl_plan_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let g1 = shared("data/nist/pddl/g1-2012-06");
-    let plan = g1
-        .as_ref()
-        .map_or("examples/kitting/one-kit.pddl".into(), |g1| {
-            g1.join("kitting-plan.txt")
-        });
     let database = folder.path().join("world.db");
     let arm = format!("plans{}/pddl", std::process::id());
     let work = Work {
-        plan: plan.clone(),
+        plan: "examples/kitting/one-kit.pddl".into(),
         world: "examples/kitting/workstation-pddl.toml",
     };
     let keep = database.to_str().unwrap();
-    let ran = canter(run(
-        &work,
-        1,
-        &[
-            "--lock-step",
-            "--arm",
-            &arm,
-            "--keep",
-            keep,
-            "--speed",
-            "100",
-        ],
-    ));
+    let more = [
+        "--lock-step",
+        "--arm",
+        &arm,
+        "--keep",
+        keep,
+        "--speed",
+        "100",
+    ];
+    let ran = canter(run(&work, 1, &more));
     assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
     assert_eq!(report(&ran)["statements"], 18);
     let world = world(&database);
@@ -355,28 +304,30 @@ fn pddl_plans_run() {
         .iter()
         .filter(|o| o["reference"] == "kit_1" && o["class"] == "Part");
     assert_eq!(parts.count(), 4);
-    let Some(g1) = g1 else { return };
-    for (domain, reached) in [("0", true), ("1", true), ("2", false), ("3", false)] {
-        let domain = g1.join(format!("kitting-domain_{domain}.pddl"));
-        let problem = g1.join("kitting-problem.pddl");
-        let arguments = [
-            "plan-check".as_ref(),
-            plan.as_os_str(),
-            "--domain".as_ref(),
-            domain.as_os_str(),
-            "--problem".as_ref(),
-            problem.as_os_str(),
-            "--json".as_ref(),
-        ];
-        let ran = canter(arguments);
+}
+
+/// A simulated PDDL plan reaches its goal, or the first step whose precondition is false is told.
+#[test]
+fn a_pddl_plan_is_checked_against_its_domain() {
+    let folder = tempfile::tempdir().unwrap();
+    let domain = "examples/kitting/one-kit-domain.pddl";
+    let text = std::fs::read_to_string(repository::root().join(domain)).unwrap();
+    let spoilt = folder.path().join("domain.pddl");
+    std::fs::write(
+        &spoilt,
+        text.replacen("(:action take-kit-tray", "(:action other", 1),
+    )
+    .unwrap();
+    for (domain, reached) in [(domain, true), (spoilt.to_str().unwrap(), false)] {
+        let plan = ["plan-check", "examples/kitting/one-kit.pddl", "--json"];
+        let problem = "examples/kitting/one-kit-problem.pddl";
+        let given = ["--domain", domain, "--problem", problem];
+        let ran = canter(plan.iter().chain(&given));
         let verdict = report(&ran);
         assert_eq!(verdict["goal_reached"], reached, "{verdict}");
         assert_eq!(ran.code, i32::from(!reached));
         let reason = verdict["reason"].as_str().unwrap_or_default();
-        assert_eq!(
-            reason.contains("step 2, (take-kit-tray"),
-            !reached,
-            "{reason}"
-        );
+        let step = reason.contains("step 2, (take-kit-tray");
+        assert_eq!(step, !reached, "{reason}");
     }
 }

@@ -31,6 +31,51 @@ fn columns(path: &std::path::Path, names: &[String]) -> Vec<(usize, Vec<f64>)> {
     lines.map(row).collect()
 }
 
+/// Holds the published setpoints of a run (CSV) against those of the dry run, of so many commands;
+/// tells how many were compared.
+pub(crate) fn same_setpoints(
+    planned: &std::path::Path,
+    published: &std::path::Path,
+    commands: usize,
+) -> usize {
+    let joints: Vec<String> = (1..=6).map(|joint| format!("q{joint}")).collect();
+    let planned = columns(planned, &joints);
+    let mut wanted = joints.clone();
+    wanted.push("path_time_s".to_owned());
+    let published = columns(published, &wanted);
+    let mut compared = 0;
+    for command in 0..commands {
+        let dry: Vec<_> = planned.iter().filter(|row| row.0 == command).collect();
+        if dry.windows(2).all(|pair| pair[0].1 == pair[1].1) {
+            continue; // nothing moves
+        }
+        let wet = published
+            .iter()
+            .filter(|row| row.0 == command && row.1[6] > 0.0);
+        for wet in wet {
+            // Late periods are left out, so rows are matched by the time on the path, in periods;
+            // the dry run's first row of a command is one period after its start.
+            let at = wet.1[6] / 0.001;
+            let Some(dry) = dry.get((at.round() as usize).wrapping_sub(1)) else {
+                continue;
+            };
+            if (at - at.round()).abs() > 1e-6 {
+                continue; // between two rows of the dry run
+            }
+            for joint in 0..6 {
+                let gap = (wet.1[joint] - dry.1[joint]).abs();
+                assert!(
+                    gap <= 1e-9,
+                    "command {command} at {} s: {gap} rad",
+                    wet.1[6]
+                );
+            }
+            compared += 1;
+        }
+    }
+    compared
+}
+
 /// The README's first command: every command done, periods that add up, setpoints equal to those
 /// of the dry run, the measured way near the published one.
 #[test]
@@ -77,41 +122,7 @@ fn a_run_publishes_what_was_planned() {
     assert_eq!(count("ticks"), count("published") + count("skipped"));
     assert!(summary["off_path_m"].as_f64().unwrap() < 2e-3, "{summary}");
 
-    let joints: Vec<String> = (1..=6).map(|joint| format!("q{joint}")).collect();
-    let planned = columns(&planned, &joints);
-    let mut wanted = joints.clone();
-    wanted.push("path_time_s".to_owned());
-    let published = columns(&published, &wanted);
-    let mut compared = 0;
-    for command in 0..24 {
-        let dry: Vec<_> = planned.iter().filter(|row| row.0 == command).collect();
-        if dry.windows(2).all(|pair| pair[0].1 == pair[1].1) {
-            continue; // nothing moves
-        }
-        let wet = published
-            .iter()
-            .filter(|row| row.0 == command && row.1[6] > 0.0);
-        for wet in wet {
-            // Late periods are left out, so rows are matched by the time on the path, in periods;
-            // the dry run's first row of a command is one period after its start.
-            let at = wet.1[6] / 0.001;
-            let Some(dry) = dry.get((at.round() as usize).wrapping_sub(1)) else {
-                continue;
-            };
-            if (at - at.round()).abs() > 1e-6 {
-                continue; // between two rows of the dry run
-            }
-            for joint in 0..6 {
-                let gap = (wet.1[joint] - dry.1[joint]).abs();
-                assert!(
-                    gap <= 1e-9,
-                    "command {command} at {} s: {gap} rad",
-                    wet.1[6]
-                );
-            }
-            compared += 1;
-        }
-    }
+    let compared = same_setpoints(&planned, &published, 24);
     assert!(compared > 4000, "only {compared} setpoints were compared");
     measured_way(&folder.path().join("run.csv"), program);
 }

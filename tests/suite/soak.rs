@@ -1,4 +1,4 @@
-//! Hours in small: programs in a loop by the clock, no limit trips, memory stays where it is.
+//! Soak test: programs in a loop by the clock; no limit is exceeded, memory does not grow.
 //!
 //! `CANTER_SOAK_S` is the length (s, as it is given 600), `CANTER_SOAK_BIN` the `canter` to try,
 //! such as the one of a release build.

@@ -1,8 +1,12 @@
-use std::io::{self, Write};
-use std::time::Duration;
+use std::io::{self, Read, Write};
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
+use anyhow::Context;
 use clap::Args;
 use engine::doctor::{Check, DoctorOptions, Health, examine};
+use ipc::{Domain, IpcError};
 use serde_json::json;
 
 use crate::client::DomainOption;
@@ -10,6 +14,9 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::rate;
 use crate::output;
+
+/// How long a look at the segments may take.
+const PROBE: Duration = Duration::from_secs(10);
 
 /// Look at what the servo loop needs of this machine, and say what would repair it
 ///
@@ -33,6 +40,13 @@ pub(crate) struct Doctor {
     /// How long to measure wake-ups, s
     #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
     seconds: f64,
+    /// Remove all segments and lists of the domain: for when they are damaged. Refused while a
+    /// process uses them
+    #[arg(long)]
+    repair: bool,
+    /// Look at the segments, which may end this process
+    #[arg(long, hide = true)]
+    probe: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -42,6 +56,13 @@ impl Doctor {
     /// Makes all checks.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let domain = self.domain.open()?;
+        if self.repair {
+            return repair(&domain);
+        }
+        if self.probe {
+            return probe(&domain);
+        }
+        let damage = probe_apart(&domain)?;
         let driver = self.arm.as_deref().map(|arm| domain.arm(arm));
         let driver = driver.transpose()?;
         let robot = self.robot.as_deref().map(crate::robot::load).transpose()?;
@@ -50,6 +71,7 @@ impl Doctor {
             wake_up: Duration::from_secs_f64(self.seconds),
             driver,
             robot,
+            damage,
             ..DoctorOptions::new(domain)
         });
         let healthy = checks.iter().all(|check| check.health != Health::Fail);
@@ -60,6 +82,57 @@ impl Doctor {
         }
         Ok(if healthy { Exit::Done } else { Exit::Refused })
     }
+}
+
+/// Empties the domain.
+fn repair(domain: &Domain) -> Result<Exit, Failure> {
+    let place = domain.directory().display();
+    match ipc::repair(domain) {
+        Ok(count) => {
+            output::note(&format!("{place}: {count} segments and files removed"));
+            Ok(Exit::Done)
+        }
+        Err(error @ IpcError::InUse { .. }) => Err(Failure::new(Exit::Refused, error)),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Reads all that is kept of processes and services.
+fn probe(domain: &Domain) -> Result<Exit, Failure> {
+    ipc::look_at_services(domain)?;
+    ipc::count_nodes(domain)?;
+    ipc::remove_dead_nodes(domain)?;
+    Ok(Exit::Done)
+}
+
+/// The same in a process of its own, which may crash or hang; gives what it came to, if not well.
+fn probe_apart(domain: &Domain) -> Result<Option<String>, Failure> {
+    let program = std::env::current_exe().context("cannot find the program's own file");
+    let mut child = Command::new(program.map_err(|cause| Failure::new(Exit::Internal, cause))?)
+        .args(["doctor", "--probe", "--domain"])
+        .arg(domain.directory())
+        .stdin(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    let end = Instant::now() + PROBE;
+    let status = loop {
+        match child.try_wait()? {
+            Some(status) => break Some(status),
+            None if Instant::now() < end => sleep(Duration::from_millis(5)),
+            None => break None,
+        }
+    };
+    let Some(status) = status else {
+        child.kill()?;
+        child.wait()?;
+        return Ok(Some(format!("no end after {} s", PROBE.as_secs())));
+    };
+    let mut said = String::new();
+    if let Some(mut stream) = child.stderr.take() {
+        stream.read_to_string(&mut said)?;
+    }
+    let last = said.lines().last().unwrap_or_default();
+    Ok((!status.success()).then(|| format!("{status}: {last}")))
 }
 
 /// One line a check, and under it what repairs it.

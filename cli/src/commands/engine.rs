@@ -20,7 +20,7 @@ pub(crate) struct Engine {
     host: HostOptions,
     #[command(flatten)]
     refusal: RefusalOption,
-    /// Print one JSON object for everything that happens, one a line
+    /// Print one JSON object for everything that happens, one per line
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! One file a command: its arguments, and `run`, which gives the exit code.
+//! One file per command: its arguments, and `run`, which returns the exit code.
 //!
 //! A new command is a file here and one line in [`Command`] and in [`Command::run`].
 

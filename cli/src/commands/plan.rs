@@ -1,6 +1,6 @@
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::PathBuf;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -10,6 +10,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::rate;
 use crate::output;
+use crate::output_file::OutputFile;
 use crate::picture;
 use crate::plot;
 use crate::program::ProgramArgument;
@@ -65,9 +66,7 @@ impl Plan {
             return Ok(Exit::Refused);
         }
         if let Some(path) = &self.samples {
-            self.write_samples(&plan)
-                .with_context(|| unwritable(path))
-                .map_err(refused)?;
+            self.write_samples(&plan, path)?;
         }
         if let Some(path) = &self.plot {
             let picture = plot::svg(&picture::drawing(&robot, &plan, program.name()));
@@ -80,12 +79,8 @@ impl Plan {
 }
 
 impl Plan {
-    fn write_samples(&self, plan: &Planned) -> anyhow::Result<()> {
-        let Some(path) = &self.samples else {
-            return Ok(());
-        };
-        let file = BufWriter::new(File::create(path)?);
-        let mut writer = SampleWriter::new(file, plan.dof, &[])?;
+    fn write_samples(&self, plan: &Planned, path: &Path) -> Result<(), Failure> {
+        let mut writer = SampleWriter::new(OutputFile::create(path)?, plan.dof, &[])?;
         for sample in plan.samples(self.period) {
             let row = SampleRow {
                 t_s: sample.t_s,

@@ -10,12 +10,12 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::counted;
-use crate::{output, world_file};
+use crate::{input, output, world_file};
 
 /// Check a kitting process plan or a PDDL plan without executing it
 ///
 /// Kitting plans are read in the outline layout, the block layout and JSON; with a world also checks
-/// that what the plan requires is there. A PDDL plan is executed in thought when its domain and
+/// that what the plan requires is there. A PDDL plan is simulated when its domain and
 /// problem are given: up to its goal, or to the first precondition that is false.
 #[derive(Args, Debug)]
 pub(crate) struct PlanCheck {
@@ -52,7 +52,7 @@ enum Form {
 impl PlanCheck {
     /// Reads and checks the plan.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        let source = world_file::read(&self.plan)?;
+        let source = input::text(&self.plan)?;
         if self.domain.is_some() || is_pddl(&source) {
             return self.pddl(&source);
         }
@@ -116,9 +116,9 @@ impl PlanCheck {
                 let message = anyhow::anyhow!("{}: {error}", path.display());
                 Failure::new(Exit::Unreadable, message)
             };
-            let read = read_domain(&world_file::read(domain)?);
+            let read = read_domain(&input::text(domain)?);
             let known = read.map_err(|error| unreadable(domain, error))?;
-            let read = read_problem(&world_file::read(problem)?);
+            let read = read_problem(&input::text(problem)?);
             let asked = read.map_err(|error| unreadable(problem, error))?;
             let done = simulate(&known, &asked, &steps);
             return Ok(done.map_err(|failure| (count, failure.to_string())));

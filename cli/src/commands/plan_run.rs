@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crcl::LengthUnit;
+use engine::arm_motion::ArmMotion;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
@@ -13,18 +14,17 @@ use plan::world::{Model, Reader, StoredRun, Writer};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 
-use crate::arm_motion::ArmMotion;
 use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::HostOptions;
+use crate::input;
 use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::printer::Printer;
 use crate::robot::{RobotOption, with_joints};
-use crate::world_file;
-use crate::world_file::Database;
+use crate::world_file::{Database, refused};
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -85,21 +85,11 @@ pub(crate) struct PlanRun {
     verbose: bool,
 }
 
-fn refused(error: PlanError) -> Failure {
-    let exit = match error {
-        PlanError::Database(_) | PlanError::Stored { .. } | PlanError::Schema { .. } => {
-            Exit::Unreadable
-        }
-        _ => Exit::Refused,
-    };
-    Failure::new(exit, error)
-}
-
 impl PlanRun {
     /// Executes the plan.
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let mut robot = self.robot.load()?;
-        let source = self.plan.as_deref().map(world_file::read).transpose()?;
+        let source = self.plan.as_deref().map(input::text).transpose()?;
         let (parameters, limits) = (self.parameters()?, self.limits()?);
         let (database, writer) = Database::open(&self.world, self.dry_run, self.keep.as_deref())?;
         let model = writer.model().map_err(refused)?;
@@ -328,15 +318,17 @@ fn execute<const N: usize>(
     arm: Option<MovingArm>,
 ) -> Result<Exit, Failure> {
     let (command, printer) = (task.command, task.printer);
-    let mut motion = ArmMotion::<N>::new(robot, command.host.rate, arm)?;
+    let mut motion = ArmMotion::<N, _>::new(robot, command.host.rate, arm)
+        .map_err(|error| Failure::new(Exit::Unreadable, error))?;
     let report: PlanReport = if task.is_pddl() {
         task.pddl(robot, &mut motion)?
     } else {
         task.kitting(robot, &mut motion).map_err(refused)?
     }
     .into();
-    let blame = motion.blame();
-    let off_path = motion.finish()?;
+    let arm = motion.into_mover();
+    let blame = arm.as_ref().and_then(MovingArm::blame);
+    let off_path = arm.map(MovingArm::finish).transpose()?;
     let mut text = Vec::new();
     report.write(&mut text, command.json, off_path)?;
     printer.lines(text);

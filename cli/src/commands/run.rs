@@ -1,17 +1,16 @@
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal};
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use engine::session::{Blame, Note};
-use planner::dry_run::FailurePolicy;
+use planner::dry_run::{FailurePolicy, Plan};
 use planner::robot::Robot;
 use serde_json::json;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
+use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
@@ -39,7 +38,7 @@ pub(crate) struct Run {
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
-    /// Print one JSON object for everything that happens, one a line
+    /// Print one JSON object for everything that happens, one per line
     #[arg(long)]
     json: bool,
 }
@@ -55,10 +54,14 @@ impl Run {
         }
         // The simulated arm starts where the dry run does, so that a program that cannot be
         // executed starts nothing. Where another arm stands is known to its driver only.
-        if self.host.driver != DriverChoice::External
-            && !self.can_be_done(&program, &robot, None)?
-        {
-            return Ok(Exit::Refused);
+        let mut plans = 0;
+        let mut plan = None;
+        if self.host.driver != DriverChoice::External {
+            let Some(ours) = self.plan(&program, &robot, None)? else {
+                return Ok(Exit::Refused);
+            };
+            plans += ours.plans;
+            plan = Some(ours);
         }
         if self.json {
             printer.expect_json();
@@ -71,18 +74,22 @@ impl Run {
             self.refusal.policy(),
         )?;
         host.own("canter run");
-        let start = Some(host.session.start.clone());
-        if self.host.driver == DriverChoice::External
-            && !self.can_be_done(&program, &robot, start)?
-        {
-            return Ok(Exit::Refused);
-        }
-        let sink = self.samples.as_ref().map(|path| {
-            let file =
-                File::create(path).with_context(|| format!("cannot write {}", path.display()));
-            file.map_err(|cause| Failure::new(Exit::Unreadable, cause))
-        });
-        let sink = sink.transpose()?.map(BufWriter::new);
+        let start = host.session.start.clone();
+        let plan = match plan.filter(|plan| plan.start == start) {
+            Some(plan) => plan,
+            None => {
+                let Some(plan) = self.plan(&program, &robot, Some(start))? else {
+                    return Ok(Exit::Refused);
+                };
+                plans += plan.plans;
+                plan
+            }
+        };
+        let sink = self
+            .samples
+            .as_deref()
+            .map(OutputFile::create)
+            .transpose()?;
         let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
         let progress = Progress::new(printer, io::stderr().is_terminal() && !self.json);
         signals.steer(&host.session);
@@ -93,26 +100,28 @@ impl Run {
             printer: printer.clone(),
             recording,
             progress,
+            plans,
         }
-        .finish_program(&program)
+        .finish_program(&program, plan)
     }
 }
 
 impl Run {
-    /// Plans the whole program from `start`, or from home, and reports what is refused; tells
-    /// whether it may be run. With a policy that lives with refusals it always may.
-    fn can_be_done(
+    /// Plans the whole program from `start`, or from home, and reports what is refused; no plan if
+    /// it may not be run. With a policy that lives with refusals it always may.
+    fn plan(
         &self,
         program: &ProgramFile,
         robot: &Robot,
         start: Option<Vec<f64>>,
-    ) -> Result<bool, Failure> {
+    ) -> Result<Option<Plan>, Failure> {
         let policy = self.refusal.policy();
         let plan = program.plan(robot, (self.host.rate, start), policy)?;
         for refusal in &plan.refusals {
             program.report_refusal(refusal);
         }
-        Ok(plan.refusals.is_empty() || policy != FailurePolicy::Abort)
+        let may_run = plan.refusals.is_empty() || policy != FailurePolicy::Abort;
+        Ok(may_run.then_some(plan))
     }
 }
 
@@ -122,18 +131,19 @@ struct Running {
     host: Host,
     signals: SignalThread,
     printer: Printer,
-    recording: Recording<BufWriter<File>>,
+    recording: Recording<OutputFile>,
     progress: Progress,
+    /// How many moves were planned before the session began.
+    plans: u64,
 }
 
 impl Running {
-    fn finish_program(mut self, program: &ProgramFile) -> Result<Exit, Failure> {
-        let commands = program.program().commands.clone();
-        let count = commands.len();
+    fn finish_program(mut self, program: &ProgramFile, plan: Plan) -> Result<Exit, Failure> {
+        let count = program.program().commands.len();
         let ids = self
             .host
             .session
-            .submit(commands)
+            .execute(program.program(), plan)
             .map_err(|full| Failure::new(Exit::Refused, full))?;
         let last = ids.last().copied().unwrap_or(0);
         let mut done = 0;
@@ -234,6 +244,7 @@ impl Running {
                 "robot": status.robot,
                 "driver": driver,
                 "duration_s": duration,
+                "plans": self.plans + status.plans,
                 "cycles": status.cycles,
                 "off_path_m": tracking,
             });

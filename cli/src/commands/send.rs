@@ -17,7 +17,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Send a program to a running engine and wait for its end
 ///
-/// Prints one JSON object for everything that happens to it, one a line.
+/// Prints one JSON object for everything that happens to it, one per line.
 #[derive(Args, Debug)]
 pub(crate) struct Send {
     #[command(flatten)]
@@ -44,9 +44,9 @@ impl Send {
             name: program.name().to_owned(),
             program: program.text().to_owned(),
         })?;
-        let ids = answer.body["ids"].as_array().cloned().unwrap_or_default();
-        output::note(&format!("canter: {} commands accepted", ids.len()));
-        let last = ids.last().and_then(Value::as_u64);
+        let commands = answer.body["commands"].as_u64().unwrap_or(0);
+        output::note(&format!("canter: {commands} commands accepted"));
+        let last = answer.body["last"].as_u64();
         match last {
             Some(last) if !self.no_wait => self.follow(seen, last),
             _ => Ok(Exit::Done),

@@ -1,4 +1,3 @@
-use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 
 use anyhow::{Context, anyhow};
@@ -8,9 +7,9 @@ use planner::recorded::{CommandVerdict, ProgramVerdict, Row, RunColumns, verify_
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::output;
 use crate::program::ProgramArgument;
 use crate::robot::RobotOption;
+use crate::{input, output};
 
 /// Check a recorded motion against its program, from the samples alone
 ///
@@ -58,15 +57,8 @@ impl Verify {
 
 /// Rows of a sample file, found by the names of its columns.
 fn read(path: &str, joints: usize) -> Result<Vec<Row>, Failure> {
-    let source: Box<dyn Read> = if path == "-" {
-        Box::new(io::stdin())
-    } else {
-        let file = File::open(path).with_context(|| format!("cannot read {path}"));
-        Box::new(file.map_err(|cause| Failure::new(Exit::Unreadable, cause))?)
-    };
-    parse(BufReader::new(source), joints)
-        .with_context(|| format!("cannot read {path}"))
-        .map_err(|cause| Failure::new(Exit::Unreadable, cause))
+    let source = BufReader::new(input::lines(path)?);
+    input::unreadable(path, parse(source, joints))
 }
 
 fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {

@@ -60,9 +60,9 @@ impl World {
             What::Check { world, json } => report(&world_file::load(world)?, *json),
             What::Import { file, database } => {
                 let model = world_file::load(file)?;
-                let unreadable = |error| Failure::new(Exit::Unreadable, error);
-                let mut writer = Writer::open(database, Durability::Full).map_err(unreadable)?;
-                writer.replace(&model).map_err(unreadable)?;
+                let mut writer =
+                    Writer::open(database, Durability::Full).map_err(world_file::refused)?;
+                writer.replace(&model).map_err(world_file::refused)?;
                 let objects = model.objects().count();
                 output::note(&format!("{objects} objects in {}", database.display()));
                 Ok(Exit::Done)

@@ -64,6 +64,9 @@ pub struct DoctorOptions {
     pub wake_up: Duration,
     /// An arm whose driver to greet. The driver must have no engine.
     pub driver: Option<Arm>,
+    /// What is wrong with the segments of the domain, found out in another process: reading them
+    /// here could end this one.
+    pub damage: Option<String>,
     /// A robot whose limits to look at, beside those of the driver.
     pub robot: Option<Robot>,
 }
@@ -76,6 +79,7 @@ impl DoctorOptions {
             rate_hz: 1000.0,
             wake_up: Duration::from_secs(5),
             driver: None,
+            damage: None,
             robot: None,
         }
     }
@@ -83,18 +87,19 @@ impl DoctorOptions {
 
 /// Makes all checks, one after the other.
 pub fn examine(options: &DoctorOptions) -> Vec<Check> {
-    let mut checks = vec![
-        kernel(),
-        governor(),
-        shared_memory(),
-        leftovers(&options.domain),
-    ];
+    let mut checks = vec![kernel(), governor(), shared_memory()];
+    match &options.damage {
+        Some(damage) => checks.push(damaged(&options.domain, damage)),
+        None => checks.push(leftovers(&options.domain)),
+    }
     checks.extend(rights());
     checks.push(wake_up(options));
-    checks.push(round_trip(&options.domain));
+    let sound = options.damage.is_none();
+    checks.extend(sound.then(|| round_trip(&options.domain)));
     let ack = options
         .driver
         .as_ref()
+        .filter(|_| sound)
         .map(|arm| driver::handshake(arm, options.rate_hz));
     let ack = ack.and_then(|(check, ack)| {
         checks.push(check);
@@ -142,16 +147,47 @@ fn governor() -> Check {
     )
 }
 
+/// Room in `/dev/shm`, and whether it can be written to.
 fn shared_memory() -> Check {
+    const NAME: &str = "shared memory";
+    let remedy = "ls -lS /dev/shm, remove what fills it, or mount -o remount,size=256m /dev/shm";
+    let left = ipc::room_left();
+    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let room = left.map_or("no limit".to_owned(), |left| {
+        format!(
+            "{:.0} MiB left, {:.0} needed",
+            mib(left),
+            mib(ipc::ROOM_NEEDED)
+        )
+    });
+    if left.is_some_and(|left| left < ipc::ROOM_NEEDED) {
+        return Check::new(NAME, Health::Fail, room, remedy);
+    }
     let path = format!("/dev/shm/canter-doctor-{}", std::process::id());
     let written = fs::write(&path, vec![1_u8; 1 << 20]).and_then(|()| fs::remove_file(&path));
     match written {
-        Ok(()) => Check::new("shared memory", Health::Ok, "1 MiB written".to_owned(), ""),
-        Err(cause) => {
-            let remedy = "mount -t tmpfs -o size=256m,mode=1777 tmpfs /dev/shm";
-            Check::new("shared memory", Health::Fail, cause.to_string(), remedy)
-        }
+        Ok(()) => Check::new(NAME, Health::Ok, format!("1 MiB written, {room}"), ""),
+        Err(cause) => Check::new(NAME, Health::Fail, format!("{cause}, {room}"), remedy),
     }
+}
+
+/// What another process found broken.
+fn damaged(domain: &Domain, damage: &str) -> Check {
+    let users: Vec<String> = ipc::inhabitants_of(domain)
+        .iter()
+        .map(|user| format!("{} ({})", user.process, user.command))
+        .collect();
+    let directory = domain.directory().display();
+    let remedy = if users.is_empty() {
+        format!("canter doctor --repair --domain {directory}")
+    } else {
+        format!(
+            "end process {}, then canter doctor --repair --domain {directory}",
+            users.join(", ")
+        )
+    };
+    let seen = format!("{directory} is damaged: {damage}");
+    Check::new("left-over segments", Health::Fail, seen, &remedy)
 }
 
 /// Cleans up while it looks: what is left then cannot be cleaned up by this user.

@@ -1,9 +1,9 @@
 //! The commands that wait, where who gives them and who plans them meet.
 
-use crcl::{Command, Located};
+use crcl::Command;
 
 use super::SubmitError;
-use crate::queue::{Full, Queue, Queued};
+use crate::queue::{Full, Given, Queue, Queued};
 use servo::{Control, Steering};
 
 /// The queue with what decides whether commands are taken.
@@ -34,7 +34,7 @@ impl Inbox {
     /// to stop.
     pub(super) fn submit(
         &mut self,
-        commands: Vec<Located>,
+        commands: Vec<Given>,
         steering: &Steering,
     ) -> Result<Vec<u32>, SubmitError> {
         if self.closed {
@@ -53,15 +53,15 @@ impl Inbox {
         }
         let age = steering.aborts();
         let mut ids = Vec::with_capacity(commands.len());
-        for located in commands {
-            if let Command::StopMotion { emergency } = located.command
+        for given in commands {
+            if let Command::StopMotion { emergency } = given.located.command
                 && self.flying > 0
             {
                 steering.control(Control::Stop {
                     fast: emergency != 0,
                 });
             }
-            ids.push(self.queue.push(located, age)?);
+            ids.push(self.queue.push(given, age)?);
         }
         Ok(ids)
     }

@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
-use crcl::{LengthUnit, Located};
+use crcl::{LengthUnit, Located, Program};
 use ipc::{Arm, Clock};
 use nalgebra::Isometry3;
 use thiserror::Error;
@@ -26,9 +26,9 @@ pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
 pub use status::{Cycles, Status};
 
-use crate::queue::Full;
+use crate::queue::{Full, Given};
 use inbox::Inbox;
-use planner::dry_run::FailurePolicy;
+use planner::dry_run::{FailurePolicy, Plan, PlannedCommand};
 use planner::robot::{Robot, RobotError};
 use planner::with_dof;
 use servo::{Control, ExecutorError, NoFault, Progress, Steering};
@@ -252,6 +252,35 @@ impl Session {
     /// # Errors
     /// [`SubmitError`], and the queue is as before.
     pub fn submit(&self, commands: Vec<Located>) -> Result<Vec<u32>, SubmitError> {
+        self.give(commands.into_iter().map(Given::from).collect())
+    }
+
+    /// Appends the commands of a program that was planned: all of them or none. What the plan has
+    /// is executed as it is planned, wherever arm and modes are then what the plan began with; any
+    /// other command is planned when its turn comes, as by [`Session::submit`].
+    ///
+    /// # Errors
+    /// [`SubmitError`], and the queue is as before.
+    pub fn execute(&self, program: &Program, plan: Plan) -> Result<Vec<u32>, SubmitError> {
+        let mut planned = plan.commands.into_iter().peekable();
+        let given = program
+            .commands
+            .iter()
+            .enumerate()
+            .map(|(index, located)| Given {
+                located: located.clone(),
+                planned: planned
+                    .next_if(|planned| planned.index == index)
+                    .map(PlannedCommand::into_step),
+            });
+        self.give(given.collect())
+    }
+
+    /// Appends commands that are planned or not: all of them or none. See [`Session::execute`].
+    ///
+    /// # Errors
+    /// [`SubmitError`], and the queue is as before.
+    pub fn give(&self, commands: Vec<Given>) -> Result<Vec<u32>, SubmitError> {
         let ids = self.shared.inbox().submit(commands, &self.steering)?;
         if self.orders.send(Order::Look).is_err() {
             return Err(SubmitError::Closed);

@@ -52,6 +52,29 @@ fn agrees_with_k<const N: usize>(name: &str) {
     }
 }
 
+/// The ball of reach holds every position of the tool, and is not much larger than they are.
+fn ball_holds<const N: usize>(name: &str) {
+    let tool = Isometry3::translation(0.02, -0.03, 0.2);
+    let base = Isometry3::translation(1.0, 2.0, -0.5);
+    let chain: Chain<N> = arms::chain(name).with_tool(&tool).with_base(&base);
+    let (middle, radius) = chain.reach_ball();
+    let mut random = Random(11);
+    let mut farthest = 0.0_f64;
+    for _ in 0..2000 {
+        let q = random.joints(&chain);
+        let point = chain.forward(&q).translation.vector;
+        farthest = farthest.max((point - middle.coords).norm());
+    }
+    assert!(farthest <= radius + 1e-12, "{name}: {farthest} > {radius}");
+    assert!(radius < 2.5 * farthest, "{name}: {radius} for {farthest}");
+}
+
+#[test]
+fn the_ball_of_reach_holds_every_pose() {
+    SIX.iter().for_each(|name| ball_holds::<6>(name));
+    SEVEN.iter().for_each(|name| ball_holds::<7>(name));
+}
+
 #[test]
 fn every_arm_agrees_with_k() {
     SIX.iter().for_each(|name| agrees_with_k::<6>(name));

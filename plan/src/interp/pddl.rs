@@ -10,6 +10,23 @@ use crate::pddl::{ActionTable, PlanStep, read_plan};
 use crate::run::RobotOptions;
 use crate::world::{Model, Reader};
 
+/// Largest file of a plan, bytes.
+const LARGEST: u64 = 64 << 20;
+
+/// The text of a plan, from a regular file: a pipe would wait for a writer, a device may never end.
+fn plan_text(path: &Path) -> std::io::Result<String> {
+    use std::io::{Error, ErrorKind, Read};
+    let found = std::fs::metadata(path)?;
+    if !found.is_file() || found.len() > LARGEST {
+        let expected = format!("expected a regular file of at most {LARGEST} bytes");
+        return Err(Error::new(ErrorKind::InvalidInput, expected));
+    }
+    let mut text = String::new();
+    let file = std::fs::File::open(path)?;
+    file.take(LARGEST).read_to_string(&mut text)?;
+    Ok(text)
+}
+
 /// Interprets PDDL plans against a world database that it can only read.
 #[derive(Debug)]
 pub struct PddlInterpreter {
@@ -121,7 +138,7 @@ impl PlanInterpreter for PddlInterpreter {
         }
         let (text, done) = match self.resumed.take() {
             Some(resumed) => resumed,
-            None => match std::fs::read_to_string(file_name) {
+            None => match plan_text(Path::new(file_name)) {
                 Ok(text) => (text, 0),
                 Err(error) => {
                     return self.fail(Code::CannotReadFile, format!("{file_name}: {error}"));

@@ -173,7 +173,7 @@ impl Entry {
     }
 }
 
-/// An action while it is turned into commands; the model is changed in thought only.
+/// An action while it is turned into commands; only a copy of the model is changed.
 struct Work<'a> {
     objects: BTreeMap<&'a str, &'a str>,
     model: Model,

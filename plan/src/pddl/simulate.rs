@@ -1,4 +1,4 @@
-//! Executing a PDDL plan in thought: preconditions, effects, goal.
+//! Simulating a PDDL plan without an arm: preconditions, effects, goal.
 
 use std::collections::{BTreeMap, BTreeSet};
 

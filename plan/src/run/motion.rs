@@ -1,4 +1,4 @@
-//! The seam to whatever moves the arm.
+//! The interface to what moves the arm.
 
 use nalgebra::Isometry3;
 

@@ -49,7 +49,7 @@ fn ready(count: usize, pairs: &[(usize, usize)], order: &[usize]) -> Vec<usize> 
         .collect()
 }
 
-/// Follows branches in thought and takes the order that is over first.
+/// Simulates the possible orders and takes the one with the shortest time.
 ///
 /// The search goes depth first with the written order as the first bound, so that the result is
 /// never slower than the written order, by the same prediction; the motion that follows the list
@@ -199,7 +199,7 @@ impl Foresight<'_> {
         0.0
     }
 
-    /// Executes a node in thought; none when it fails or ends the plan.
+    /// Simulates a node; none when it fails or ends the plan.
     fn follow(
         &mut self,
         program: &Program,

@@ -54,6 +54,15 @@ impl Reader {
         load(&transaction)
     }
 
+    /// The whole world and the latest run, both as of the same commit.
+    ///
+    /// # Errors
+    /// As [`Reader::model`].
+    pub fn snapshot(&self) -> Result<(Model, Option<StoredRun>), PlanError> {
+        let transaction = self.connection.unchecked_transaction()?;
+        Ok((load(&transaction)?, last_run(&transaction)?))
+    }
+
     /// The latest run, or none.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use plan::world::{
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 
-use crate::fixtures::{fuzz_cases, repository_text, shared_text};
+use crate::fixtures::{data, fuzz_cases, repository_text};
 
 /// Texts near a good one: pieces cut out, doubled, moved, or replaced by hostile ones.
 fn near(good: String) -> impl Strategy<Value = String> {
@@ -101,8 +101,7 @@ fn plan_readers_survive() {
     let world = import_toml(&repository_text("examples/kitting/workstation.toml")).unwrap();
     let own = repository_text("examples/kitting/kit-abc.plan");
     let json = serde_json::to_string(&read(&own).plan).unwrap();
-    let mut good = vec![own, json];
-    good.extend(crate::reading::document_plan());
+    let good = [own, json, data("odd.plan")];
     run(&good, |text| {
         let reading = read(text);
         let findings = check(&reading.plan, Some(&world));
@@ -138,9 +137,8 @@ fn world_importers_survive() {
 /// Workstations in NIST's XML.
 #[test]
 fn nist_importer_survives() {
-    let Some(xml) = shared_text("data/nist/workstation/kittingInstancesInit1.xml") else {
-        return;
-    };
+    let xml = data("cell.xml");
+    import_nist(&xml).unwrap();
     run(&[xml], |text| drop(import_nist(text).map(try_world)));
 }
 
@@ -152,12 +150,10 @@ fn pddl_readers_survive() {
     let table = ActionTable::own().unwrap();
     let entry = "[[action]]\nnames = [\"a\"]\narguments = [\"b\"]\ndo = [{ pick_up = \"b\" }]\n";
     run(&[entry.to_owned()], |text| drop(table.with(text)));
-    let file = |name: &str| shared_text(&format!("data/nist/pddl/g2g3-2013-2014/{name}"));
-    let Some(domain) = file("domain-kitting.pddl") else {
-        return;
-    };
-    let problem = file("a2b1c1/problem-a2b1c1.pddl").unwrap();
-    let steps = read_plan(&file("a2b1c1/pddlplan_a2b1c1.txt").unwrap()).unwrap();
+    let file = |name: &str| repository_text(&format!("examples/kitting/{name}"));
+    let domain = file("one-kit-domain.pddl");
+    let problem = file("one-kit-problem.pddl");
+    let steps = read_plan(&file("one-kit.pddl")).unwrap();
     let good = (
         read_domain(&domain).unwrap(),
         read_problem(&problem).unwrap(),

@@ -13,3 +13,4 @@ mod reading;
 mod running;
 mod statements;
 mod world;
+mod writers;

@@ -7,94 +7,83 @@ use plan::pddl::{ActionTable, Failure, read_domain, read_plan, read_problem, sim
 use plan::run::{Report, RobotOptions, SimulatedMotion};
 use plan::world::{Class, Durability, Model, Writer, import_toml};
 
-use crate::fixtures::{repository_text, shared, shared_text};
+use crate::fixtures::repository_text;
 use crate::running::{assert_consistent, read_world};
 
-fn run(domain: &str, problem: &str, plan: &str) -> Option<Result<usize, Failure>> {
-    let text = |path: &str| shared_text(&format!("data/nist/pddl/{path}"));
-    let domain = read_domain(&text(domain)?).unwrap();
-    let problem = read_problem(&text(problem)?).unwrap();
-    let plan = read_plan(&text(plan)?).unwrap();
-    Some(simulate(&domain, &problem, &plan))
+/// Domain, problem and plan of the example, with one text replaced in one of them.
+fn outcome(file: &str, from: &str, to: &str) -> Result<usize, Failure> {
+    let text = |name: &str| {
+        let text = repository_text(&format!("examples/kitting/{name}"));
+        if name != file {
+            return text;
+        }
+        assert!(text.contains(from), "{name} has no {from}");
+        text.replacen(from, to, 1)
+    };
+    let domain = read_domain(&text("one-kit-domain.pddl")).unwrap();
+    let problem = read_problem(&text("one-kit-problem.pddl")).unwrap();
+    let plan = read_plan(&text("one-kit.pddl")).unwrap();
+    simulate(&domain, &problem, &plan)
 }
 
-/// Plans that reach their goal.
+/// The example plan reaches the goal of its problem.
 #[test]
-fn good_plans_reach_their_goal() {
-    let g1 = "g1-2012-06";
-    let (problem, plan) = (
-        format!("{g1}/kitting-problem.pddl"),
-        format!("{g1}/kitting-plan.txt"),
-    );
-    for number in 0..2 {
-        let domain = format!("{g1}/kitting-domain_{number}.pddl");
-        let Some(result) = run(&domain, &problem, &plan) else {
-            return;
-        };
-        assert_eq!(result, Ok(18), "{domain}");
-    }
-    let old = "g2g3-2013-2014/a2b1c1/old";
-    let result = run(
-        &format!("{old}/kitting-domain.pddl"),
-        &format!("{old}/kitting-problem_a2b1c1.pddl"),
-        &format!("{old}/plan_a2b1c1.txt"),
-    );
-    assert_eq!(result, Some(Ok(18)));
-    let g3 = "g2g3-2013-2014";
-    let result = run(
-        &format!("{g3}/domain-kitting.pddl"),
-        &format!("{g3}/a2b1c1/problem-a2b1c1.pddl"),
-        &format!("{g3}/a2b1c1/pddlplan_a2b1c1.txt"),
-    );
-    assert_eq!(result, Some(Ok(21)));
+fn a_good_plan_reaches_its_goal() {
+    assert_eq!(outcome("", "", ""), Ok(18));
 }
 
-/// Plans that do not fit their domain or problem fail at the step they should.
+/// A plan that does not fit its domain or problem fails at the step it should, and says why.
 #[test]
 fn bad_plans_fail_where_they_should() {
-    let (g1, g3) = ("g1-2012-06", "g2g3-2013-2014");
+    let (domain, problem, plan) = (
+        "one-kit-domain.pddl",
+        "one-kit-problem.pddl",
+        "one-kit.pddl",
+    );
     let cases = [
+        (domain, "(:action take-kit-tray", "(:action take-tray"),
+        (problem, "(bare robot_1)", ""),
         (
-            format!("{g1}/kitting-domain_2.pddl"),
-            format!("{g1}/kitting-problem.pddl"),
-            format!("{g1}/kitting-plan.txt"),
+            problem,
+            "(= (left empty_kit_tray_supply) 1)",
+            "(= (left empty_kit_tray_supply) 0)",
         ),
         (
-            format!("{g1}/kitting-domain_3.pddl"),
-            format!("{g1}/kitting-problem.pddl"),
-            format!("{g1}/kitting-plan.txt"),
+            plan,
+            "(take-part robot_1 part_b_1 part_b_tray part_gripper work_table_1 kit_1)",
+            "(take-part robot_1 part_b_1 part_b_tray part_gripper)",
         ),
         (
-            format!("{g3}/domain-kitting.pddl"),
-            format!("{g3}/a2b1c1/problem-a2b1c1.pddl"),
-            format!("{g3}/a2b1c1/plan_a2b1c1.txt"),
+            plan,
+            "(put-part robot_1 part_b_1 kit_1 work_table_1)",
+            "(put-part robot_1 tray_gripper kit_1 work_table_1)",
         ),
         (
-            format!("{g3}/domain-fluents.pddl"),
-            format!("{g3}/a2b1c1/problem-fluents-a2b1c1.pddl"),
-            format!("{g3}/a2b1c1/plan_a2b1c1.txt.1"),
+            plan,
+            "(put-part robot_1 part_b_1",
+            "(put-part robot_1 part_z_1",
         ),
-        (
-            "aprs/domain-mini-demo.pddl".into(),
-            "aprs/problem-mini-demo.pddl".into(),
-            "aprs/minidemo_pddl_actions.txt".into(),
-        ),
+        (problem, "(= (steps) 0)", ""),
+        (plan, "(put-kit robot_1 kit_1 finished_kit_receiver)", ""),
+        (problem, "(= (steps) 18)", "(= (steps) 17)"),
     ];
     let mut messages = String::new();
-    for (domain, problem, plan) in cases {
-        let Some(result) = run(&domain, &problem, &plan) else {
-            return;
-        };
-        let failure = result.unwrap_err();
-        messages.push_str(&format!("{plan} in {domain}: {failure}\n"));
+    for (file, from, to) in cases {
+        let failure = outcome(file, from, to).unwrap_err();
+        messages.push_str(&format!("{failure}\n"));
     }
     expect_test::expect![[r#"
-        g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_2.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
-        g1-2012-06/kitting-plan.txt in g1-2012-06/kitting-domain_3.pddl: step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
-        g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt in g2g3-2013-2014/domain-kitting.pddl: step 1, (attach-endeffector robot_1 tray_gripper tray_gripper_holder changing_station_1): the precondition (endeffectorholder-has-endeffector tray_gripper_holder tray_gripper) is false
-        g2g3-2013-2014/a2b1c1/plan_a2b1c1.txt.1 in g2g3-2013-2014/domain-fluents.pddl: step 8, (take-part robot_1 part_c_1 part_c_tray part_gripper work_table_1 kit_a2b1c1): take-part takes 4 objects, not 6
-        aprs/minidemo_pddl_actions.txt in aprs/domain-mini-demo.pddl: step 1, (look-for-part robot_1 large_gear_1 sku_part_large_gear kit_s2b2 part_gripper): the effect (increase (grasp-set-flag) 1) has no result: (grasp-set-flag) has no value
-    "#]].assert_eq(&messages);
+        step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the domain has no action take-kit-tray
+        step 1, (attach-eff robot_1 tray_gripper tray_gripper_holder): the precondition (bare robot_1) is false
+        step 2, (take-kit-tray robot_1 kit_tray_1 empty_kit_tray_supply tray_gripper work_table_1): the precondition (>= (left empty_kit_tray_supply) 1) with 0 and 1 is false
+        step 9, (take-part robot_1 part_b_1 part_b_tray part_gripper): take-part takes 6 objects, not 4
+        step 10, (put-part robot_1 tray_gripper kit_1 work_table_1): tray_gripper is a effector, ?p takes a part
+        step 10, (put-part robot_1 part_z_1 kit_1 work_table_1): the problem has no object part_z_1
+        step 1, (attach-eff robot_1 tray_gripper tray_gripper_holder): the effect (increase (steps) 1) has no result: (steps) has no value
+        step 18, (goal): (at kit_1 finished_kit_receiver) is false at the end
+        step 19, (goal): (= (steps) 17) with 18 and 17 is false at the end
+    "#]]
+    .assert_eq(&messages);
 }
 
 /// The example workstation for PDDL plans as a database.
@@ -160,22 +149,18 @@ fn assert_one_kit(world: &Model) {
     }
 }
 
-/// The plan of June 2012 and our own make a kit with a simulated arm.
+/// The example plan makes a kit with a simulated arm.
 #[test]
-fn pddl_plans_make_a_kit() {
+fn a_pddl_plan_makes_a_kit() {
     let table = ActionTable::own().unwrap();
-    let mut plans =
-        vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/kitting/one-kit.pddl")];
-    plans.extend(shared().map(|s| s.join("data/nist/pddl/g1-2012-06/kitting-plan.txt")));
-    for plan in plans {
-        let (report, world) = execute(&plan, &table);
-        assert_eq!(
-            (report.outcome, report.code, report.counters.statements),
-            ("stopped", 0, 18),
-            "{report:?}"
-        );
-        assert_one_kit(&world);
-    }
+    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/kitting/one-kit.pddl");
+    let (report, world) = execute(&plan, &table);
+    assert_eq!(
+        (report.outcome, report.code, report.counters.statements),
+        ("stopped", 0, 18),
+        "{report:?}"
+    );
+    assert_one_kit(&world);
 }
 
 /// A run whose motion fails at any command goes on from its database to the same kit; one that

@@ -11,7 +11,6 @@ use plan::run::{
 use plan::world::{Class, Durability, Model, Reader, Scalar, Writer, check, import_toml};
 
 use crate::fixtures::repository_text;
-use crate::reading::document_plan;
 
 /// A run of a plan in a fresh copy of a world.
 pub(crate) struct Trial {
@@ -43,12 +42,6 @@ impl Trial {
             options: RunOptions::default(),
             adjust: |_| {},
         }
-    }
-
-    /// The plan of the original document in its workstation.
-    pub(crate) fn document(kits: usize) -> Option<Self> {
-        let world = "examples/kitting/workstation-kitABCPlan.toml";
-        Some(Self::new(&document_plan()?, world, kits))
     }
 
     /// The repository's own plan in its workstation.
@@ -170,41 +163,17 @@ fn assert_three_kits(result: &Result) {
     assert_eq!(world.count(full, "kitABC", 1), 3);
 }
 
-/// The document's plan as it stands makes three kits.
-#[test]
-fn the_document_makes_three_kits() {
-    let Some(trial) = Trial::document(3) else {
-        return;
-    };
-    let result = trial.run();
-    assert_three_kits(&result);
-    assert!(
-        result
-            .report
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("on top of what is in"))
-    );
-}
-
-/// Our own plan does the same in our own workstation.
+/// A plan makes three kits.
 #[test]
 fn our_plan_makes_three_kits() {
     let result = Trial::own(3).run();
     assert_three_kits(&result);
 }
 
-fn document_or_own(kits: usize) -> Vec<Trial> {
-    Trial::document(kits)
-        .into_iter()
-        .chain([Trial::own(kits)])
-        .collect()
-}
-
 /// Twelve kits fill a box; supplies run empty on the way and come again in both ways.
 #[test]
 fn supplies_are_refilled_and_a_box_fills() {
-    for trial in document_or_own(12) {
+    for trial in [Trial::own(12)] {
         let Result {
             report,
             world,
@@ -231,7 +200,7 @@ fn supplies_are_refilled_and_a_box_fills() {
 /// The thirteenth kit needs another box for kits and another box of trays.
 #[test]
 fn full_and_empty_boxes_are_replaced() {
-    for trial in document_or_own(13) {
+    for trial in [Trial::own(13)] {
         let Result { report, world, .. } = trial.run();
         assert_eq!(
             (report.outcome, report.counters.kits),
@@ -257,7 +226,7 @@ fn full_and_empty_boxes_are_replaced() {
 #[test]
 fn failed_refills_end_the_plan_with_a_positive_reason() {
     let names = ["partASupplyRequirement", "supply of A"];
-    for mut trial in document_or_own(6) {
+    for mut trial in [Trial::own(6)] {
         trial.adjust = |factotum| {
             for name in ["partASupplyRequirement", "supply of A"] {
                 factotum.stock.empty(name);
@@ -269,7 +238,7 @@ fn failed_refills_end_the_plan_with_a_positive_reason() {
         assert_eq!(report.counters.kits, 4);
         assert_consistent(&world);
     }
-    for mut trial in document_or_own(6) {
+    for mut trial in [Trial::own(6)] {
         trial.adjust = |factotum| {
             factotum.limits = ["partASupplyRequirement", "supply of A"]
                 .map(|n| (n.to_owned(), 0))

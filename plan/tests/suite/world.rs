@@ -6,7 +6,7 @@ use plan::world::{
     export_toml, import_json, import_nist, import_toml,
 };
 
-use crate::fixtures::{shared, shared_text};
+use crate::fixtures::data;
 
 fn errors(model: &Model) -> Vec<String> {
     check(model)
@@ -46,57 +46,46 @@ pub(crate) fn assert_same(one: &Model, other: &Model) {
     assert_eq!(one.designs().count(), other.designs().count());
 }
 
-/// Every workstation of the kitting viewer comes in, is consistent, and survives TOML and JSON.
+/// A workstation in NIST's form comes in with what it says, is consistent, and survives TOML and
+/// JSON.
 #[test]
-fn nist_workstations_come_in() {
-    let Some(shared) = shared() else { return };
-    let mut files = 0;
-    for entry in std::fs::read_dir(shared.join("data/nist/workstation")).unwrap() {
-        let path = entry.unwrap().path();
-        if !path
-            .file_name()
-            .unwrap()
-            .to_string_lossy()
-            .starts_with("kittingInstances")
-        {
-            continue;
-        }
-        let model = import_nist(&std::fs::read_to_string(&path).unwrap())
-            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        assert_eq!(errors(&model), Vec::<String>::new(), "{}", path.display());
-        assert_same(&model, &import_toml(&export_toml(&model).unwrap()).unwrap());
-        assert_same(&model, &import_json(&export_json(&model).unwrap()).unwrap());
-        files += 1;
-    }
-    assert_eq!(files, 6);
-}
-
-/// Figures of one file, counted by eye.
-#[test]
-fn a_nist_workstation_holds_what_it_says() {
-    let Some(text) = shared_text("data/nist/workstation/kittingInstancesInit1.xml") else {
-        return;
-    };
-    let model = import_nist(&text).unwrap();
-    assert_eq!(model.skus().count(), 6);
-    assert_eq!(model.design("kit_design_a2b1c1").unwrap().parts.len(), 4);
-    assert_eq!(model.effector().unwrap().name, "tray_gripper");
-    let tray = model.named("part_a_tray").unwrap().id;
-    assert_eq!(model.count(tray, "stock_keeping_unit_part_a", 1), 2);
-    let part = model.named("part_a_1").unwrap().id;
-    let pose = model.workstation_from(part).unwrap();
-    assert!((pose.translation.vector - nalgebra::vector![5.659, 1.1, 0.0001]).norm() < 1e-9);
-    let supply = model.named("empty_kit_tray_supply").unwrap().id;
-    assert_eq!(model.count(supply, "stock_keeping_unit_kit_tray", 1), 1);
+fn a_nist_workstation_comes_in() {
+    let model = import_nist(&data("cell.xml")).unwrap();
+    assert_eq!(errors(&model), Vec::<String>::new());
+    assert_same(&model, &import_toml(&export_toml(&model).unwrap()).unwrap());
+    assert_same(&model, &import_json(&export_json(&model).unwrap()).unwrap());
+    assert_eq!((model.skus().count(), model.volumes().len()), (5, 1));
+    assert_eq!(model.design("bolt_and_nut").unwrap().parts.len(), 2);
+    assert_eq!(model.effector().unwrap().name, "big_cup");
+    let bolts = model.named("bolts").unwrap().id;
+    assert_eq!(model.count(bolts, "bolt", 1), 2);
+    // (20, 0, 0) + turned by a quarter (0, -10, 30) + (2, 0, 0.5), in inches.
+    let bolt = model.named("bolt_1").unwrap();
+    let place = model.workstation_from(bolt.id).unwrap().translation.vector;
+    let wanted = nalgebra::vector![20.0 + 10.0, 2.0, 30.5] * 0.0254;
+    assert!((place - wanted).norm() < 1e-9, "{place}");
+    assert_eq!(bolt.sku(), Some("bolt"));
+    let kit = model.named("kit_7").unwrap();
+    assert_eq!(
+        (kit.class, kit.sku()),
+        (Class::KitInstance, Some("bolt_and_nut"))
+    );
+    assert_eq!(
+        kit.properties["isKitInstance_Finished"],
+        Scalar::Truth(true)
+    );
+    let cup = model.named("small_cup").unwrap();
+    assert_eq!(cup.number("hasVacuumEffector_CupDiameter"), Some(0.0127));
+    let effectors = &model.sku("bolt").unwrap().effectors;
+    assert_eq!(effectors, &["small_cup"]);
+    let volume = &model.volumes()[0];
+    assert!((volume.maximum[2] - 50.0 * 0.0254).abs() < 1e-12);
 }
 
 /// What the database gives back is the model that went in, bit for bit; readers cannot write.
 #[test]
 fn database_round_trip() {
-    let Some(text) = shared_text("data/nist/workstation/kittingInstancesGoal2.xml") else {
-        return;
-    };
-    let model = import_nist(&text).unwrap();
+    let model = import_nist(&data("cell.xml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("world.db");
     let mut writer = Writer::open(&path, Durability::Process).unwrap();
@@ -146,20 +135,21 @@ fn impossible_descriptions_are_refused() {
     cases.push((format!("{toml}\n{volume}"), "toml", "volume"));
     let flat = json.replacen("\"length\": 25.0", "\"length\": -25.0", 1);
     cases.push((flat, "json", "sizes must be positive"));
-    if let Some(xml) = shared_text("data/nist/workstation/kittingInstancesInit1.xml") {
-        let (start, length) = (xml.find("<Length>").unwrap(), "<Length>".len());
-        let end = start + xml[start..].find("</Length>").unwrap();
-        let flat = format!("{}-0.0{}", &xml[..start + length], &xml[end..]);
-        cases.push((flat, "xml", "sizes must be positive"));
-        let first = "<Name>stock_keeping_unit_part_a</Name>";
-        let twice = xml.replacen("<Name>stock_keeping_unit_part_b</Name>", first, 1);
-        assert_ne!(twice, xml);
-        let unit = "<AngleUnit>degree</AngleUnit>";
-        let turned = xml.replacen(unit, "<AngleUnit>turn</AngleUnit>", 1);
-        assert_ne!(turned, xml);
-        cases.push((turned, "xml", "unknown angle unit"));
-        cases.push((twice, "xml", "stock_keeping_unit_part_a"));
-    }
+    let xml = data("cell.xml");
+    let xml_with = |from: &str, to: &str| {
+        assert!(xml.contains(from), "{from}");
+        xml.replacen(from, to, 1)
+    };
+    let flat = xml_with("<Length>2.0</Length>", "<Length>-0.0</Length>");
+    cases.push((flat, "xml", "sizes must be positive"));
+    let twice = xml_with("<Name>nut</Name>", "<Name>bolt</Name>");
+    cases.push((twice, "xml", "bolt"));
+    let turned = xml_with(">degree</AngleUnit>", ">turn</AngleUnit>");
+    cases.push((turned, "xml", "unknown angle unit"));
+    let word = xml_with("<X>10</X>", "<X>ten</X>");
+    cases.push((word, "xml", "X is not a number: ten"));
+    let lost = xml_with("<RefObjectName>bench</", "<RefObjectName>stool</");
+    cases.push((lost, "xml", "relative to an object that is not there"));
     for (text, form, why) in cases {
         let import = match form {
             "toml" => import_toml,
@@ -207,15 +197,12 @@ fn runs_go_with_their_world() {
 /// A commit with one impossible change changes nothing.
 #[test]
 fn commits_are_whole() {
-    let Some(text) = shared_text("data/nist/workstation/kittingInstancesInit1.xml") else {
-        return;
-    };
-    let model = import_nist(&text).unwrap();
+    let model = import_nist(&data("cell.xml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Writer::open(&folder.path().join("w.db"), Durability::Process).unwrap();
     writer.replace(&model).unwrap();
     let part = model.first_of(Class::Part).unwrap();
-    let tray = model.named("part_a_tray").unwrap();
+    let tray = model.named("bolts").unwrap();
     let good = Change::Set {
         object: part.id,
         property: "hasPart_SerialNumber".into(),

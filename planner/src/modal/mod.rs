@@ -5,7 +5,7 @@
 mod pose;
 mod settings;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 pub use pose::isometry;
 pub use settings::Settings;
@@ -13,7 +13,7 @@ pub use settings::Settings;
 use crate::command_error::CommandError;
 use crate::task::{Move, Shape, Task, ToolAction};
 use crate::tooling::Tooling;
-use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit};
+use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit, Pose};
 use trajectory::ToolLimits;
 
 /// What the controller accepts.
@@ -28,7 +28,7 @@ pub enum CanonState {
 }
 
 /// The modes of one program on one arm.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Modal {
     state: CanonState,
     length: LengthUnit,
@@ -188,11 +188,7 @@ impl Modal {
         workstation_from_flange: &Isometry3<f64>,
     ) -> Result<Task, CommandError> {
         let limits = self.settings.tool_limits(&self.maxima)?;
-        let workstation_from_frame = match self.frame {
-            CoordinateFrame::Workstation => Isometry3::identity(),
-            CoordinateFrame::RobotBase => self.workstation_from_base,
-            CoordinateFrame::ToolTip => workstation_from_flange * self.tooling.flange_from_tool(),
-        };
+        let workstation_from_frame = self.workstation_from_frame(workstation_from_flange);
         let poses = poses
             .iter()
             .enumerate()
@@ -209,6 +205,32 @@ impl Modal {
             tolerance,
             limits,
         }))
+    }
+
+    fn workstation_from_frame(&self, workstation_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
+        match self.frame {
+            CoordinateFrame::Workstation => Isometry3::identity(),
+            CoordinateFrame::RobotBase => self.workstation_from_base,
+            CoordinateFrame::ToolTip => workstation_from_flange * self.tooling.flange_from_tool(),
+        }
+    }
+
+    /// A pose of the controlled point (m) as the program would write it now: in its frame and
+    /// units, with the arm's end at `workstation_from_flange`.
+    #[must_use]
+    pub fn written(
+        &self,
+        workstation_from_tool: &Isometry3<f64>,
+        workstation_from_flange: &Isometry3<f64>,
+    ) -> Pose {
+        let frame = self.workstation_from_frame(workstation_from_flange);
+        let pose = frame.inv_mul(workstation_from_tool);
+        let axis = |axis: Vector3<f64>| (pose.rotation * axis).into();
+        Pose::Axes {
+            point: (pose.translation.vector / self.length.metres()).into(),
+            z_axis: axis(Vector3::z()),
+            x_axis: axis(Vector3::x()),
+        }
     }
 
     fn set(&mut self, command: &Command) -> Result<Task, CommandError> {

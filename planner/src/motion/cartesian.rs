@@ -48,6 +48,7 @@ impl<const N: usize> Planner<N> {
         };
         let path = joint_path(&line, &points)?;
         let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
+        let trajectory = self.finite(timed.trajectory, &points, &|_| 1)?;
         let draft = Draft {
             // The joints of a seven-joint arm may take another way along the same line.
             least: if N > 6 {
@@ -55,7 +56,7 @@ impl<const N: usize> Planner<N> {
             } else {
                 timed.certificate.lower_bound
             },
-            ..Draft::of(timed.trajectory)
+            ..Draft::of(trajectory)
         };
         Ok(self.slowed(draft, motion))
     }

@@ -12,6 +12,8 @@ mod goal;
 mod jog;
 mod least;
 mod motion_error;
+mod reach;
+mod singular;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
@@ -23,6 +25,7 @@ pub use certificate::{LimitReport, MoveCertificate, PassReport, Peaks};
 pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
+use motion_error::figures;
 
 use certificate::Arm;
 use draft::Draft;
@@ -116,6 +119,7 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        self.check_reach(motion, start)?;
         match motion.shape {
             Shape::Joint => self.certify(motion, start, self.plan_joint(motion, start)?),
             Shape::Straight => self.certify(motion, start, self.plan_straight(motion, start)?),
@@ -294,8 +298,8 @@ impl<const N: usize> Planner<N> {
     /// A joint quantity with the unit that people read.
     fn amount(&self, joint: usize, value: f64) -> String {
         match self.chain().prismatic().get(joint) {
-            Some(true) => format!("{:.1} mm", value * 1e3),
-            _ => format!("{:.2} degrees", value.to_degrees()),
+            Some(true) => format!("{} mm", figures(value * 1e3, 1)),
+            _ => format!("{} degrees", figures(value.to_degrees(), 2)),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::Fault;
 #[non_exhaustive]
 pub enum MotionError {
     /// No configuration of the arm reaches the pose.
-    #[error("pose {pose} is out of reach by {millimetres:.1} mm")]
+    #[error("pose {pose} is out of reach by {} mm", figures(*millimetres, 1))]
     OutOfReach {
         /// Which pose of the command.
         pose: usize,
@@ -30,7 +30,10 @@ pub enum MotionError {
         beyond: String,
     },
     /// The position is in reach, the orientation is not.
-    #[error("pose {pose} is in reach, but its orientation is {degrees:.1} degrees out of reach")]
+    #[error(
+        "pose {pose} is in reach, but its orientation is {} degrees out of reach",
+        figures(*degrees, 1)
+    )]
     Orientation {
         /// Which pose of the command.
         pose: usize,
@@ -81,6 +84,21 @@ pub enum MotionError {
     Uncertified(#[from] Fault),
 }
 
+/// A number with so many decimals, and with more where these would all be zero: a small amount is
+/// not called 0.
+pub(super) fn figures(value: f64, decimals: usize) -> String {
+    let size = value.abs();
+    if size >= 1e12 {
+        return format!("{value:.1e}");
+    }
+    let needed = if size > 0.0 && size < 1.0 {
+        (1.0 - size.log10().floor()).clamp(0.0, 12.0) as usize
+    } else {
+        0
+    };
+    format!("{value:.digits$}", digits = decimals.max(needed))
+}
+
 impl MotionError {
     /// What would fix it.
     #[must_use]
@@ -100,5 +118,21 @@ impl MotionError {
                 "please report this with the program: it is a fault of the planner"
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::figures;
+
+    #[test]
+    fn small_amounts_are_not_zero() {
+        let said = |value: f64| figures(value, 1);
+        assert_eq!(said(1388.11), "1388.1");
+        assert_eq!(said(0.5), "0.50");
+        assert_eq!(said(0.0123), "0.012");
+        assert_eq!(said(3.4e-7), "0.00000034");
+        assert_eq!(said(0.0), "0.0");
+        assert_eq!(said(1e300), "1.0e300");
     }
 }

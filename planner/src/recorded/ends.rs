@@ -31,7 +31,8 @@ pub(super) fn start(recording: &Recording<'_>, report: &mut Report) {
 }
 
 /// The last row of a move: the move ends before the next row, so this one may be as far from rest
-/// and from the goal as the joints can stop from until then.
+/// and from the goal as the joints can stop from until then. Where the arm rests at the next row, it
+/// rests in the goal.
 pub(super) fn end(recording: &Recording<'_>, span: &Span<'_>, motion: &Move, report: &mut Report) {
     let Some(goal) = motion.poses.last() else {
         return;
@@ -56,13 +57,15 @@ pub(super) fn end(recording: &Recording<'_>, span: &Span<'_>, motion: &Move, rep
             report.hold(Rule::Rest, Subject::Joint(joint), row.t_s, measure);
         }
     }
-    let (way, turn) = if row.rests() && !span.own.is_empty() {
+    let rest = (row.rests() && !span.own.is_empty()).then_some(last);
+    let rest = rest.or(span.rest_after);
+    let (way, turn) = if rest.is_some() {
         (0.0, 0.0)
     } else {
         let levers = arm.levers(&span.tools[1]);
         arm.spread(&levers, |joint| from_rest(arm.limits, joint, left)[0])
     };
-    let (off, turned) = off_goal(recording, span, last, goal);
+    let (off, turned) = off_goal(recording, span, rest.unwrap_or(last), goal);
     let subject = Subject::The("the distance from the last pose");
     let measure = Measure::at_most(off, ARRIVED.0 + way, "m");
     report.hold(Rule::End, subject, row.t_s, measure);

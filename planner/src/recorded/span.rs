@@ -51,6 +51,8 @@ pub(super) struct Span<'a> {
     pub later_tools: Vec<Isometry3<f64>>,
     /// Nominal time of a gripper or tool changer, s.
     pub tool_time: f64,
+    /// The first row behind its own, if the arm still rests there: no move was in between.
+    pub rest_after: Option<usize>,
 }
 
 impl Span<'_> {
@@ -106,11 +108,13 @@ pub(super) fn spans<'a>(
             own,
             later_tools: Vec::new(),
             tool_time,
+            rest_after: None,
         };
         flange = flange_after(recording, &span, &flange);
         column(recording, &span, &mut report);
         spans.push((span, report));
     }
+    find_rests(&mut spans);
     if recording.is_run() {
         show_later_tools(&mut spans);
     }
@@ -120,6 +124,19 @@ pub(super) fn spans<'a>(
         whole.hold(Rule::CommandColumn, subject, row.t_s, measure);
     }
     spans
+}
+
+/// Where the arm is seen at rest behind a command.
+fn find_rests(spans: &mut [(Span<'_>, Report)]) {
+    let mut rest = None;
+    for (span, _) in spans.iter_mut().rev() {
+        span.rest_after = rest;
+        if span.task.is_none() || matches!(span.task, Some(Task::Move(_))) {
+            rest = None;
+        } else if !span.own.is_empty() {
+            rest = Some(span.own.start);
+        }
+    }
 }
 
 /// Rows of a run while a tool works belong to the move before.

@@ -1,7 +1,8 @@
 //! A robot folder from any URDF, with our own defaults for what it does not say.
 
+use super::Robot;
 use super::error::RobotError;
-use super::{Robot, load};
+use super::file::Files;
 use kinematics::{Model, urdf};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,40 +17,46 @@ use std::path::Path;
 /// `robot.toml` already, or when it cannot be written.
 pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robot, RobotError> {
     let file = urdf_file.display().to_string();
-    let text = std::fs::read_to_string(urdf_file).map_err(|error| RobotError::Read {
-        file: file.clone(),
-        message: error.to_string(),
-    })?;
-    let model = urdf::read(&text, tip).map_err(|source| RobotError::Urdf { file, source })?;
-    let write = |path: &Path, text: &str| {
-        std::fs::write(path, text).map_err(|error| RobotError::Write {
-            file: path.display().to_string(),
-            message: error.to_string(),
-        })
-    };
-    let toml = folder.join("robot.toml");
-    if toml.exists() {
+    let urdf = super::text_of(urdf_file)?;
+    let model = urdf::read(&urdf, tip).map_err(|source| RobotError::Urdf { file, source })?;
+    let toml_file = folder.join("robot.toml");
+    if toml_file.exists() {
         let message = "it exists already".to_owned();
-        return Err(RobotError::Write {
-            file: toml.display().to_string(),
-            message,
-        });
+        return Err(unwritable(&toml_file, message));
     }
-    std::fs::create_dir_all(folder).map_err(|error| RobotError::Write {
-        file: folder.display().to_string(),
-        message: error.to_string(),
-    })?;
-    write(&folder.join("robot.urdf"), &text)?;
-    write(&toml, &defaults(&model))?;
-    let folder = folder.display().to_string();
-    load(
-        if folder.contains('/') {
-            folder
-        } else {
-            format!("./{folder}")
-        }
-        .as_str(),
-    )
+    // Read before anything is written: a robot that is refused leaves nothing behind.
+    let toml = defaults(&model);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let robot = Files {
+        name: &name,
+        place: folder,
+        urdf: &urdf,
+        toml: &toml,
+    }
+    .read()?;
+    let is_new = !folder.exists();
+    let written = write(folder, &urdf, &toml);
+    if written.is_err() && is_new {
+        // Half of a robot is of no use; that it cannot be written is what is reported.
+        let _ = std::fs::remove_dir_all(folder);
+    }
+    written.map(|()| robot)
+}
+
+fn write(folder: &Path, urdf: &str, toml: &str) -> Result<(), RobotError> {
+    std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, error.to_string()))?;
+    for (name, text) in [("robot.urdf", urdf), ("robot.toml", toml)] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|error| unwritable(&path, error.to_string()))?;
+    }
+    Ok(())
+}
+
+fn unwritable(path: &Path, message: String) -> RobotError {
+    RobotError::Write {
+        file: path.display().to_string(),
+        message,
+    }
 }
 
 /// Text of a `robot.toml` for a model, every default marked as ours.

@@ -14,7 +14,8 @@ pub struct Damaged {
 /// A kind of damage.
 pub struct Kind {
     pub name: &'static str,
-    pub rule: Rule,
+    /// It breaks one of these: which one depends on the limits of the robot.
+    pub rules: &'static [Rule],
     pub make: Make,
 }
 
@@ -30,10 +31,10 @@ pub enum Make {
 }
 
 /// A kind that changes rows.
-pub const fn rows(name: &'static str, rule: Rule, make: fn(&mut Vec<Row>)) -> Kind {
+pub const fn rows(name: &'static str, rules: &'static [Rule], make: fn(&mut Vec<Row>)) -> Kind {
     Kind {
         name,
-        rule,
+        rules,
         make: Make::Rows(make),
     }
 }
@@ -41,21 +42,21 @@ pub const fn rows(name: &'static str, rule: Rule, make: fn(&mut Vec<Row>)) -> Ki
 /// A kind that records another program.
 pub const fn program(
     name: &'static str,
-    rule: Rule,
+    rules: &'static [Rule],
     make: fn(&Scene) -> [Vec<Command>; 2],
 ) -> Kind {
     Kind {
         name,
-        rule,
+        rules,
         make: Make::Program(make),
     }
 }
 
 /// A kind that changes rows of a run.
-pub const fn run(name: &'static str, rule: Rule, make: fn(&mut Vec<Row>)) -> Kind {
+pub const fn run(name: &'static str, rules: &'static [Rule], make: fn(&mut Vec<Row>)) -> Kind {
     Kind {
         name,
-        rule,
+        rules,
         make: Make::Run(make),
     }
 }

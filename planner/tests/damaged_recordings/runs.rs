@@ -10,24 +10,24 @@ const JOINT: usize = 4;
 const SMOOTH: usize = 8;
 
 pub const KINDS: [Kind; 8] = [
-    run("path time: faster than time", Rule::PathTime, |rows| {
+    run("path time: faster than time", &[Rule::PathTime], |rows| {
         columns(rows, |run| run.path_time_s *= 1.01);
     }),
-    run("path time: goes back", Rule::PathTime, |rows| {
+    run("path time: goes back", &[Rule::PathTime], |rows| {
         let own = of(rows, SMOOTH);
         let at = own.start + own.len() / 2;
         set(&mut rows[at], |run| run.path_time_s -= 0.1);
     }),
     run(
         "path time: stands while the arm moves",
-        Rule::PathTime,
+        &[Rule::PathTime],
         |rows| {
             columns(rows, |run| run.path_time_s = 0.0);
         },
     ),
     run(
         "measured: a joint far from the published one",
-        Rule::Measured,
+        &[Rule::Measured],
         |rows| {
             let own = of(rows, JOINT);
             set(&mut rows[own.start + 20], |run| run.measured[1] += 0.1);
@@ -35,14 +35,14 @@ pub const KINDS: [Kind; 8] = [
     ),
     run(
         "measured: the point of other joints",
-        Rule::Measured,
+        &[Rule::Measured],
         |rows| {
             columns(rows, |run| run.measured_point.z += 1e-6);
         },
     ),
     run(
         "run: times closed up over missing rows",
-        Rule::Derivatives,
+        &[Rule::Derivatives],
         |rows| {
             let own = of(rows, SMOOTH);
             let at = own.start + own.len() / 2;
@@ -52,12 +52,16 @@ pub const KINDS: [Kind; 8] = [
             }
         },
     ),
-    run("run: a time that is no whole period", Rule::Time, |rows| {
-        rows[40].t_s += 0.3 * crate::PERIOD;
-    }),
+    run(
+        "run: a time that is no whole period",
+        &[Rule::Time],
+        |rows| {
+            rows[40].t_s += 0.3 * crate::PERIOD;
+        },
+    ),
     run(
         "run: the arm creeps while it waits",
-        Rule::Standstill,
+        &[Rule::Standstill],
         |rows| {
             for at in of(rows, 0) {
                 rows[at].joints[0] += 1e-9 * at as f64;

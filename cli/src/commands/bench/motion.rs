@@ -13,7 +13,7 @@ use super::suite::{self, Suite};
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::plot::{self, Bar};
-use crate::{output, robot};
+use crate::{input, output, robot};
 
 /// Smooth motions through pose lists: motion time beside exact stop, planning time, certificate
 ///
@@ -96,9 +96,7 @@ impl Motion {
     fn read(&self) -> Result<Suite, Failure> {
         let unreadable = |cause: anyhow::Error| Failure::new(Exit::Unreadable, cause);
         let context = || format!("cannot read {}", self.file.display());
-        let text = fs::read_to_string(&self.file)
-            .with_context(context)
-            .map_err(unreadable)?;
+        let text = input::text(&self.file)?;
         serde_json::from_str(&text)
             .with_context(context)
             .map_err(unreadable)

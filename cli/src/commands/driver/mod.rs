@@ -1,4 +1,4 @@
-//! Drivers: one file a way to move an arm, and the test of any of them.
+//! Drivers: one file per kind of driver, and the test of any driver.
 
 mod mujoco;
 mod sim;

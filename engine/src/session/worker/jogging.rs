@@ -1,0 +1,187 @@
+//! Moving by hand, with a dead man's switch: a jog lasts as long as requests keep coming.
+
+use std::time::{Duration, Instant};
+
+use planner::motion::Direction;
+use realtime::Segment;
+use servo::Control;
+
+use super::super::jog::{Jog, JogError, direction};
+use super::super::note::Note;
+use super::{Work, Worker};
+
+/// Number of the command that a jog is to the executor.
+const COMMAND: u32 = u32::MAX;
+/// The dead man's switch: least and most time without a request.
+const TIMEOUT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
+
+/// A jog under way.
+#[derive(Clone, Debug)]
+pub(super) struct Jogging {
+    request: Jog,
+    until: Instant,
+    phase: Phase,
+    /// What comes after the stop, with its own time limit.
+    next: Option<(Jog, Instant)>,
+}
+
+/// Where a jog is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The way is to be planned as soon as the arm rests.
+    Waiting,
+    /// On its way.
+    Moving,
+    /// On its way to a stop.
+    Ending,
+    /// There is no way on; it rests until the switch is let go.
+    Stuck,
+}
+
+impl<const N: usize> Worker<'_, N> {
+    /// Begins, prolongs, changes or ends a jog.
+    pub(super) fn jog(&mut self, request: Jog) -> Result<(), JogError> {
+        let direction = direction::<N>(&request)?;
+        let until = Instant::now() + request.timeout.clamp(TIMEOUT.0, TIMEOUT.1);
+        if let Some(fault) = &self.fault {
+            return Err(JogError::Fault(fault.clone()));
+        }
+        if self.has_program() {
+            return Err(JogError::Program);
+        }
+        let Some(jogging) = &mut self.jogging else {
+            return match direction {
+                Some(direction) => self.begin_jog(request, &direction, until),
+                None => Ok(()),
+            };
+        };
+        let same = direction.is_some() && jogging.request.speeds == request.speeds;
+        if same && jogging.request.space == request.space && jogging.phase != Phase::Ending {
+            jogging.until = until;
+            return Ok(());
+        }
+        jogging.next = direction.map(|_| (request, until));
+        self.end_jog();
+        Ok(())
+    }
+
+    fn begin_jog(
+        &mut self,
+        request: Jog,
+        direction: &Direction<N>,
+        until: Instant,
+    ) -> Result<(), JogError> {
+        let now = self.remote.measured();
+        if now.held || self.is_held() {
+            return Err(JogError::Held);
+        }
+        if !(now.idle && now.resting) {
+            return Err(JogError::Program);
+        }
+        self.plan_jog(direction)?;
+        self.jogging = Some(Jogging {
+            request,
+            until,
+            phase: Phase::Moving,
+            next: None,
+        });
+        Ok(())
+    }
+
+    /// Plans the way from where the arm rests and hands it over.
+    fn plan_jog(&mut self, direction: &Direction<N>) -> Result<(), JogError> {
+        let start = self.remote.measured().setpoint;
+        self.controller.set_joints(start);
+        let planner = self.controller.planner();
+        let planned = planner
+            .jog(direction, &start, &self.most)
+            .map_err(|error| JogError::Motion(error.to_string()))?;
+        let pieces = planned.trajectory.pieces();
+        for (index, piece) in pieces.iter().enumerate() {
+            self.work.push_back(Work::Motion(Segment {
+                piece: *piece,
+                command: COMMAND,
+                last: index + 1 == pieces.len(),
+            }));
+        }
+        Ok(())
+    }
+
+    /// Stops the arm on its way; what comes next begins when it rests.
+    fn end_jog(&mut self) {
+        let Some(jogging) = &mut self.jogging else {
+            return;
+        };
+        match jogging.phase {
+            Phase::Waiting | Phase::Stuck => {
+                self.rest_from_jog();
+            }
+            Phase::Moving => {
+                jogging.phase = Phase::Ending;
+                self.jog_aborts += 1;
+                self.remote.control(Control::Abort);
+            }
+            Phase::Ending => {}
+        }
+    }
+
+    /// Looks at the dead man's switch, and goes on where the arm came to rest.
+    pub(super) fn watch_jog(&mut self) {
+        let Some(jogging) = &self.jogging else { return };
+        if Instant::now() >= jogging.until {
+            return self.end_jog();
+        }
+        let now = self.remote.measured();
+        if jogging.phase != Phase::Waiting || !(now.idle && now.resting) || now.held {
+            return;
+        }
+        let begun = direction::<N>(&jogging.request).and_then(|direction| match direction {
+            Some(direction) => self.plan_jog(&direction),
+            None => Ok(()),
+        });
+        if let Some(jogging) = &mut self.jogging {
+            jogging.phase = if begun.is_ok() {
+                Phase::Moving
+            } else {
+                Phase::Stuck
+            };
+        }
+        if let Err(error) = begun {
+            let text = format!("jog: {error}");
+            self.say(Note::Message { text });
+        }
+    }
+
+    /// Whether it was a jog that came to the end of its way; it goes on from there if it can.
+    pub(super) fn jog_finished(&mut self, command: u32) -> bool {
+        let ours = command == COMMAND;
+        if let Some(jogging) = self.jogging.as_mut().filter(|_| ours)
+            && jogging.phase == Phase::Moving
+        {
+            jogging.phase = Phase::Waiting;
+        }
+        ours
+    }
+
+    /// The arm rests after a jog; whether there was one. What comes next begins.
+    pub(super) fn rest_from_jog(&mut self) -> bool {
+        let Some(jogging) = self.jogging.take() else {
+            return false;
+        };
+        self.work.clear();
+        self.feeder.renew();
+        self.controller.set_joints(self.remote.measured().setpoint);
+        match jogging.next.filter(|(_, until)| Instant::now() < *until) {
+            Some((request, until)) => {
+                self.jogging = Some(Jogging {
+                    request,
+                    until,
+                    phase: Phase::Waiting,
+                    next: None,
+                });
+            }
+            None => self.say(Note::Stopped),
+        }
+        true
+    }
+}

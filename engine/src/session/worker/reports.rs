@@ -1,0 +1,185 @@
+//! What the servo thread reports, and what the session tells of it, in the order of the commands.
+
+use std::sync::PoisonError;
+
+use nalgebra::SVector;
+use servo::{Event, Fault, Recorded};
+
+use super::super::RunSample;
+use super::super::note::{Blame, Note};
+use super::Worker;
+
+/// How many reported commands the tool is known of, for samples that come late.
+const CHAINS: usize = 64;
+
+impl<const N: usize> Worker<'_, N> {
+    /// Takes what the servo thread has reported.
+    pub(super) fn read_reports(&mut self) {
+        while let Some(sample) = self.monitor.sample() {
+            self.record(&sample);
+        }
+        while let Some(event) = self.monitor.event() {
+            self.on_event(event);
+        }
+    }
+
+    fn on_event(&mut self, event: Event) {
+        match event {
+            Event::Started { command, tick } => {
+                let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) else {
+                    return;
+                };
+                flight.started = Some(tick);
+                let (id, line, name) = (flight.id, flight.line, flight.name);
+                let planned_s = flight.planned_s;
+                // What came before has ended, and is reported before.
+                self.report_done();
+                self.say(Note::Started {
+                    id,
+                    line,
+                    name,
+                    planned_s,
+                    tick,
+                });
+            }
+            Event::Finished { command, .. } if self.jog_finished(command) => {}
+            Event::Finished { command, tick } => {
+                if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
+                    flight.finished = Some(tick);
+                }
+                self.report_done();
+            }
+            Event::Stopped { .. } => self.say(Note::Stopped),
+            Event::Aborted { aborts, .. } => {
+                let asked = aborts.wrapping_sub(self.age);
+                let ours = asked <= self.jog_aborts;
+                self.jog_aborts = self.jog_aborts.saturating_sub(asked);
+                self.age = aborts;
+                self.on_abort(ours);
+            }
+            Event::Faulted { fault, tick } => {
+                let (blame, reason) = (blame(&fault), fault.to_string());
+                let dropped = self.drop_all(None);
+                self.fault = Some(reason.clone());
+                self.ends.shared.inbox().set_fault(self.fault.clone());
+                self.say(Note::Faulted {
+                    blame,
+                    reason,
+                    tick,
+                    dropped,
+                });
+            }
+            Event::Recovered { .. } => {
+                let dropped = self.drop_all(None);
+                self.fault = None;
+                self.ends.shared.inbox().set_fault(None);
+                tracing::debug!(dropped, "recovered");
+                self.say(Note::Recovered);
+            }
+            Event::Ended { .. } => self.closing = true,
+        }
+    }
+
+    /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. What
+    /// was given before drops with the latter only.
+    fn on_abort(&mut self, ends_jog: bool) {
+        if ends_jog {
+            self.ends.shared.inbox().renew(self.age);
+        }
+        if !self.rest_from_jog() {
+            let dropped = self.drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
+        } else if !ends_jog {
+            let dropped = self.ends.shared.inbox().drop_all(Some(self.age));
+            self.say(Note::Aborted { dropped });
+        }
+    }
+
+    /// Forgets all that is planned or queued, but what was given at `age`, and begins again from
+    /// where the arm is.
+    fn drop_all(&mut self, age: Option<u32>) -> usize {
+        let dropped = self.flight.len();
+        self.work.clear();
+        self.flight.clear();
+        let dropped = dropped + {
+            let mut inbox = self.ends.shared.inbox();
+            inbox.set_flying(0);
+            inbox.drop_all(age)
+        };
+        self.jogging = None;
+        self.feeder.renew();
+        self.held = None;
+        self.controller.abort();
+        self.controller.set_joints(self.remote.measured().setpoint);
+        dropped
+    }
+
+    /// Reports, in order, every command that has ended.
+    pub(super) fn report_done(&mut self) {
+        while self
+            .flight
+            .front()
+            .is_some_and(|flight| flight.finished.is_some())
+        {
+            let Some(flight) = self.flight.pop_front() else {
+                return;
+            };
+            if let Some(note) = flight.says {
+                self.say(note);
+            }
+            self.chains.push_back((flight.id, flight.chain));
+            if self.chains.len() > CHAINS {
+                self.chains.pop_front();
+            }
+            if flight.refused {
+                continue;
+            }
+            let ticks = match (flight.started, flight.finished) {
+                (Some(from), Some(to)) => to.saturating_sub(from),
+                _ => 0,
+            };
+            let (id, line, name) = (flight.id, flight.line, flight.name);
+            self.say(Note::Done {
+                id,
+                line,
+                name,
+                ticks,
+            });
+        }
+    }
+
+    fn record(&self, sample: &Recorded<N>) {
+        let flying = self.flight.iter().map(|flight| (flight.id, &flight.chain));
+        let reported = self.chains.iter().rev().map(|(id, chain)| (*id, chain));
+        // Command 0 is the time before the first; one that is forgotten was long ago.
+        let chain = flying
+            .chain(reported)
+            .find_map(|(id, chain)| (id == sample.command).then_some(chain))
+            .unwrap_or_else(|| self.controller.chain());
+        let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
+        let measured = SVector::from(sample.measured);
+        let recorded = RunSample {
+            tick: sample.tick,
+            command: sample.command,
+            path_time: sample.path_time,
+            q: list(&sample.setpoint.position),
+            dq: list(&sample.setpoint.velocity),
+            ddq: list(&sample.setpoint.acceleration),
+            measured: sample.measured.to_vec(),
+            workstation_from_tool: chain.forward(&sample.setpoint.position),
+            measured_pose: chain.forward(&measured),
+        };
+        let samples = &self.ends.shared.samples;
+        samples
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(recorded);
+    }
+}
+
+fn blame(fault: &Fault) -> Blame {
+    match fault {
+        Fault::Limit(_) | Fault::BrokenSegment | Fault::Stalled { .. } => Blame::Guard,
+        _ => Blame::Driver,
+    }
+}

@@ -1,0 +1,76 @@
+//! Room in shared memory: looked at before it is used, and kept for as long as it is needed.
+//!
+//! A segment in `/dev/shm` has a size, but no memory until somebody writes to it. When the file
+//! system is full by then, the writer is killed with SIGBUS. So we look at the room before we make
+//! segments, and give each its memory before we use it.
+
+use std::fs::{self, OpenOptions};
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
+
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use rustix::io::Errno;
+
+use crate::{Domain, IpcError};
+
+/// Where the segments are.
+const PLACE: &str = "/dev/shm";
+
+/// What must be free before a process makes segments (bytes): an engine, a driver and their
+/// clients need about 8 MiB together, see the test `a_full_shared_memory_is_named`.
+pub const ROOM_NEEDED: u64 = 8 << 20;
+
+/// What is free in `/dev/shm` (bytes); none where it is without a limit or cannot be asked.
+pub fn room_left() -> Option<u64> {
+    let found = statvfs(PLACE).ok()?;
+    (found.f_blocks > 0).then(|| found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+/// Looks whether there is room for the segments of a process.
+///
+/// # Errors
+/// [`IpcError::NoRoom`] with what is needed and what is there.
+pub(crate) fn look() -> Result<(), IpcError> {
+    match room_left() {
+        Some(found) if found < ROOM_NEEDED => Err(IpcError::NoRoom {
+            place: PLACE,
+            needed: ROOM_NEEDED,
+            found,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The segments of a domain.
+pub(crate) fn segments(domain: &Domain) -> Vec<PathBuf> {
+    let listed = fs::read_dir(PLACE).into_iter().flatten().flatten();
+    let ours = listed.filter(|entry| {
+        let name = entry.file_name();
+        name.as_encoded_bytes()
+            .starts_with(domain.prefix().as_bytes())
+    });
+    ours.map(|entry| entry.path()).collect()
+}
+
+/// Gives every segment of a domain the memory of its whole size, so that no write meets a full
+/// file system. Call it when ports were opened.
+///
+/// # Errors
+/// [`IpcError::NoRoom`] when there is too little.
+pub(crate) fn reserve(domain: &Domain) -> Result<(), IpcError> {
+    for path in segments(domain) {
+        // One that is gone, or closed already to writing, is nobody's need.
+        let Ok(file) = OpenOptions::new().read(true).write(true).open(&path) else {
+            continue;
+        };
+        let size = file.metadata().map_or(0, |found| found.size());
+        if size > 0 && fallocate(&file, FallocateFlags::empty(), 0, size) == Err(Errno::NOSPC) {
+            return Err(IpcError::NoRoom {
+                place: PLACE,
+                needed: size,
+                found: room_left().unwrap_or(0),
+            });
+        }
+    }
+    Ok(())
+}

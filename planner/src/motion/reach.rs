@@ -1,0 +1,52 @@
+//! Reach, looked at before a curve is laid.
+
+use super::{MotionError, Planner};
+use crate::task::{Move, Shape};
+use nalgebra::SVector;
+
+impl<const N: usize> Planner<N> {
+    /// Refuses a straight or smooth move with a pose that lies beyond the ball of reach, before
+    /// any curve is laid: a curve of kilometres would be followed in steps of millimetres. A joint
+    /// move lays no curve and is refused by the inverse kinematics, with the same words.
+    ///
+    /// An intermediate pose may be missed by the tolerance, but not by more than the radius of the
+    /// ball: a larger tolerance brings the arm no nearer.
+    ///
+    /// # Errors
+    /// What the inverse kinematics says about the first such pose.
+    pub(super) fn check_reach(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<(), MotionError> {
+        if motion.shape == Shape::Joint {
+            return Ok(());
+        }
+        let (middle, radius) = self.chain().reach_ball();
+        let last = motion.poses.len().saturating_sub(1);
+        for (index, pose) in motion.poses.iter().enumerate() {
+            let distance = (pose.translation.vector - middle.coords).norm();
+            let slack = if index < last {
+                motion.tolerance.min(radius)
+            } else {
+                0.0
+            };
+            // Written so that a distance that is no number is refused too.
+            let inside = distance <= radius + slack + ROUNDING_M;
+            if inside {
+                continue;
+            }
+            return Err(match self.solver.nearest(pose, start) {
+                Err(report) => self.refusal(index + 1, &report),
+                Ok(_) => MotionError::OutOfReach {
+                    pose: index + 1,
+                    millimetres: (distance - radius) * 1e3,
+                },
+            });
+        }
+        Ok(())
+    }
+}
+
+/// How far beyond the ball rounding may put a pose, m.
+const ROUNDING_M: f64 = 1e-9;

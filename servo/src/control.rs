@@ -1,0 +1,20 @@
+//! What an operator may ask while the arm moves.
+
+/// What an operator may ask while the arm moves. It acts in the next period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// Stop on the path and wait for [`Control::Resume`].
+    Pause,
+    /// Go on along the path.
+    Resume,
+    /// Share of the planned speed, 0..=1; what is outside is brought inside, what is not a number
+    /// is ignored.
+    Override(f64),
+    /// Stop on the path and wait for [`Control::Resume`].
+    Stop {
+        /// As fast as the joints can.
+        fast: bool,
+    },
+    /// Stop on the path, then forget all that was pushed.
+    Abort,
+}

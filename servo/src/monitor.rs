@@ -1,0 +1,33 @@
+//! What the real-time thread reports, for its reader.
+
+use rtrb::Consumer;
+
+use super::event::{Event, Recorded};
+
+/// The reader's end: what happened, and what was published and measured.
+#[derive(Debug)]
+pub struct Monitor<const N: usize> {
+    pub(super) events: Consumer<Event>,
+    pub(super) samples: Consumer<Recorded<N>>,
+    pub(super) seen: u64,
+}
+
+impl<const N: usize> Monitor<N> {
+    /// The oldest event that was not read yet.
+    pub fn event(&mut self) -> Option<Event> {
+        let event = self.events.pop().ok();
+        self.seen += u64::from(event.is_some());
+        event
+    }
+
+    /// How many events were read, for [`super::Feeder::settle`].
+    pub fn seen(&self) -> u64 {
+        self.seen
+    }
+
+    /// The oldest sample that was not read yet; none without [`super::ExecutorConfig::record`]. In
+    /// lock-step the thread waits for the reader, by the clock it drops what has no room.
+    pub fn sample(&mut self) -> Option<Recorded<N>> {
+        self.samples.pop().ok()
+    }
+}

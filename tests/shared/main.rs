@@ -1,0 +1,71 @@
+//! Tests of foreign files: programs, plans and workstations of NIST.
+//!
+//! They lie in a folder beside the repository, `../shared`, which a clone does not have. Where it is
+//! missing these tests are reported as ignored; every law that they test is also tested on files of
+//! the repository. A test harness of its own (`libtest-mimic`) is needed because an ordinary test
+//! cannot become ignored when it runs.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
+#![allow(dead_code, reason = "helpers that the other tests use")]
+
+#[path = "../suite/canter.rs"]
+mod canter;
+mod pddl;
+mod plans;
+mod programs;
+mod workstations;
+
+use std::path::{Path, PathBuf};
+
+use libtest_mimic::{Arguments, Trial};
+
+/// The folder of foreign files.
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared")
+}
+
+/// A file of it.
+fn path(name: &str) -> PathBuf {
+    folder().join(name)
+}
+
+/// The text of a file of it.
+fn text(name: &str) -> String {
+    let path = path(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+macro_rules! trials {
+    ($($module:ident::$name:ident)*) => {
+        vec![$((concat!(stringify!($module), "::", stringify!($name)), $module::$name as fn())),*]
+    };
+}
+
+fn main() {
+    let tests: Vec<(&str, fn())> = trials! {
+        programs::sound_programs_have_no_findings
+        programs::commands_with_errors
+        workstations::nist_workstations_come_in
+        workstations::a_nist_workstation_holds_what_it_says
+        plans::the_document_is_read_unchanged
+        plans::layouts_agree
+        plans::the_documents_oddities_are_found
+        plans::the_documents_plan_is_checked
+        plans::the_documents_plan_makes_three_kits_in_thought
+        pddl::good_plans_reach_their_goal
+        pddl::bad_plans_fail_where_they_should
+        pddl::verdicts_of_the_command_line
+        pddl::the_plan_of_june_2012_runs_on_the_arm
+    };
+    let arguments = Arguments::from_args();
+    let missing = !folder().is_dir();
+    let trial = |(name, test): (&str, fn())| {
+        Trial::test(name, move || {
+            test();
+            Ok(())
+        })
+        .with_ignored_flag(missing)
+    };
+    let trials = tests.into_iter().map(trial).collect();
+    libtest_mimic::run(&arguments, trials).exit();
+}
