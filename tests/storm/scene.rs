@@ -147,7 +147,9 @@ impl Arm {
         let mut since = None;
         while Instant::now() < end {
             self.look();
-            if self.state.driver() == DriverState::Fault {
+            // The engine may have one of its own while the driver follows it to rest.
+            let engine = self.fault(Duration::ZERO);
+            if engine || self.state.driver() == DriverState::Fault {
                 // Nobody did it.
                 self.tally.by_themselves += 1;
                 self.recover();
