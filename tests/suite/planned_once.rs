@@ -22,7 +22,7 @@ fn program() -> String {
         } else {
             "MoveStraightTo"
         };
-        let (x, y) = (400 + number % 7 * 3, number % 11 * 4 - 20);
+        let (x, y) = (400 + number % 7 * 3, number % 11 * 4);
         writeln!(
             text,
             "{name}({{{{{x}, {y}, 300}}, {{0, 0, -1}}, {{1, 0, 0}}}})"
