@@ -114,14 +114,14 @@ impl<R: Read> Read for ShortLines<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.source.read(buffer)?;
         let got = buffer.get(..count).unwrap_or_default();
-        self.length = match got.iter().rposition(|byte| *byte == b'\n') {
-            Some(end) => count - end - 1,
-            None => self.length + count,
-        };
-        if self.length > LONGEST_LINE {
-            let message =
-                format!("expected lines of at most {LONGEST_LINE} bytes, got a longer one");
-            return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+        for (index, piece) in got.split(|byte| *byte == b'\n').enumerate() {
+            let begun = if index == 0 { self.length } else { 0 };
+            self.length = begun + piece.len();
+            if self.length > LONGEST_LINE {
+                let message =
+                    format!("expected lines of at most {LONGEST_LINE} bytes, got a longer one");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+            }
         }
         Ok(count)
     }

@@ -372,7 +372,7 @@ mod tests {
     #[test]
     fn every_check_that_is_not_ok_has_a_remedy() {
         let folder = tempfile::tempdir().unwrap();
-        let domain = Domain::open(folder.path()).unwrap();
+        let domain = Domain::open(&folder.path().join("domain")).unwrap();
         let options = DoctorOptions {
             wake_up: Duration::from_millis(100),
             driver: Some(domain.arm("doctor/nobody-there").unwrap()),
