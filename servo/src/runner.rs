@@ -1,12 +1,12 @@
 //! One period of the real-time thread, without a clock and without a channel.
 
+mod message;
+mod tools;
+
 use core::sync::atomic::Ordering;
 use std::sync::Arc;
 
-use ipc::{
-    DriverState, HelloAck, MAX_JOINTS, MAX_TOOLS, Setpoint, SetpointFlags, State, ToolCommand,
-    ToolStatus,
-};
+use ipc::{DriverState, HelloAck, MAX_TOOLS, Setpoint, State, ToolCommand};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Following, Manner, Pushed, Sample, Step, check_following};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -15,8 +15,10 @@ use super::config::ExecutorConfig;
 use super::event::{Event, Fault, Recorded};
 use super::feed::{Feeder, Item, ToolOrder, Work};
 use super::monitor::Monitor;
-use super::orders::{Asked, Progress};
-use super::remote::{Measured, Remote, Shared};
+use super::orders::Asked;
+use super::remote::{Remote, Shared};
+
+use message::first;
 
 /// Planned segments that the cycle has at hand.
 const AT_HAND: usize = 512;
@@ -373,70 +375,6 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Sends a tool order; says whether it may begin now.
-    fn start_tool(&mut self, order: ToolOrder) -> bool {
-        let moving = matches!(self.demand(), Demand::Run(share) if share > 0.0);
-        let Some(command) = self.tools.get_mut(order.tool) else {
-            self.latch(Fault::Tool {
-                tool: order.tool,
-                timeout: false,
-            });
-            return true;
-        };
-        if !self.ready || !moving {
-            return false;
-        }
-        self.orders += 1;
-        command.order = self.orders;
-        command.action = order.action as u32;
-        let left = (order.timeout.max(0.0) / self.period) as u64;
-        self.tool = Some(Working {
-            order,
-            number: self.orders,
-            left,
-        });
-        self.report(Event::Started {
-            command: order.command,
-            tick: self.tick,
-        });
-        true
-    }
-
-    /// Whether the tool has done what it should.
-    fn watch_tool(&mut self) {
-        let Some(mut working) = self.tool else { return };
-        let tool = working.order.tool;
-        let Some(feedback) = self.state.tools.get(tool) else {
-            return;
-        };
-        let status = ToolStatus::from_number(feedback.status).unwrap_or(ToolStatus::Failed);
-        let answered = feedback.order == working.number;
-        match status {
-            ToolStatus::Open | ToolStatus::Closed if answered => {
-                self.tool = None;
-                let command = working.order.command;
-                self.report(Event::Finished {
-                    command,
-                    tick: self.tick,
-                });
-            }
-            ToolStatus::Failed | ToolStatus::Unknown if answered => {
-                self.latch(Fault::Tool {
-                    tool,
-                    timeout: false,
-                });
-            }
-            _ if working.left == 0 => self.latch(Fault::Tool {
-                tool,
-                timeout: true,
-            }),
-            _ => {
-                working.left -= 1;
-                self.tool = Some(working);
-            }
-        }
-    }
-
     /// What the cycle shall do now.
     fn demand(&self) -> Demand {
         if self.fault.is_some() {
@@ -532,79 +470,5 @@ impl<const N: usize> Runner<N> {
 
     fn measured(&self) -> SVector<f64, N> {
         first(&self.state.position)
-    }
-
-    fn share_position(&self) {
-        let resting = self.cycle.is_resting();
-        let path_rate = if resting { 0.0 } else { self.cycle.path_rate() };
-        let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
-        self.shared.write(&Measured {
-            position: self.measured(),
-            velocity: first(&self.state.velocity),
-            setpoint: self.published.position,
-            path_rate,
-            resting,
-            idle,
-            faulted: self.fault.is_some(),
-            held: false,
-            tools: self.state.tools.map(|tool| tool.status),
-        });
-        self.shared.orders.tell(&Progress {
-            order: self.asked.order(),
-            tick: self.tick,
-            path_rate,
-            resting,
-            held: self.asked.holds(),
-            idle,
-            ..Progress::default()
-        });
-    }
-
-    /// The message of the period.
-    fn setpoint(&mut self, tick: Tick) -> Setpoint {
-        self.sequence += 1;
-        let resting = self.cycle.is_resting();
-        let stopping = !resting && matches!(self.demand(), Demand::Stop(_));
-        let mut setpoint = Setpoint {
-            joints: N as u32,
-            session: self.session,
-            sequence: self.sequence,
-            tick: tick.number,
-            published_ns: tick.now_ns,
-            tick_ns: tick.begin_ns,
-            period_ns: self.config.period_ns(),
-            watchdog_ns: self.config.watchdog.as_nanos() as u64,
-            state_sequence: self.state.sequence,
-            command: self.cycle.command(),
-            flags: if resting {
-                SetpointFlags::HOLD
-            } else if stopping {
-                SetpointFlags::STOPPING
-            } else {
-                0
-            },
-            valid: (1_u32 << N) - 1,
-            path_time: self.cycle.path_time(),
-            path_rate: self.cycle.path_rate(),
-            tools: self.tools,
-            ..Setpoint::default()
-        };
-        let published = &self.published;
-        put(&mut setpoint.position, &published.position);
-        put(&mut setpoint.velocity, &published.velocity);
-        put(&mut setpoint.acceleration, &published.acceleration);
-        setpoint
-    }
-}
-
-/// The numbers of the arm's joints out of a message.
-fn first<const N: usize>(all: &[f64; MAX_JOINTS]) -> SVector<f64, N> {
-    SVector::from_fn(|joint, _| all.get(joint).copied().unwrap_or(0.0))
-}
-
-/// Writes the numbers of the arm's joints into a message.
-fn put<const N: usize>(all: &mut [f64; MAX_JOINTS], joints: &SVector<f64, N>) {
-    for (to, from) in all.iter_mut().zip(joints.iter()) {
-        *to = *from;
     }
 }

@@ -1,6 +1,8 @@
 //! The real-time thread's work on a virtual clock, with an ideal driver: what happens when is
 //! exact.
 
+mod orders;
+
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
 use realtime::{Piece, Sample, Segment};
 use servo::{Control, Event, Fault, Feeder, Monitor, Remote, Runner, Tick};
@@ -435,84 +437,4 @@ fn a_clock_that_jumps_at_the_driver() {
             assert!(speed <= limits.velocity[joint], "{speed} rad/s");
         }
     }
-}
-
-/// A recovery where there is no fault is refused and leaves nothing behind: the pause after it
-/// keeps what is planned. One for a fault is used up by that fault.
-#[test]
-fn a_recovery_without_a_fault_leaves_nothing_behind() {
-    let mut bench = Bench::new();
-    (0..2).for_each(|index| assert!(feed(&mut bench.feeder, index)));
-    bench.run(400);
-    assert!(bench.remote.recover().is_err());
-    bench.remote.control(Control::Pause);
-    bench.run(1000);
-    assert!(bench.remote.measured().resting);
-    assert!(!bench.remote.measured().idle, "the plan was dropped");
-    let forgotten =
-        |event: &Event| matches!(event, Event::Aborted { .. } | Event::Recovered { .. });
-    assert!(!bench.events().iter().any(forgotten));
-    bench.remote.control(Control::Resume);
-    bench.run(8000);
-    let finished = |event: &Event| matches!(event, Event::Finished { command: 1, .. });
-    assert!(bench.events().iter().any(finished));
-}
-
-/// An order is seen in the first period after it, and what it has come to by then is told.
-#[test]
-fn an_order_acts_in_the_next_period() {
-    let mut bench = Bench::new();
-    assert!(feed(&mut bench.feeder, 0));
-    bench.run(400);
-    let steering = bench.remote.steering();
-    let orders = [
-        Control::Pause,
-        Control::Resume,
-        Control::Override(0.2),
-        Control::Stop { fast: true },
-    ];
-    for control in orders {
-        let before = bench.setpoints.last().unwrap().path_rate;
-        let order = steering.control(control);
-        assert!(!steering.progress().has(order));
-        let setpoint = bench.period(0, Some);
-        let now = steering.progress();
-        assert!(now.has(order) && now.tick == setpoint.tick);
-        assert!((now.path_rate - setpoint.path_rate).abs() < 1e-12);
-        if control != Control::Resume {
-            assert!(setpoint.path_rate < before, "{control:?} does not act");
-        }
-        bench.run(60);
-    }
-}
-
-/// A stop that comes while an abort brakes is not lost: the arm is held after the abort, and what
-/// is pushed then waits for the operator.
-#[test]
-fn a_stop_during_an_abort_holds() {
-    let mut bench = Bench::new();
-    (0..2).for_each(|index| assert!(feed(&mut bench.feeder, index)));
-    bench.run(400);
-    bench.remote.control(Control::Abort);
-    bench.run(20);
-    bench.remote.control(Control::Stop { fast: true });
-    bench.run(1000);
-    let aborted = |event: &Event| matches!(event, Event::Aborted { aborts: 1, .. });
-    assert!(bench.events().iter().any(aborted));
-    bench.feeder.renew();
-    let here = bench.remote.measured();
-    assert!(here.resting && here.idle && here.held);
-    let back = Piece::hermite(1.0, &Sample::rest(here.setpoint), &Sample::rest(home()));
-    let segment = Segment {
-        piece: back,
-        command: 5,
-        last: true,
-    };
-    bench.feeder.push(segment).unwrap();
-    bench.run(200);
-    assert_eq!(bench.remote.measured().setpoint, here.setpoint);
-    bench.remote.control(Control::Resume);
-    bench.run(1100);
-    let finished = |event: &Event| matches!(event, Event::Finished { command: 5, .. });
-    assert!(bench.events().iter().any(finished));
 }

@@ -18,7 +18,9 @@ use watch::Watch;
 /// What one stop took.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
-    /// From the call to the first slower setpoint (ms).
+    /// From the call to the first setpoint that the order has reached (ms).
+    acts_ms: f64,
+    /// From the call to the first slower setpoint (ms): later where the plan leaves no room to brake.
     effect_ms: f64,
     /// The way of the controlled point in that time (mm).
     effect_mm: f64,
@@ -111,12 +113,13 @@ fn row(burden: Burden, way: Way, taken: &[Taken]) {
         let mut values: Vec<f64> = taken.iter().map(value).collect();
         [0.5, 0.99, 1.0].map(|share| quantile(&mut values, share))
     };
+    let [a50, a99, a100] = column(|taken| taken.acts_ms);
     let [e50, e99, e100] = column(|taken| taken.effect_ms);
     let [m50, m99, m100] = column(|taken| taken.effect_mm);
     let [r50, r99, r100] = column(|taken| taken.rest_ms);
     let [d50, d99, d100] = column(|taken| taken.rest_mm);
     println!(
-        "| {burden:?} | {way:?} | {} | {e50:.2} / {e99:.2} / {e100:.2} | {m50:.2} / {m99:.2} / {m100:.2} \
+        "| {burden:?} | {way:?} | {} | {a50:.2} / {a99:.2} / {a100:.2} | {e50:.2} / {e99:.2} / {e100:.2} | {m50:.2} / {m99:.2} / {m100:.2} \
          | {r50:.0} / {r99:.0} / {r100:.0} | {d50:.1} / {d99:.1} / {d100:.1} |",
         taken.len()
     );
@@ -127,8 +130,10 @@ fn row(burden: Burden, way: Way, taken: &[Taken]) {
 fn stop_latency() {
     let count = count();
     let only = std::env::var("CANTER_BURDEN").ok();
-    println!("| burden | way | stops | to the first slower setpoint, ms | mm | to rest, ms | mm |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| burden | way | stops | the order acts, ms | first slower setpoint, ms | mm | rest, ms | mm |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for burden in Burden::ALL {
         if only
             .as_ref()

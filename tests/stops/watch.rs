@@ -20,6 +20,7 @@ struct Seen {
     sequence: u64,
     path_rate: f64,
     resting: bool,
+    stopping: bool,
     joints: [f64; 6],
 }
 
@@ -89,6 +90,7 @@ impl Watch {
         if seen[before].resting || seen[before].path_rate < 1.0 {
             return None;
         }
+        let acts = (before + 1..seen.len()).find(|at| seen[*at].stopping)?;
         let slower = (before + 1..seen.len()).find(|at| seen[*at].path_rate < 1.0)?;
         let rest = (slower..seen.len()).find(|at| seen[*at].resting)?;
         let whole = seen[before..=rest]
@@ -100,6 +102,7 @@ impl Watch {
         let ms = |at: usize| (seen[at].published_ns - called) as f64 * 1e-6;
         let way = |at: usize| self.way(&seen[before..=at]);
         Some(Taken {
+            acts_ms: ms(acts),
             effect_ms: ms(slower),
             effect_mm: way(slower),
             rest_ms: ms(rest),
@@ -131,6 +134,7 @@ fn read(arm: &Arm, list: &Mutex<Vec<Seen>>, stop: &AtomicBool) {
                 sequence: setpoint.sequence,
                 path_rate: setpoint.path_rate,
                 resting,
+                stopping: setpoint.flags & ipc::SetpointFlags::STOPPING != 0,
                 joints,
             });
         }

@@ -147,7 +147,9 @@ impl Arm {
         let mut since = None;
         while Instant::now() < end {
             self.look();
-            if self.state.driver() == DriverState::Fault {
+            // The engine may have one of its own while the driver follows it to rest.
+            let engine = self.fault(Duration::ZERO);
+            if engine || self.state.driver() == DriverState::Fault {
                 // Nobody did it.
                 self.tally.by_themselves += 1;
                 self.recover();
@@ -199,10 +201,15 @@ impl Arm {
         while Instant::now() < end {
             sleep(Duration::from_millis(100));
             self.engine.say("recover");
-            let answer = self
-                .engine
-                .line_with(&["Recovered", "NoSession"], Duration::from_secs(2));
-            if answer.is_some_and(|line| line.contains("Recovered")) {
+            let answer = self.engine.line_with(
+                &["Recovered", "NoSession", "NoFault"],
+                Duration::from_secs(2),
+            );
+            // What was said before it is old.
+            self.look();
+            let answer = answer.unwrap_or_default();
+            let none = answer.contains("NoFault") && self.state.driver() != DriverState::Fault;
+            if none || answer.contains("Recovered") {
                 self.state = State::default();
                 return;
             }
@@ -248,6 +255,11 @@ impl Arm {
         self.engine.kill();
         self.latch(&[FaultCode::Watchdog, FaultCode::Stalled], "engine killed");
         self.engine = Peer::start(&["engine", &self.name]);
+        // It opens a session by itself.
+        if self.engine.line_with(&["Started"], PATIENCE).is_none() {
+            self.broken("a new engine does not start");
+        }
+        self.look();
         self.state = State::default();
     }
 

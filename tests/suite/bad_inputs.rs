@@ -249,6 +249,16 @@ fn far_poses_are_refused_at_once() {
     }
 }
 
+/// A line that ends next to a singular pose can be followed, but not timed: the refusal says so.
+#[test]
+fn a_line_next_to_a_singular_pose_is_explained() {
+    let program = "tests/data/next_to_singular.canon";
+    let ran = canter(["check", program, "--robot", "ur5e"]);
+    assert_eq!(ran.code, 1, "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("singular pose"), "{}", ran.stdout);
+    assert!(!ran.stdout.contains("NaN"), "{}", ran.stdout);
+}
+
 /// Runs `canter` with a file as standard input; it must end by itself.
 fn ended(arguments: &[&str], input: &str) -> Ran {
     let mut child = crate::canter::command(arguments)

@@ -13,8 +13,8 @@ ROUNDING, SMALL, AT_END = 1e-3, 1e-9, 1e-6
 # target; the rest is for the motion of the target itself.
 CLOSING = 0.3, 0.2
 
-# Halvings of a share: for an end of the range, and for a target.
-COARSE, FINE = 16, 44
+# Halvings of a share for an end of the range; steps for a target, and how close is enough (rad).
+COARSE, STEPS, CLOSE = 16, 12, 1e-11
 
 
 def after(reference, time, jerk):
@@ -88,10 +88,38 @@ def mixed(low, high, share):
     return tuple(a + (b - a) * share for a, b in zip(low, high))
 
 
-def before_share(is_beyond, halvings):
+def zero_share(beyond):
+    """The share in 0..1 at which `beyond`, which grows, is zero, or the nearest to that.
+
+    The Illinois method, which needs a few steps where halving needs dozens: a period is short.
+    """
+    low, high = 0.0, 1.0
+    under, over = beyond(low), beyond(high)
+    if under >= 0:
+        return low
+    if over <= 0:
+        return high
+    side = 0
+    for _ in range(STEPS):
+        share = (low * over - high * under) / (over - under)
+        found = beyond(share)
+        if abs(found) < CLOSE:
+            return share
+        if found > 0:
+            high, over = share, found
+            under *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            low, under = share, found
+            over *= 0.5 if side < 0 else 1.0
+            side = -1
+    return low
+
+
+def before_share(is_beyond):
     """The largest share in 0..1 for which `is_beyond` is not true; from there on it stays true."""
     low, high = 0.0, 1.0
-    for _ in range(halvings):
+    for _ in range(COARSE):
         middle = (low + high) / 2
         if is_beyond(middle):
             high = middle
@@ -120,13 +148,7 @@ class Limiter:
             now = mixed(low, high, share)
             return end(tuple(a - b for a, b in zip(now, target)), closing, jerk)
 
-        if beyond(0.0) >= 0:
-            share = 0.0
-        elif beyond(1.0) <= 0:
-            share = 1.0
-        else:
-            share = before_share(lambda share: beyond(share) > 0, FINE)
-        return self.within_range(low, high, share)
+        return self.within_range(low, high, zero_share(beyond))
 
     def go_on(self, reference, period):
         """One period (s) without anything new: braking goes on, a speed is kept, and it is braked
@@ -183,11 +205,11 @@ class Limiter:
         wanted = mixed(low, high, share)
         if not self.stays_below(wanted, 0.0):
             passes = lambda part: not self.stays_below(mixed(low, high, part * share), 0.0)
-            return mixed(low, high, before_share(passes, COARSE) * share)
+            return mixed(low, high, before_share(passes) * share)
         if not self.stays_above(wanted, 0.0):
             rest = 1 - share
             passes = lambda part: not self.stays_above(mixed(low, high, 1 - part * rest), 0.0)
-            return mixed(low, high, 1 - before_share(passes, COARSE) * rest)
+            return mixed(low, high, 1 - before_share(passes) * rest)
         return wanted
 
     def most(self, v, a):

@@ -57,21 +57,23 @@ pub(super) fn end(recording: &Recording<'_>, span: &Span<'_>, motion: &Move, rep
             report.hold(Rule::Rest, Subject::Joint(joint), row.t_s, measure);
         }
     }
-    let rest = (row.rests() && !span.own.is_empty()).then_some(last);
-    let rest = rest.or(span.rest_after);
-    let (way, turn) = if rest.is_some() {
+    let (way, turn) = if row.rests() && !span.own.is_empty() {
         (0.0, 0.0)
     } else {
         let levers = arm.levers(&span.tools[1]);
         arm.spread(&levers, |joint| from_rest(arm.limits, joint, left)[0])
     };
-    let (off, turned) = off_goal(recording, span, rest.unwrap_or(last), goal);
-    let subject = Subject::The("the distance from the last pose");
-    let measure = Measure::at_most(off, ARRIVED.0 + way, "m");
-    report.hold(Rule::End, subject, row.t_s, measure);
-    let subject = Subject::The("the angle from the last pose");
-    let measure = Measure::at_most(turned, ARRIVED.1 + turn, "rad");
-    report.hold(Rule::End, subject, row.t_s, measure);
+    let at_rest = span.rest_after.map(|index| (index, 0.0, 0.0));
+    for (index, way, turn) in [Some((last, way, turn)), at_rest].into_iter().flatten() {
+        let (off, turned) = off_goal(recording, span, index, goal);
+        let time = recording.rows[index].t_s;
+        let subject = Subject::The("the distance from the last pose");
+        let measure = Measure::at_most(off, ARRIVED.0 + way, "m");
+        report.hold(Rule::End, subject, time, measure);
+        let subject = Subject::The("the angle from the last pose");
+        let measure = Measure::at_most(turned, ARRIVED.1 + turn, "rad");
+        report.hold(Rule::End, subject, time, measure);
+    }
 }
 
 /// Distance (m) and angle (rad) of the controlled point at a row from a pose.

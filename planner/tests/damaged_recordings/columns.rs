@@ -28,11 +28,15 @@ pub const KINDS: [Kind; 30] = [
     rows("q: one period late", &[Rule::Derivatives], |rows| {
         late(rows, |from, to| to.joints.clone_from(&from.joints));
     }),
-    rows("q: noise of 1e-5", &[Rule::Derivatives], |rows| {
-        for (index, row) in rows.iter_mut().enumerate() {
-            row.joints[3] += 1e-5 * ((index * 7919 % 13) as f64 - 6.0) / 6.0;
-        }
-    }),
+    rows(
+        "q: noise of 1e-5",
+        &[Rule::Derivatives, Rule::Standstill],
+        |rows| {
+            for (index, row) in rows.iter_mut().enumerate() {
+                row.joints[3] += 1e-5 * ((index * 7919 % 13) as f64 - 6.0) / 6.0;
+            }
+        },
+    ),
     rows("q: a joint stands still", &[Rule::Derivatives], |rows| {
         let first = rows[0].joints[0];
         each(rows, |row| row.joints[0] = first);
@@ -59,9 +63,13 @@ pub const KINDS: [Kind; 30] = [
             each(rows, |row| row.rates.swap(1, 2));
         },
     ),
-    rows("dq: off by 0.01 all along", &[Rule::Derivatives], |rows| {
-        each(rows, |row| row.rates[4] += 0.01);
-    }),
+    rows(
+        "dq: off by 0.01 all along",
+        &[Rule::Derivatives, Rule::Standstill],
+        |rows| {
+            each(rows, |row| row.rates[4] += 0.01);
+        },
+    ),
     rows(
         "dq: one sample beyond the limit",
         &[Rule::JointVelocity],

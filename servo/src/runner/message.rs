@@ -1,0 +1,85 @@
+//! What leaves the real-time thread in a period: the setpoint, and where the motion is.
+
+use ipc::{MAX_JOINTS, Setpoint, SetpointFlags};
+use nalgebra::SVector;
+use realtime::Demand;
+
+use super::{Runner, Tick};
+use crate::orders::Progress;
+use crate::remote::Measured;
+
+impl<const N: usize> Runner<N> {
+    pub(super) fn share_position(&self) {
+        let resting = self.cycle.is_resting();
+        let path_rate = if resting { 0.0 } else { self.cycle.path_rate() };
+        let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
+        self.shared.write(&Measured {
+            position: self.measured(),
+            velocity: first(&self.state.velocity),
+            setpoint: self.published.position,
+            path_rate,
+            resting,
+            idle,
+            faulted: self.fault.is_some(),
+            held: false,
+            tools: self.state.tools.map(|tool| tool.status),
+        });
+        self.shared.orders.tell(&Progress {
+            order: self.asked.order(),
+            tick: self.tick,
+            path_rate,
+            resting,
+            held: self.asked.holds(),
+            idle,
+            ..Progress::default()
+        });
+    }
+
+    /// The message of the period.
+    pub(super) fn setpoint(&mut self, tick: Tick) -> Setpoint {
+        self.sequence += 1;
+        let resting = self.cycle.is_resting();
+        let stopping = !resting && matches!(self.demand(), Demand::Stop(_));
+        let mut setpoint = Setpoint {
+            joints: N as u32,
+            session: self.session,
+            sequence: self.sequence,
+            tick: tick.number,
+            published_ns: tick.now_ns,
+            tick_ns: tick.begin_ns,
+            period_ns: self.config.period_ns(),
+            watchdog_ns: self.config.watchdog.as_nanos() as u64,
+            state_sequence: self.state.sequence,
+            command: self.cycle.command(),
+            flags: if resting {
+                SetpointFlags::HOLD
+            } else if stopping {
+                SetpointFlags::STOPPING
+            } else {
+                0
+            },
+            valid: (1_u32 << N) - 1,
+            path_time: self.cycle.path_time(),
+            path_rate: self.cycle.path_rate(),
+            tools: self.tools,
+            ..Setpoint::default()
+        };
+        let published = &self.published;
+        put(&mut setpoint.position, &published.position);
+        put(&mut setpoint.velocity, &published.velocity);
+        put(&mut setpoint.acceleration, &published.acceleration);
+        setpoint
+    }
+}
+
+/// The numbers of the arm's joints out of a message.
+pub(super) fn first<const N: usize>(all: &[f64; MAX_JOINTS]) -> SVector<f64, N> {
+    SVector::from_fn(|joint, _| all.get(joint).copied().unwrap_or(0.0))
+}
+
+/// Writes the numbers of the arm's joints into a message.
+fn put<const N: usize>(all: &mut [f64; MAX_JOINTS], joints: &SVector<f64, N>) {
+    for (to, from) in all.iter_mut().zip(joints.iter()) {
+        *to = *from;
+    }
+}
