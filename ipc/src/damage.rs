@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::time::Duration;
 
 use crate::room::segments;
 use crate::{Domain, IpcError};
@@ -10,10 +11,10 @@ use crate::{Domain, IpcError};
 /// The first eight bytes of a segment: version 0.9.3.
 const VERSION: u64 = 0x0009_0003;
 
-/// Looks at the first bytes of every segment of `domain`.
-///
-/// What is damaged behind them is not seen. One without them is in the making, or its maker has
-/// died: iceoryx2 deals with both.
+/// How old a segment without its first bytes may be: a younger one is in the making.
+const MAKING: Duration = Duration::from_secs(1);
+
+/// Looks at the first bytes of every segment of `domain`. What is damaged behind them is not seen.
 ///
 /// # Errors
 /// [`IpcError::Damaged`] names the first that iceoryx2 0.9.3 has not made.
@@ -32,9 +33,20 @@ pub(crate) fn look(domain: &Domain) -> Result<(), IpcError> {
 
 /// What is wrong with a segment. One that cannot be opened is on its way in or out.
 fn fault(path: &Path) -> Option<String> {
+    let mut file = File::open(path).ok()?;
+    let found = file.metadata().ok()?;
     let mut head = [0; 8];
-    File::open(path).ok()?.read_exact(&mut head).ok()?;
-    let version = u64::from_le_bytes(head);
-    (version != VERSION && version != 0)
-        .then(|| format!("it begins with {version:#018x}, iceoryx2 0.9.3 with {VERSION:#018x}"))
+    let version = match file.read_exact(&mut head) {
+        Ok(()) => u64::from_le_bytes(head),
+        Err(_) => 0,
+    };
+    // A time that is not in the past is young.
+    let age = found.modified().ok()?.elapsed().unwrap_or_default();
+    if version == VERSION || (version == 0 && age < MAKING) {
+        return None;
+    }
+    Some(format!(
+        "it has {} bytes and begins with {version:#018x}, iceoryx2 0.9.3 with {VERSION:#018x}",
+        found.len()
+    ))
 }
