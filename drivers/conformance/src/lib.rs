@@ -62,6 +62,9 @@ pub struct Report {
 /// What a clause comes to: what was seen, as good or as bad.
 type Seen = Result<String, String>;
 
+/// What [`Seen`] begins with where a driver has nothing to try the clause on.
+const NOT_TRIED: &str = "not tried: ";
+
 /// A clause and how it is tried.
 type Named<F> = (&'static str, F);
 
@@ -126,8 +129,10 @@ pub fn test_driver(arm: &Arm) -> Result<Report, IpcError> {
 /// What was seen, as a verdict.
 fn judge(name: &'static str, seen: Seen) -> Clause {
     let (verdict, seen) = match seen {
-        Ok(seen) if seen.starts_with("no ") => (Verdict::Skip, seen),
-        Ok(seen) => (Verdict::Pass, seen),
+        Ok(seen) => match seen.strip_prefix(NOT_TRIED) {
+            Some(reason) => (Verdict::Skip, reason.to_owned()),
+            None => (Verdict::Pass, seen),
+        },
         Err(seen) => (Verdict::Fail, seen),
     };
     Clause {
@@ -359,7 +364,7 @@ impl Player {
         self.hold(50);
         let status = |player: &Self| ToolStatus::from_number(player.state.tools[GRIPPER].status);
         if status(self) == Some(ToolStatus::Unknown) {
-            return Ok("no gripper".to_owned());
+            return Ok(format!("{NOT_TRIED}no gripper"));
         }
         let mut seen = String::new();
         let orders = [
@@ -434,7 +439,7 @@ impl Player {
     fn leaves_range(&mut self) -> Seen {
         let upper = self.ack.upper[0];
         if upper > 100.0 {
-            return Ok("no end of the first joint's range".to_owned());
+            return Ok(format!("{NOT_TRIED}no end of the first joint's range"));
         }
         self.spoil(|setpoint| setpoint.position[0] = upper + 0.1)
     }
@@ -450,7 +455,9 @@ impl Player {
         };
         match self.link.greet(&hello, Duration::from_secs(2)) {
             Ok(ack) => self.ack = ack,
-            Err(IpcError::Refused { reason, .. }) => return Ok(format!("no lock-step: {reason}")),
+            Err(IpcError::Refused { reason, .. }) => {
+                return Ok(format!("{NOT_TRIED}no lock-step: {reason}"));
+            }
             Err(error) => return Err(error.to_string()),
         }
         self.sequence = 0;
