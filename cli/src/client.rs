@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 
 /// After this time an asking client is caught in damaged segments; longer than all that it waits
 /// for by itself.
-const HANG: Duration = Duration::from_secs(15);
+pub(crate) const HANG: Duration = Duration::from_secs(15);
 
 /// How long a stop is waited for: a gentle one takes about a third of a second where the joints
 /// can.

@@ -1,14 +1,22 @@
 use std::io::{self, Write};
+use std::time::Duration;
 
 use clap::Args;
 use driver_conformance::{Clause, Verdict, test_driver};
-use ipc::IpcError;
+use ipc::{EngineLink, IpcError};
 use serde_json::json;
 
-use crate::client::ArmOption;
+use crate::client::{ArmOption, HANG};
+use crate::damage;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
+
+/// How long the driver may take to tell how many joints it has.
+const LOOK: Duration = Duration::from_secs(3);
+
+/// After this time the test is caught in damaged segments; a slow driver takes half of it.
+const LONGEST: Duration = Duration::from_secs(60);
 
 /// Test a running driver against the driver protocol
 ///
@@ -28,7 +36,12 @@ impl Test {
     /// Tests all clauses.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let arm = self.arm.open()?;
-        let report = test_driver(&arm).map_err(failure)?;
+        // A first look, so that damaged shared memory is told soon.
+        damage::bounded(HANG, || {
+            EngineLink::open(&arm).and_then(|link| link.joints(LOOK))
+        })
+        .map_err(failure)?;
+        let report = damage::bounded(LONGEST, || test_driver(&arm)).map_err(failure)?;
         let count = |verdict| {
             let found = |clause: &&Clause| clause.verdict == verdict;
             report.clauses.iter().filter(found).count()
