@@ -267,7 +267,7 @@ fn taylor<const N: usize>(piece: &Piece<N>, since: f64, width: f64) -> [SVector<
     let middle = since + 0.5 * width;
     for low in 0..5 {
         for k in (low..5).rev() {
-            at[k] = at[k] + at[k + 1] * middle;
+            at[k] += at[k + 1] * middle;
         }
     }
     let mut power = 1.0;
@@ -278,7 +278,7 @@ fn taylor<const N: usize>(piece: &Piece<N>, since: f64, width: f64) -> [SVector<
     // The same shift by half a width, with magnitudes.
     for low in 0..5 {
         for k in (low..5).rev() {
-            at[k] = at[k] + at[k + 1] * 0.5;
+            at[k] += at[k + 1] * 0.5;
         }
     }
     at
