@@ -192,18 +192,7 @@ where
     Q: Debug + ZeroCopySend,
     A: Debug + ZeroCopySend,
 {
-    let (service, name) = service_name(arm, kind)?;
-    node.service_builder(&name)
-        .request_response::<Q, A>()
-        .enable_safe_overflow_for_requests(true)
-        .enable_safe_overflow_for_responses(true)
-        .max_active_requests_per_client(2)
-        .max_response_buffer_size(2)
-        .max_servers(1)
-        .max_clients(8)
-        .max_nodes(16)
-        .open_or_create()
-        .map_err(|error| exchange_error(service, &error))
+    exchange_for(node, arm, kind, 8, 16)
 }
 
 /// The same as [`exchange`] for many clients: nobody shall find no place to say stop.
@@ -211,6 +200,21 @@ pub(crate) fn control_exchange<Q, A>(
     node: &Node<Shared>,
     arm: &Arm,
     kind: &str,
+) -> Result<request_response::PortFactory<Shared, Q, (), A, ()>, IpcError>
+where
+    Q: Debug + ZeroCopySend,
+    A: Debug + ZeroCopySend,
+{
+    exchange_for(node, arm, kind, 64, 80)
+}
+
+/// An exchange with one server, for so many clients in so many processes.
+fn exchange_for<Q, A>(
+    node: &Node<Shared>,
+    arm: &Arm,
+    kind: &str,
+    clients: usize,
+    nodes: usize,
 ) -> Result<request_response::PortFactory<Shared, Q, (), A, ()>, IpcError>
 where
     Q: Debug + ZeroCopySend,
@@ -224,8 +228,8 @@ where
         .max_active_requests_per_client(2)
         .max_response_buffer_size(2)
         .max_servers(1)
-        .max_clients(64)
-        .max_nodes(80)
+        .max_clients(clients)
+        .max_nodes(nodes)
         .open_or_create()
         .map_err(|error| exchange_error(service, &error))
 }
