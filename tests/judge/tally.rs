@@ -1,4 +1,4 @@
-//! Counts how often each rule was checked, and where one was broken.
+//! Which laws were judged how often, and where one was broken.
 
 use std::collections::BTreeMap;
 

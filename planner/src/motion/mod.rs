@@ -1,7 +1,7 @@
-//! Plans a certified trajectory for a self-contained move from a start at rest.
+//! From a self-contained move and a start at rest to a certified trajectory.
 //!
-//! The planner is a pure function: the same move, arm and start give the same bytes. The dry run,
-//! the real run and the benchmarks all call it.
+//! The planner is a pure function: the same move, arm and start give the same
+//! bytes. The dry run, the real run and the benchmarks call it alike.
 
 mod active;
 mod cartesian;
