@@ -35,8 +35,8 @@ pub(super) struct Audit {
 
 impl Audit {
     /// Bounds every limit over every piece.
-    pub(super) fn new<P: Path<N>, const N: usize>(
-        bounded: Bounded<'_, P, N>,
+    pub(super) fn new<const N: usize>(
+        bounded: Bounded<'_, N>,
         pieces: &Pieces<N>,
     ) -> Self {
         let joint = [
@@ -74,9 +74,9 @@ impl Audit {
     }
 
     /// Adds the ratios of the tool over one piece.
-    fn push_tool<P: Path<N>, const N: usize>(
+    fn push_tool<const N: usize>(
         &mut self,
-        path: &P,
+        path: &dyn Path<N>,
         law: &Piece<1>,
         tool: &[Option<(Limit, f64)>; 6],
     ) {
@@ -255,7 +255,7 @@ impl<const N: usize> JointBounds<N> {
 }
 
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
-fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [f64; 6] {
+fn tool_norms<const N: usize>(path: &dyn Path<N>, law: &Piece<1>, t: f64) -> [f64; 6] {
     let at = law.sample(t);
     let reparametrization = [
         at.position[0],

@@ -32,7 +32,7 @@ impl LawProblem {
     /// # Errors
     /// As [`time_path`](super::time_path).
     pub fn new<const N: usize>(
-        path: &impl Path<N>,
+        path: &dyn Path<N>,
         joint: &JointLimits<N>,
         tool: &ToolLimits,
         options: &TimingOptions,

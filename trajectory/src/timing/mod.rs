@@ -61,7 +61,7 @@ pub struct Timed<const N: usize> {
 /// [`TimingError`] when a limit or an option is not positive, when the path is not finite or has
 /// a corner, or when a moving start cannot be continued.
 pub fn time_path<const N: usize>(
-    path: &impl Path<N>,
+    path: &dyn Path<N>,
     joint: &JointLimits<N>,
     tool: &ToolLimits,
     options: &TimingOptions,
@@ -112,8 +112,8 @@ pub fn time_path<const N: usize>(
 
 /// The best law for the survey. A moving start near what is possible may need finer cells than the
 /// law of the whole does.
-fn draft<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
+fn draft<const N: usize>(
+    bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
 ) -> Result<tighten::Draft<N>, TimingError> {
     let mut options = *bounded.options;

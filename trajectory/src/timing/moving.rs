@@ -10,7 +10,7 @@ use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::problem::Problem;
 use super::tighten::{Draft, MOST_STEPS, tighten};
-use crate::{Path, TimingError};
+use crate::TimingError;
 
 /// Times that limits are narrowed.
 const NARROWINGS: usize = 60;
@@ -22,8 +22,8 @@ const ROUNDS: usize = 10;
 const ROUNDING: f64 = 1e-6;
 
 /// The fastest law found over `grid` that meets every bound as it is.
-pub(super) fn best<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
+pub(super) fn best<const N: usize>(
+    bounded: Bounded<'_, N>,
     gridpoints: &Gridpoints<'_, N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {

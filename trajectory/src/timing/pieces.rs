@@ -54,8 +54,8 @@ impl<const N: usize> State<N> {
 }
 
 /// Makes pieces out of one law.
-pub(super) struct Maker<'a, P, const N: usize> {
-    bounded: Bounded<'a, P, N>,
+pub(super) struct Maker<'a, const N: usize> {
+    bounded: Bounded<'a, N>,
     gridpoints: &'a Gridpoints<'a, N>,
     /// One over the jerk limits.
     narrow: SVector<f64, N>,
@@ -63,9 +63,9 @@ pub(super) struct Maker<'a, P, const N: usize> {
     out: Pieces<N>,
 }
 
-impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
+impl<'a, const N: usize> Maker<'a, N> {
     /// For laws over the grid of `gridpoints`.
-    pub(super) fn new(bounded: Bounded<'a, P, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
+    pub(super) fn new(bounded: Bounded<'a, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
         let count = 2 * gridpoints.grid.nodes.len();
         let out = Pieces {
             joint: Vec::with_capacity(count),

@@ -21,7 +21,7 @@ struct Rows<'a, const N: usize> {
     jerk: SVector<f64, N>,
 }
 
-impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
+impl<const N: usize> Bounded<'_, N> {
     /// The problem over the places of `gridpoints`.
     pub(super) fn problem(&self, gridpoints: &Gridpoints<'_, N>) -> Problem {
         let tool = self.tool;

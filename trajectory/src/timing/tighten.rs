@@ -32,8 +32,8 @@ pub(super) struct Draft<const N: usize> {
 
 impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
-    pub(super) fn new<P: Path<N>>(
-        bounded: Bounded<'_, P, N>,
+    pub(super) fn new(
+        bounded: Bounded<'_, N>,
         (gridpoints, problem): (&Gridpoints<'_, N>, &Problem),
         interior: &Interior,
     ) -> Self {
@@ -52,8 +52,8 @@ impl<const N: usize> Draft<N> {
 }
 
 /// The fastest law found over `grid` once it is stretched to meet every bound.
-pub(super) fn best<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
+pub(super) fn best<const N: usize>(
+    bounded: Bounded<'_, N>,
     gridpoints: &Gridpoints<'_, N>,
 ) -> Result<Draft<N>, TimingError> {
     let mut problem = bounded.problem(gridpoints);
