@@ -7,7 +7,7 @@ use system_tests::repository::root;
 use toml::{Table, Value};
 
 /// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     (
         "cli",
         &[
@@ -43,12 +43,13 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ),
     ("servo", &["realtime", "ipc", "scheduling"]),
     ("planner", &["crcl", "kinematics", "trajectory", "realtime"]),
-    ("trajectory", &["realtime"]),
+    ("trajectory", &["realtime", "simd"]),
     ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
-    ("kinematics", &[]),
+    ("kinematics", &["simd"]),
+    ("simd", &[]),
     ("realtime", &[]),
     ("ipc", &[]),
     ("scheduling", &[]),
@@ -56,9 +57,10 @@ const ARROWS: [(&str, &[&str]); 15] = [
 
 /// Crates of others that may be named by these crates of ours only. That the planner starts no
 /// thread and reads no clock is more than a manifest shows: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 8] = [
+const FENCES: [(&str, &[&str]); 9] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
+    ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
@@ -194,7 +196,7 @@ fn impurity(text: &str) -> Option<&'static str> {
 
 #[test]
 fn the_planner_is_pure() {
-    for folder in ["planner/src", "trajectory/src", "kinematics/src"] {
+    for folder in ["planner/src", "trajectory/src", "kinematics/src", "simd/src"] {
         for path in sources(folder) {
             let found = impurity(&fs::read_to_string(&path).unwrap());
             assert_eq!(found, None, "{}", path.display());

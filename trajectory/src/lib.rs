@@ -21,7 +21,6 @@ pub mod smooth;
 mod spline_path;
 pub mod timing;
 mod trajectory;
-mod wide;
 
 pub use bounds::MotionBounds;
 pub use error::TimingError;

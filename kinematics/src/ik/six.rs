@@ -12,13 +12,12 @@
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025, sections 4.1 and 4.3.
 
 use super::frames::Frames;
-use super::product::{Columns, Padded, Product, inverse, padded};
-use super::simd::Held;
+use super::product::{Columns, Product, inverse};
 use super::solving::Solving;
-use crate::arith::Arith;
+use super::subproblems::Held;
 use crate::links::{ScrewAxis, foot};
-use crate::wide::{B4, F4};
 use nalgebra::Vector3;
+use simd::{F4, Four, Frame, Mask};
 
 /// How the first three joints position the wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +47,7 @@ pub(crate) struct Six {
     pub(super) slack: f64,
     pub(super) frames: Frames,
     /// Constant left factor of the product of rotations, and the right one.
-    left: Padded,
+    left: Frame,
     right: Columns,
     /// Where joint positions are found in angles of the frames: `sign * angle + offset`.
     signs: [f64; 6],
@@ -64,9 +63,9 @@ pub(crate) struct Six {
 }
 
 /// Angles (rad) of `M` joints in two groups of four branches, and which of them exist.
-pub(crate) struct Joints<A: Arith, const M: usize> {
+pub(crate) struct Joints<A: Four, const M: usize> {
     pub(crate) angles: [[F4<A>; M]; 2],
-    pub(crate) real: [B4<A>; 2],
+    pub(crate) real: [Mask<A>; 2],
 }
 
 #[inline(always)]
@@ -118,7 +117,7 @@ impl Six {
             reversed,
             slack,
             frames,
-            left: padded(&left),
+            left: Frame::from_columns(left),
             right,
             signs,
             offsets,
@@ -146,7 +145,7 @@ impl Six {
     /// of turns already multiplied with [`Six::right`]. `hold` are joint positions (rad)
     /// for joints that a singular pose leaves free.
     #[inline(always)]
-    pub(crate) fn solve<A: Arith>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
+    pub(crate) fn solve<A: Four>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
         let mut seen = product.seen_from(&self.left);
         if self.reversed {
             seen = inverse(&seen);
@@ -169,7 +168,7 @@ impl Six {
 
     /// The same where the pose leaves a joint free.
     #[inline(always)]
-    fn held<A: Arith>(&self, a: A, seen: &Columns, hold: [f64; 6]) -> Joints<A, 6> {
+    fn held<A: Four>(&self, a: A, seen: &Columns, hold: [f64; 6]) -> Joints<A, 6> {
         let (slots, mut angles) = (self.slots(), [0.0; 7]);
         for i in 0..6 {
             angles[i] = self.signs[i] * (hold[slots[i]] - self.offsets[i]);

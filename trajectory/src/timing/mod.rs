@@ -7,6 +7,7 @@
 
 mod audit;
 mod band;
+mod block;
 mod bound;
 mod certificate;
 mod grid;
@@ -26,7 +27,7 @@ mod reach;
 mod reachability;
 mod reparametrization;
 mod rows;
-mod simd;
+
 mod state;
 mod step_length;
 mod tighten;

@@ -2,11 +2,11 @@
 
 use nalgebra::{SVector, Vector3};
 
+use super::block::{LANE, Lane};
 use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
 use super::reachability::{joint_ratio, speed_cap};
-use super::simd::{LANE, Lane};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, ToolLimits};
 

@@ -1,9 +1,9 @@
 //! Values and multipliers of the rows of a problem under a law.
 
+use super::block::{LANE, Lane, combine, dot};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
-use super::simd::{LANE, Lane, Packed, combine, dot};
-use crate::wide::{Four, Op};
+use simd::{F4, Four, Op};
 
 /// Values `g`, multipliers and their steps of a row in each cell of a block.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,9 +46,9 @@ pub(super) struct Worth {
 /// The law in each cell of a block, at one place.
 #[derive(Clone, Copy)]
 pub(super) struct Spots<S: Four> {
-    pub a: Packed<S>,
-    pub b: Packed<S>,
-    pub c: Packed<S>,
+    pub a: F4<S>,
+    pub b: F4<S>,
+    pub c: F4<S>,
 }
 
 impl<S: Four> Spots<S> {
@@ -56,25 +56,22 @@ impl<S: Four> Spots<S> {
     #[inline(always)]
     pub(super) fn left(simd: S, basis: &Basis, x: &[f64]) -> Self {
         let x: &[f64; LANE + 2] = x.first_chunk().unwrap_or(&[1.0; LANE + 2]);
-        let x0 = Packed::load(simd, &x[..LANE]);
-        let x1 = Packed::load(simd, &x[1..LANE + 1]);
-        let x2 = Packed::load(simd, &x[2..]);
-        let b = (x1 - x0) * Packed::load(simd, &basis.left);
-        let next = (x2 - x1) * Packed::load(simd, &basis.right);
-        let (first, second) = (
-            Packed::load(simd, &basis.first),
-            Packed::load(simd, &basis.second),
-        );
+        let x0 = F4::load(simd, &x[..LANE]);
+        let x1 = F4::load(simd, &x[1..LANE + 1]);
+        let x2 = F4::load(simd, &x[2..]);
+        let b = (x1 - x0) * F4::load(simd, &basis.left);
+        let next = (x2 - x1) * F4::load(simd, &basis.right);
+        let (first, second) = (F4::load(simd, &basis.first), F4::load(simd, &basis.second));
         Self {
             a: x0 * first + x1 * second,
             b,
-            c: (next - b) * Packed::load(simd, &basis.inverse),
+            c: (next - b) * F4::load(simd, &basis.inverse),
         }
     }
 
     /// `x` further on.
     #[inline(always)]
-    pub(super) fn moved(self, x: Packed<S>) -> Self {
+    pub(super) fn moved(self, x: F4<S>) -> Self {
         let gain = x * self.c;
         Self {
             a: self.a + x * (self.b + self.b + gain),
@@ -86,11 +83,11 @@ impl<S: Four> Spots<S> {
 
 /// A vector in registers.
 #[inline(always)]
-pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [Packed<S>; 3] {
+pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [F4<S>; 3] {
     [
-        Packed::load(simd, &lanes[0]),
-        Packed::load(simd, &lanes[1]),
-        Packed::load(simd, &lanes[2]),
+        F4::load(simd, &lanes[0]),
+        F4::load(simd, &lanes[1]),
+        F4::load(simd, &lanes[2]),
     ]
 }
 
@@ -126,15 +123,15 @@ impl Op for Evaluate<'_> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> Worth {
-        let zero = Packed::splat(simd, 0.0);
+        let zero = F4::splat(simd, 0.0);
         let (mut flat, mut steep, mut time) = (zero, zero, zero);
         let (mut lines, blocks) = Lines::all(self.problem, self.state);
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
-            let width = Packed::load(simd, &basis.width);
+            let width = F4::load(simd, &basis.width);
             let middle = left.moved(width * 0.5);
-            time += Packed::load(simd, &value[0][0]) / left.a.sqrt();
-            time += Packed::load(simd, &value[1][0]) / middle.a.sqrt();
+            time += F4::load(simd, &value[0][0]) / left.a.sqrt();
+            time += F4::load(simd, &value[1][0]) / middle.a.sqrt();
             let [first, second] = cap;
             flat = self::cap(&value[0][1], first, left).max(flat);
             flat = self::cap(&value[1][1], second, middle).max(flat);
@@ -155,19 +152,19 @@ impl Op for Evaluate<'_> {
 
 /// Sets the ratios to caps; returns their squares.
 #[inline(always)]
-fn cap<S: Four>(cap: &Lane, row: &mut ConstraintRow, spot: Spots<S>) -> Packed<S> {
-    let g = Packed::load(spot.a.simd(), cap) * spot.a;
+fn cap<S: Four>(cap: &Lane, row: &mut ConstraintRow, spot: Spots<S>) -> F4<S> {
+    let g = F4::load(spot.a.build(), cap) * spot.a;
     g.store(&mut row.g);
     g * g
 }
 
 /// Sets the values at a slot; returns the largest square.
 #[inline(always)]
-fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Packed<S> {
-    let simd = spot.a.simd();
-    let mut most = Packed::splat(simd, 0.0);
+fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> F4<S> {
+    let simd = spot.a.build();
+    let mut most = F4::splat(simd, 0.0);
     for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
-        let g = Packed::load(simd, p) * spot.b + Packed::load(simd, q) * spot.a;
+        let g = F4::load(simd, p) * spot.b + F4::load(simd, q) * spot.a;
         g.store(&mut row.g);
         most = (g * g).max(most);
     }
@@ -181,17 +178,13 @@ fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Packed<S> {
 
 /// Sets the values at a jerk slot; returns the largest square.
 #[inline(always)]
-fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Packed<S> {
-    let simd = spot.a.simd();
+fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> F4<S> {
+    let simd = spot.a.build();
     let root = spot.a.sqrt();
     let (a, b, c) = (root * spot.a, root * spot.b, root * spot.c);
-    let mut most = Packed::splat(simd, 0.0);
+    let mut most = F4::splat(simd, 0.0);
     for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
-        let (x, y, z) = (
-            Packed::load(simd, x),
-            Packed::load(simd, y),
-            Packed::load(simd, z),
-        );
+        let (x, y, z) = (F4::load(simd, x), F4::load(simd, y), F4::load(simd, z));
         let g = x * a + y * b + z * c;
         g.store(&mut row.g);
         most = (g * g).max(most);
@@ -207,7 +200,7 @@ fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Packed<S> {
 
 /// Writes a vector to memory.
 #[inline(always)]
-fn store<S: Four>(vector: [Packed<S>; 3], to: &mut [Lane; 3]) {
+fn store<S: Four>(vector: [F4<S>; 3], to: &mut [Lane; 3]) {
     for (lane, x) in to.iter_mut().zip(vector) {
         x.store(lane);
     }
@@ -233,15 +226,15 @@ impl Op for Multipliers<'_> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> f64 {
-        let one = Packed::splat(simd, 1.0);
-        let mut total = Packed::splat(simd, 0.0);
+        let one = F4::splat(simd, 1.0);
+        let mut total = F4::splat(simd, 0.0);
         let (state, turn) = (self.state, self.turn);
         for row in state.acceleration.iter_mut().chain(&mut state.jerk) {
-            let g = Packed::load(simd, &row.g);
+            let g = F4::load(simd, &row.g);
             total += turn.take(one - g * g, &mut row.multiplier, &row.change);
         }
         for row in state.cap.iter_mut().flatten() {
-            let g = Packed::load(simd, &row.g);
+            let g = F4::load(simd, &row.g);
             total += turn.take(one - g, &mut row.multiplier, &row.change);
         }
         for row in state
@@ -259,13 +252,11 @@ impl Op for Multipliers<'_> {
 impl Turn {
     /// Turns one multiplier; returns its product with the slack.
     #[inline(always)]
-    fn take<S: Four>(self, slack: Packed<S>, multiplier: &mut Lane, change: &Lane) -> Packed<S> {
-        let simd = slack.simd();
+    fn take<S: Four>(self, slack: F4<S>, multiplier: &mut Lane, change: &Lane) -> F4<S> {
+        let simd = slack.build();
         let new = match self {
-            Self::Balance(mu) => Packed::splat(simd, mu) / slack,
-            Self::Advance(factor) => {
-                Packed::load(simd, multiplier) + Packed::load(simd, change) * factor
-            }
+            Self::Balance(mu) => F4::splat(simd, mu) / slack,
+            Self::Advance(factor) => F4::load(simd, multiplier) + F4::load(simd, change) * factor,
         };
         new.store(multiplier);
         new * slack

@@ -2,13 +2,13 @@
 //! that are exceeded there, solves again.
 
 use super::audit::Audit;
+use super::block::{LANE, Lane};
 use super::certificate::{Limit, order};
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::pieces::{Maker, Pieces};
 use super::problem::Problem;
-use super::simd::{LANE, Lane};
 use crate::{Path, TimingError};
 
 /// Newton steps after which the best law so far is taken.
