@@ -3,7 +3,6 @@ use std::io;
 use ipc::IpcError;
 
 use crate::exit::Exit;
-use crate::output_file::Unwritable;
 use crate::printer::Printer;
 
 /// Why a command could not do its work: the exit code and the chain of causes.
@@ -81,6 +80,18 @@ impl From<IpcError> for Failure {
         Self::new(exit, error)
     }
 }
+
+/// A named file that cannot be written: no mistake of ours.
+#[derive(Debug)]
+pub(crate) struct Unwritable(pub(crate) String);
+
+impl std::fmt::Display for Unwritable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Unwritable {}
 
 #[cfg(test)]
 mod tests {

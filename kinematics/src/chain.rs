@@ -1,7 +1,7 @@
 //! A serial arm as flat data: forward kinematics, Jacobian, limits.
 
 use crate::links::{Links, Reached, ScrewAxis};
-use crate::urdf::{JointKind, Model};
+use crate::urdf::{JointKind, Model, UrdfError};
 use nalgebra::{ArrayStorage, Isometry3, Point3, SMatrix, SVector, Vector3};
 use simd::{Build, F4, Four, Op, Plain, transposed};
 
@@ -43,9 +43,22 @@ pub struct Chain<const N: usize> {
     build: Build,
 }
 
+impl Model {
+    /// The arm as flat data for `N` joints.
+    ///
+    /// # Errors
+    /// [`UrdfError::JointCount`] when the arm does not have `N` joints.
+    pub fn chain<const N: usize>(&self) -> Result<Chain<N>, UrdfError> {
+        Chain::new(self).ok_or(UrdfError::JointCount {
+            found: self.joints.len(),
+            expected: N,
+        })
+    }
+}
+
 impl<const N: usize> Chain<N> {
     /// `None` when the model does not have `N` joints.
-    pub(crate) fn new(model: &Model) -> Option<Self> {
+    fn new(model: &Model) -> Option<Self> {
         if model.joints.len() != N || model.frames.len() != N || model.axes.len() != N || N == 0 {
             return None;
         }

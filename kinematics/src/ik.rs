@@ -16,7 +16,7 @@ mod swivel;
 mod turns;
 
 pub use goal::Goal;
-pub(crate) use goal::{LENGTH, PoseError};
+pub(crate) use goal::PoseError;
 pub(crate) use numeric::restart;
 pub use report::{Branches, IkFailure, IkReport, MOST_BRANCHES, Solution};
 use simd::Frame;
@@ -378,13 +378,17 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         raw: &mut Raw<N>,
     ) {
-        self.chain.build().run(Branching {
+        let Some(compute) = (const { closed::branching::<N>() }) else {
+            return;
+        };
+        let branching = Branching {
             closed,
             pose,
             parameter,
             seed,
             raw,
-        });
+        };
+        compute(self.chain.build(), branching);
     }
 
     fn branches_at(

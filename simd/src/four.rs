@@ -207,4 +207,4 @@ macro_rules! lane_by_lane {
 
 lane_by_lane!(Plain, |x, y, z| x * y + z);
 #[cfg(not(target_arch = "x86_64"))]
-lane_by_lane!(crate::Fused, |x, y, z| x.mul_add(y, z));
+pub(crate) use lane_by_lane;

@@ -1,6 +1,5 @@
 //! The SIMD build.
 
-#[cfg(target_arch = "x86_64")]
 use crate::four::Four;
 
 /// Fused multiply-add and SIMD registers, with the proof that the processor has them.
@@ -12,6 +11,9 @@ pub struct Fused(pub(crate) pulp::x86::V3);
 #[cfg(not(target_arch = "x86_64"))]
 #[derive(Clone, Copy, Debug)]
 pub struct Fused(pub(crate) ());
+
+#[cfg(not(target_arch = "x86_64"))]
+crate::four::lane_by_lane!(Fused, |x, y, z| x.mul_add(y, z));
 
 #[cfg(target_arch = "x86_64")]
 impl Four for Fused {

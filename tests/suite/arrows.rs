@@ -196,7 +196,12 @@ fn impurity(text: &str) -> Option<&'static str> {
 
 #[test]
 fn the_planner_is_pure() {
-    for folder in ["planner/src", "trajectory/src", "kinematics/src", "simd/src"] {
+    for folder in [
+        "planner/src",
+        "trajectory/src",
+        "kinematics/src",
+        "simd/src",
+    ] {
         for path in sources(folder) {
             let found = impurity(&fs::read_to_string(&path).unwrap());
             assert_eq!(found, None, "{}", path.display());

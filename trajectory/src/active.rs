@@ -1,6 +1,6 @@
 //! Which limit is active at which time.
 
-use crate::timing::{ActiveSpan, Limit};
+use crate::limit::{ActiveSpan, Limit};
 
 /// Collects the stretches over which limits are used to a share or more.
 #[derive(Clone, Debug)]

@@ -13,10 +13,11 @@ mod error;
 mod extrema;
 mod hermite_path;
 mod joint_line;
+mod limit;
 mod limits;
 mod line;
 mod path;
-
+mod poly;
 pub mod smooth;
 mod spline_path;
 pub mod timing;

@@ -6,7 +6,7 @@ use super::six::Joints;
 use super::turns::Range;
 use crate::chain::Chain;
 use nalgebra::{Isometry3, SVector};
-use simd::{F4, Four, Mask, Op};
+use simd::{Build, F4, Four, Mask, Op};
 
 /// The closed form of one arm.
 #[derive(Clone, Copy, Debug)]
@@ -134,6 +134,21 @@ impl Closed {
             Form::Swivel(swivel) => swivel.of(&std::array::from_fn(|i| q[i.min(N - 1)])),
         }
     }
+}
+
+/// How the branches of an arm of `N` joints are computed. A constant: only arms with six or seven
+/// joints have closed forms, and others do not carry their code.
+pub(crate) const fn branching<const N: usize>() -> Option<fn(Build, Branching<'_, N>)> {
+    if N == 6 || N == 7 {
+        Some(compute::<N>)
+    } else {
+        None
+    }
+}
+
+#[inline]
+fn compute<const N: usize>(build: Build, branching: Branching<'_, N>) {
+    build.run(branching);
 }
 
 /// All branches of one pose, compiled for both builds.

@@ -1,10 +1,8 @@
 //! Goals of inverse kinematics, and the distance of the tool from them.
 
+use crate::measure::LENGTH;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use simd::{F4, Four, Frame, V4};
-
-/// Length that counts as much as one radian, m.
-pub(crate) const LENGTH: f64 = 0.3;
 
 /// The goal of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,7 +33,7 @@ pub(crate) struct SolverResult<const N: usize> {
     pub(crate) reached: bool,
 }
 
-/// Largest step of a joint, rad (or m divided by [`super::goal::LENGTH`]).
+/// Largest step of a joint, rad (or m divided by [`crate::measure::LENGTH`]).
 const LONGEST_STEP: f64 = 1.2;
 /// How often joints are held at their limits before a step is taken.
 const HELD: u32 = 3;

@@ -1,7 +1,7 @@
 //! The computation of one closed form of six joints: four branches at once, in the frames of the
 //! arm.
 
-use super::product::Columns;
+use super::product::{Columns, Product, inverse};
 use super::six::{Joints, Placing, Shape, Six, dot};
 use super::subproblems::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
 use simd::{F4, Four, Mask};
@@ -17,17 +17,57 @@ const FREE: f64 = 1e-50;
 const NEAR_ONE: f64 = 1e-8;
 
 /// The state of one computation.
-pub(super) struct Solving<'a, A: Four> {
+struct Solving<'a, A: Four> {
     a: A,
     six: &'a Six,
     hold: Option<&'a [Held; 7]>,
     /// Where every joint is determined.
-    pub(super) sure: Mask<A>,
+    sure: Mask<A>,
+}
+
+impl Six {
+    /// All branches, as angles of the six joints in the order of the frames, of a product
+    /// of turns already multiplied with [`Six::right`]. `hold` are joint positions (rad)
+    /// for joints that a singular pose leaves free.
+    #[inline(always)]
+    pub(crate) fn solve<A: Four>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
+        let mut seen = product.seen_from(&self.left);
+        if self.reversed {
+            seen = inverse(&seen);
+        }
+        let a = product.build();
+        let mut quick = Solving::new(a, self, None);
+        let mut found = quick.solve(&seen);
+        let real = found.real[0].bits() | found.real[1].bits();
+        if real & !quick.sure.bits() != 0 {
+            found = self.held(a, &seen, hold);
+        }
+        for group in &mut found.angles {
+            for i in 0..6 {
+                let sign = F4::splat(a, self.signs[i]);
+                group[i] = group[i].fma(sign, F4::splat(a, self.offsets[i]));
+            }
+        }
+        found
+    }
+
+    /// The same where the pose leaves a joint free.
+    #[inline(always)]
+    fn held<A: Four>(&self, a: A, seen: &Columns, hold: [f64; 6]) -> Joints<A, 6> {
+        let (slots, mut angles) = (self.slots(), [0.0; 7]);
+        for i in 0..6 {
+            angles[i] = self.signs[i] * (hold[slots[i]] - self.offsets[i]);
+        }
+        // The seventh is the sum of the turns about parallel axes.
+        angles[6] = angles[1] + angles[2] + angles[3];
+        let held = Held::all(a, angles);
+        Solving::new(a, self, Some(&held)).solve(seen)
+    }
 }
 
 impl<'a, A: Four> Solving<'a, A> {
     #[inline(always)]
-    pub(super) fn new(a: A, six: &'a Six, hold: Option<&'a [Held; 7]>) -> Self {
+    fn new(a: A, six: &'a Six, hold: Option<&'a [Held; 7]>) -> Self {
         let zero = F4::splat(a, 0.0);
         let sure = zero.le(zero);
         Self { a, six, hold, sure }
@@ -45,7 +85,7 @@ impl<'a, A: Four> Solving<'a, A> {
 
     /// All branches of a product of rotations, expressed in the frames.
     #[inline(always)]
-    pub(super) fn solve(&mut self, seen: &Columns) -> Joints<A, 6> {
+    fn solve(&mut self, seen: &Columns) -> Joints<A, 6> {
         match self.six.shape {
             Shape::Wrist(_, Placing::Parallel) => self.wrist_on_parallels(seen),
             Shape::Wrist(_, Placing::Meeting(_)) => self.wrist_on_meeting(seen),

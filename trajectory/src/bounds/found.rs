@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul};
 
-use crate::smooth::poly::halve;
+use crate::poly::halve;
 
 /// A bound that is so near to a value that is reached is good enough.
 pub(super) const TOLERANCE: f64 = 1e-3;

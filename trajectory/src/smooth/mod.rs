@@ -19,12 +19,12 @@ mod exact_stop;
 mod lower_bound;
 mod options;
 mod plan;
-pub(crate) mod poly;
 mod ramp;
 mod span;
 mod spline;
 mod windows;
 
+use crate::poly;
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use crossing::{Crossing, RESOLUTION};

@@ -4,12 +4,12 @@ use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
 use super::bound::bound;
-use super::certificate::{ActiveSpan, Limit, LimitPeak, order, root};
 use super::grid::Bounded;
 use super::gridpoints::ToolGridpoint;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
+use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
 use crate::{Path, ToolLimits};
 use simd::Build;
 

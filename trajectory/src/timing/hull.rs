@@ -81,7 +81,7 @@ impl<const N: usize> Hull<N> {
         at: usize,
         points: [F4<S>; M],
     ) {
-        let simd = points[0].simd();
+        let simd = points[0].build();
         let narrow = F4::some(simd, narrow.as_slice(), at);
         let ends = points[0].abs().max(points[M - 1].abs());
         let mut most = ends;

@@ -9,9 +9,10 @@
 //! part of its curvature, which is the convex inner approximation by its tangent.
 
 use super::band::{self, Band};
+use super::evaluate::{Evaluate, Multipliers, Turn, Worth};
 use super::newton_system::AssembleNewton;
 use super::problem::Problem;
-use super::state::{Evaluate, Multipliers, State, Turn, Worth};
+use super::state::State;
 use super::step_length::{Measure, StepLength};
 use simd::Build;
 

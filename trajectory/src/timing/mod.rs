@@ -10,6 +10,7 @@ mod band;
 mod block;
 mod bound;
 mod certificate;
+mod evaluate;
 mod grid;
 mod gridpoints;
 mod hull;
@@ -27,13 +28,14 @@ mod reach;
 mod reachability;
 mod reparametrization;
 mod rows;
+mod search;
 
 mod state;
 mod step_length;
 mod tighten;
 
-pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
-pub(crate) use certificate::{order as limit_order, root as limit_root};
+pub use crate::limit::{ActiveSpan, Limit, LimitPeak};
+pub use certificate::TimeCertificate;
 pub use law::{Law, LawProblem};
 pub use least::least_time;
 pub use options::{Boundary, TimingOptions};
@@ -126,7 +128,7 @@ fn draft<const N: usize>(
             bounded.path.end(),
             &options,
         );
-        match tighten::best(bounded, &Gridpoints::new(bounded, &grid)) {
+        match search::best(bounded, &Gridpoints::new(bounded, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

@@ -2,9 +2,10 @@
 
 use super::band::Band;
 use super::block::{LANE, Lane, dot};
+use super::evaluate::{Spots, vector};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
-use super::state::{ConstraintRow, Norm, Spots, State, vector};
+use super::state::{ConstraintRow, Norm, State};
 use simd::{F4, Four, Op};
 
 /// Gradient and curvature at a place, over `a`, `b`, `c` there.
@@ -312,8 +313,8 @@ fn scatter(entries: &[Lane; 9], first: usize, matrix: &mut [[f64; 3]], step: &mu
 
 #[cfg(test)]
 mod tests {
+    use super::super::evaluate::{Evaluate, Multipliers, Turn};
     use super::super::law::swaying;
-    use super::super::state::{Evaluate, Multipliers, Turn};
     use super::*;
     use simd::Build;
 

@@ -7,7 +7,6 @@ use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints};
 use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
-use crate::Path;
 use simd::Build;
 
 /// Jerk of a piece may differ from that of the law by this share of the limit.

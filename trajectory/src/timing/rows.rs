@@ -8,7 +8,7 @@ use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
 use super::reachability::{joint_ratio, speed_cap};
 use super::{Boundary, TimingOptions};
-use crate::{JointLimits, Path, ToolLimits};
+use crate::{JointLimits, ToolLimits};
 
 /// Limits as factors: what rows are multiplied by.
 struct Rows<'a, const N: usize> {

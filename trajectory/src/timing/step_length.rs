@@ -1,9 +1,10 @@
 //! How far a Newton step may go.
 
 use super::block::{LANE, Lane, combine, dot};
+use super::evaluate::{Spots, vector};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::Problem;
-use super::state::{ConstraintRow, Norm, Spots, State, vector};
+use super::state::{ConstraintRow, Norm, State};
 use simd::{F4, Four, Op};
 
 /// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
