@@ -22,12 +22,12 @@ pub enum Fault {
     DriverFault {
         /// Why.
         code: FaultCode,
-        /// Which joint, from 0, where it is about one.
+        /// Which joint, from 0, if the fault is about one.
         joint: Option<u32>,
     },
     /// A state that makes no sense.
     BadState(MessageError),
-    /// The real-time thread was kept from running for longer than the watchdog.
+    /// The real-time thread did not run for longer than the watchdog.
     Stalled {
         /// How long (ms).
         late_ms: u64,
@@ -86,7 +86,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What happened, and in which period since the start.
+/// An event, and its period since the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A command starts to move, or a tool order goes out.
@@ -108,14 +108,14 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
-    /// What was queued is forgotten; the arm rests.
+    /// The queue was dropped; the arm rests.
     Aborted {
-        /// How many aborts were asked for by then: what was given after the last of them counts.
+        /// Number of aborts asked for until then: commands given after the last of them stay.
         aborts: u32,
         /// The period.
         tick: u64,
     },
-    /// Something went wrong; the arm is being stopped.
+    /// A fault; the arm is being stopped.
     Faulted {
         /// What.
         fault: Fault,

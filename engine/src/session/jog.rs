@@ -11,7 +11,7 @@ use thiserror::Error;
 pub enum JogSpace {
     /// One share a joint, root first.
     Joint,
-    /// Along x, y, z and about x, y, z of the controlled point's own axes.
+    /// Along and about the x, y and z axes of the controlled point.
     Tool,
 }
 
@@ -20,17 +20,17 @@ pub enum JogSpace {
 pub struct Jog {
     /// What the shares are about.
     pub space: JogSpace,
-    /// Shares of the largest speeds, -1..=1; all 0 stops.
+    /// Fractions of the largest speeds, -1..=1; all 0 stops.
     pub speeds: Vec<f64>,
     /// The arm stops when no further request comes for this long.
     pub timeout: Duration,
 }
 
-/// Why a request to move by hand is refused.
+/// Why a jog is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum JogError {
-    /// Not as many shares as there are axes, or one that is not within -1 to 1.
+    /// The number of speeds is not the number of axes, or one is not within -1 to 1.
     #[error("a jog has {wanted} shares of speed from -1 to 1, got {got}")]
     Speeds {
         /// How many axes there are.
@@ -55,7 +55,7 @@ pub enum JogError {
     Closed,
 }
 
-/// The direction that a request means; `None` where it asks for rest.
+/// The direction of a request; `None` if it asks for rest.
 pub(super) fn direction<const N: usize>(jog: &Jog) -> Result<Option<Direction<N>>, JogError> {
     let wanted = match jog.space {
         JogSpace::Joint => N,

@@ -14,7 +14,7 @@ pub enum Blame {
     Driver,
 }
 
-/// One thing that happened, in the order of the commands.
+/// One event, in the order of the commands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -73,7 +73,7 @@ pub enum Note {
         /// How many commands were dropped.
         dropped: usize,
     },
-    /// Something went wrong; the arm is stopped until the operator recovers.
+    /// A fault; the arm is stopped until the operator recovers.
     Faulted {
         /// Who is to blame.
         blame: Blame,

@@ -39,8 +39,7 @@ pub struct Status {
     pub orientation_wxyz: [f64; 4],
     /// Settings in force, SI.
     pub settings: Option<Settings>,
-    /// Moves that the session has planned itself; those of a program that came planned are not
-    /// among them.
+    /// Number of moves that the session planned itself; moves that came with a plan do not count.
     pub plans: u64,
     /// Servo periods.
     pub cycles: Cycles,
