@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 /// How a command of `canter` ends, as its process exit code.
 ///
-/// The numbers are a contract with scripts and never change their meaning.
+/// Scripts rely on the numbers: their meaning never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Exit {

@@ -27,7 +27,7 @@ pub(crate) struct Call {
 pub(crate) enum State {
     /// As it should be.
     Sound,
-    /// A fault was reported, but what is meant is clear enough to look for more.
+    /// An error was reported, but the meaning is clear enough to continue.
     Mended,
     /// Beyond use.
     Broken,

@@ -13,7 +13,7 @@ pub enum Task {
         /// Reason given by the program.
         reason: i64,
     },
-    /// A setting was taken over; nothing happens in the world.
+    /// A setting was applied; nothing moves.
     Setting,
     /// Show a text on the operator console.
     Message {

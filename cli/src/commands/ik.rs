@@ -47,7 +47,8 @@ impl Ik {
     }
 }
 
-/// A row as a pose; the quaternion may be a little off unit length, as printed numbers are.
+/// A row as a pose; the length of the quaternion may differ from one by rounding of printed
+/// numbers.
 fn pose(row: &CsvRow) -> anyhow::Result<Isometry3<f64>> {
     let line = row.line;
     let [x, y, z, w, i, j, k] = row.numbers.as_slice() else {

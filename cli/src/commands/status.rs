@@ -19,7 +19,7 @@ const WATCH: Duration = Duration::from_millis(250);
 pub(crate) struct Status {
     #[command(flatten)]
     arm: ArmOption,
-    /// Go on showing it until Ctrl-C or the end of the engine
+    /// Show it continuously until Ctrl-C or the end of the engine
     #[arg(long)]
     watch: bool,
     /// Print JSON; with --watch one object a line

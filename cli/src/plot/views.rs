@@ -5,7 +5,7 @@ use super::svg::{Anchor, Svg};
 use super::{Drawing, PlotRow};
 
 const GAP: f64 = 30.0;
-/// Room for the marks of the axes, left of and below each view.
+/// Space for the marks of the axes, left of and below each view.
 const LEFT: f64 = 48.0;
 const BELOW: f64 = 40.0;
 const LEGEND: f64 = 24.0;
@@ -151,7 +151,7 @@ fn millimetres(meters: f64) -> String {
     }
 }
 
-/// The way in pieces of one colour each, by speed.
+/// The path in pieces of one colour each, by speed.
 fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
     let peak = peak_speed(&drawing.rows);
     let at = |row: &PlotRow| {
@@ -170,7 +170,7 @@ fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
             piece.push(at(&pair[0]));
             piece_shade = shade;
         }
-        // Points nearer than a fifth of a pixel (the arm waits) add nothing to see.
+        // Points nearer than a fifth of a pixel (the arm waits) make no visible difference.
         let next = at(&pair[1]);
         let apart = piece
             .last()

@@ -201,7 +201,7 @@ impl Context<'_> {
         }
     }
 
-    /// A coordinate or angle, in the units of the workstation as plans see it.
+    /// A coordinate or angle, in the units of the workstation.
     fn component(&self, values: &[f64; 3], property: &str) -> Option<Value> {
         let (metres, radians) = (self.model.units.metres()?, self.model.units.radians()?);
         Some(Value::Number(match property {

@@ -32,12 +32,12 @@ pub enum FactotumStatus {
     Failed(String),
 }
 
-/// The agent that replaces, removes and refills. The controller commits what it did.
+/// The agent that replaces, removes and refills. The controller commits its changes.
 pub trait Factotum {
     /// Does an errand.
     ///
     /// # Errors
-    /// A text that says why it could not; then nothing has changed.
+    /// The reason why it failed; then nothing has changed.
     fn perform(
         &mut self,
         model: &Model,
@@ -55,13 +55,13 @@ pub trait Factotum {
     fn status(&self) -> FactotumStatus;
 }
 
-/// Things to bring, one for each requirement, as they were before the plan started.
+/// Objects to bring, one supply per requirement, as they were before the plan started.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stock {
     supplies: BTreeMap<String, Vec<Item>>,
 }
 
-/// An object of a supply; the first of a list is the supply itself, and says where it stands.
+/// An object of a supply; the first of a list is the supply itself, with its location.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Item {
     stem: String,
@@ -145,7 +145,8 @@ fn copy(model: &Model, root: ObjectId) -> Vec<Item> {
     members.iter().filter_map(item).collect()
 }
 
-/// A factotum that does its errands at once, out of a stock that never ends unless limited.
+/// A simulated factotum: it executes requests at once, from an unlimited stock unless limits are
+/// set.
 #[derive(Clone, Debug)]
 pub struct SimulatedFactotum {
     /// What it brings.

@@ -68,7 +68,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Interprets the next statement. The world is not changed; the step says how it will be.
+    /// Interprets the next statement. The world is not changed; the step contains its changes.
     pub(crate) fn step(&self, state: &State, chooser: &mut dyn Chooser) -> Result<Step> {
         let mut next = state.clone();
         let Some(node) = self.next_leaf(&mut next, chooser)? else {

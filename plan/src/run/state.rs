@@ -88,7 +88,7 @@ pub struct Counters {
     pub gained_s: f64,
 }
 
-/// Where a plan is: program counter, variables, counters.
+/// The state of a plan: program counter, variables, counters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     pub(crate) stack: Vec<Frame>,

@@ -27,7 +27,7 @@ pub enum Change {
         /// The value.
         value: Scalar,
     },
-    /// The end of the arm rests at this pose (m) in the frame of the workstation. The end effector
-    /// on it is placed by a change of its own ([`super::Model::arm_changes`]).
+    /// The end of the arm rests at this pose (m) in the frame of the workstation. A separate change
+    /// places the end effector on it ([`super::Model::arm_changes`]).
     Arm(Isometry3<f64>),
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A joint jumps between two pieces, or from where the arm stands.
+    /// A joint position jumps between two pieces, or from the start.
     #[error("piece {piece} begins {jump:.1e} from where the arm is")]
     Position {
         /// The piece that begins elsewhere.

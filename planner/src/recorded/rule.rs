@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-/// A rule that a recorded motion is held against.
+/// A rule that a recorded motion is checked against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Rule {
@@ -106,8 +106,8 @@ impl Rule {
         self.words().1
     }
 
-    /// Whether it is a limit of joint or tool motion, so that the ratio to it tells how much of it
-    /// was used.
+    /// Whether it is a limit of joint or tool motion, with a ratio that tells how much of it was
+    /// used.
     pub(super) fn is_limit(self) -> bool {
         matches!(
             self,

@@ -36,7 +36,7 @@ pub struct CommandVerdict {
     /// For a straight move: largest distance from the line, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub straightness_m: Option<f64>,
-    /// Largest ratio to a limit of joint or tool that the samples prove, and of what.
+    /// Largest ratio to a limit of joint or tool that the samples prove, and which limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak: Option<(f64, String)>,
     /// What is wrong, in words; empty if nothing is.

@@ -15,14 +15,14 @@ use clap::{Args, Subcommand};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// How long a driver goes on when the process that started it is gone: enough for its watchdog to
-/// stop the arm.
+/// How long a driver continues when the process that started it has ended: enough for its watchdog
+/// to stop the arm.
 const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Drivers: run one, or test one
 ///
-/// A driver is the process that moves an arm: it takes setpoints from shared memory and gives
-/// measured states back.
+/// A driver is the process that moves an arm: it reads setpoints from shared memory and publishes
+/// measured states.
 #[derive(Args, Debug)]
 pub(crate) struct Driver {
     #[command(subcommand)]
