@@ -10,7 +10,7 @@ pub(crate) enum Exit {
     Done = 0,
     /// The program has findings, or a command of it was refused before any motion.
     Refused = 1,
-    /// The arguments make no sense.
+    /// The arguments are wrong.
     Usage = 2,
     /// A file cannot be read, parsed or written, or a robot cannot be loaded.
     Unreadable = 3,

@@ -63,7 +63,7 @@ pub(crate) enum DriverChoice {
 /// What happens when a command cannot be executed.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum OnRefusal {
-    /// Stop and forget the rest of the program.
+    /// Stop and drop the rest of the program.
     Abort,
     /// The command has no effect; continue with the next.
     Skip,

@@ -120,7 +120,7 @@ impl Printer {
     }
 }
 
-/// Log lines go the same way.
+/// Log lines are printed in the same way.
 impl Write for Printer {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.err.push(bytes.to_vec());
@@ -263,6 +263,6 @@ fn word_about(dropped: u64, json: bool) -> String {
     if json {
         format!("{{\"event\":\"dropped\",\"lines\":{dropped}}}\n")
     } else {
-        format!("dropped  {dropped} lines that nobody read\n")
+        format!("dropped  {dropped} lines that were not read\n")
     }
 }

@@ -84,7 +84,7 @@ impl Refused<'_> {
                 finding
                     .expected("`InitCanon ()` or the end of the program")
                     .found(format!("`{name}`"))
-                    .help("move EndCanon to the end, or begin anew with `InitCanon ()`")
+                    .help("move EndCanon to the end, or start again with `InitCanon ()`")
                     .note(end, "the program ends here")
             }
         }
@@ -203,7 +203,7 @@ fn no_move(located: &Located, quantity: &str, set: &Located) -> Finding {
         )
 }
 
-/// Follows tool changer and gripper as far as the program itself tells their states.
+/// Follows tool changer and gripper as far as the program determines their states.
 fn tools(commands: &[Located]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let (mut released, mut closed): (Option<&Located>, Option<&Located>) = (None, None);

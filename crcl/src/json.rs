@@ -506,7 +506,7 @@ fn find<'a>(fields: &[Field<'a>], name: &str) -> Option<&'a RawValue> {
         .map(|field| field.value)
 }
 
-/// A JSON value in words, for "what came".
+/// A description of a JSON value, for "found".
 fn describe(raw: &RawValue) -> String {
     let written = raw.get();
     match written.chars().next() {

@@ -36,7 +36,7 @@ pub enum Verb {
         /// As fast as the joints can, instead of gently.
         fast: bool,
     },
-    /// Stop on the path and forget what is queued.
+    /// Stop on the path and drop the queue.
     Abort,
     /// Clear a latched fault and open a new session with the driver.
     Recover,

@@ -47,7 +47,7 @@ pub struct Setpoint {
     pub watchdog_ns: u64,
     /// Sequence of the last state that the engine received.
     pub state_sequence: u64,
-    /// Index of the canonical command under way.
+    /// Index of the current canonical command.
     pub command: u32,
     /// Bits of [`SetpointFlags`].
     pub flags: u32,

@@ -58,7 +58,7 @@ pub enum FaultCode {
     None = 0,
     /// No setpoint within the watchdog time.
     Watchdog = 1,
-    /// A setpoint that makes no sense.
+    /// An invalid setpoint.
     BadSetpoint = 2,
     /// A setpoint is too far from the last one, or beyond the joint's range, speed or acceleration.
     OutOfRange = 3,
@@ -91,7 +91,7 @@ impl FaultCode {
         }
     }
 
-    /// What happened, in words.
+    /// What happened, as text.
     pub const fn reason(self) -> &'static str {
         match self {
             Self::None => "no fault",
@@ -115,7 +115,7 @@ pub struct State {
     pub protocol: u32,
     /// Number of joints.
     pub joints: u32,
-    /// The session under way; 0 without one.
+    /// The current session; 0 if there is none.
     pub session: u64,
     /// Counts the states of a driver process, from 1.
     pub sequence: u64,

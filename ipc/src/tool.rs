@@ -36,7 +36,7 @@ pub enum ToolStatus {
     Open = 1,
     /// Closed, at rest.
     Closed = 2,
-    /// On its way.
+    /// Moving.
     Moving = 3,
     /// The last order failed.
     Failed = 4,

@@ -45,7 +45,7 @@ pub enum FailurePolicy {
     /// Stop, drop what waits, accept only InitCanon.
     #[default]
     Abort,
-    /// The command has no effect; go on with the next.
+    /// The command has no effect; continue with the next.
     Skip,
     /// Stop and keep the waiting commands until the operator decides.
     Hold,

@@ -14,7 +14,7 @@ const LOOK: f64 = 0.01;
 /// travel.
 const DIP: f64 = 0.02;
 
-/// Most parts that a straight way is made in.
+/// Largest number of parts of a straight path.
 const MOST_PARTS: usize = 8;
 
 /// A command as it is executed, and how.

@@ -25,7 +25,7 @@ pub enum Fault {
         /// Which joint, from 0, if the fault is about one.
         joint: Option<u32>,
     },
-    /// A state that makes no sense.
+    /// An invalid state.
     BadState(MessageError),
     /// The real-time thread did not run for longer than the watchdog.
     Stalled {
@@ -66,7 +66,7 @@ impl fmt::Display for Fault {
                 write!(f, "driver fault at joint {}: {}", joint + 1, code.reason())
             }
             Self::DriverFault { code, joint: None } => write!(f, "driver fault: {}", code.reason()),
-            Self::BadState(cause) => write!(f, "a state of the driver makes no sense: {cause}"),
+            Self::BadState(cause) => write!(f, "invalid state of the driver: {cause}"),
             Self::Stalled { late_ms } => write!(f, "the real-time thread was {late_ms} ms late"),
             Self::Tool { tool, timeout } => {
                 let name = if *tool == ipc::GRIPPER {
@@ -139,7 +139,7 @@ pub enum Event {
 pub struct Recorded<const N: usize> {
     /// The period since the start.
     pub tick: u64,
-    /// The command under way, or the last one.
+    /// The current command, or the last one.
     pub command: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,

@@ -23,7 +23,7 @@ use message::first;
 /// Number of planned segments in the cycle's buffer.
 const AT_HAND: usize = 512;
 
-/// Items on their way from the planner.
+/// Items from the planner.
 const RING: usize = 4096;
 
 /// Events and samples that wait for their reader.
@@ -48,7 +48,7 @@ pub struct Tick {
     pub skipped: u64,
 }
 
-/// A tool order under way.
+/// The current tool order.
 #[derive(Clone, Copy, Debug)]
 struct Working {
     order: ToolOrder,
@@ -177,7 +177,7 @@ impl<const N: usize> Runner<N> {
         self.latch(fault);
     }
 
-    /// The session under way.
+    /// The current session.
     pub(super) fn session(&self) -> u64 {
         self.session
     }

@@ -51,7 +51,7 @@ pub struct SegmentSender<const N: usize> {
 }
 
 impl<const N: usize> SegmentSender<N> {
-    /// Hands over a planned segment.
+    /// Sends a planned segment.
     ///
     /// # Errors
     /// [`Full`] when there is no room now.
@@ -59,7 +59,7 @@ impl<const N: usize> SegmentSender<N> {
         self.hand_over(Work::Motion(segment))
     }
 
-    /// Hands over a tool order.
+    /// Sends a tool order.
     ///
     /// # Errors
     /// [`Full`] when there is no room now.

@@ -223,7 +223,7 @@ impl<const N: usize> Loop<'_, N> {
     }
 
     /// Stops virtual time as long as the runner allows it; returns the newest state, or `None` when
-    /// the driver is gone.
+    /// the driver has ended.
     fn stand(&mut self, mut state: State, last: &mut Setpoint) -> Option<State> {
         let mut since = Instant::now();
         let mut turns = 0_u32;
@@ -256,7 +256,7 @@ impl<const N: usize> Loop<'_, N> {
         Some(state)
     }
 
-    /// The driver of a lock-step session is gone: the motion comes to rest in virtual time.
+    /// The driver of a lock-step session has ended: the motion comes to rest in virtual time.
     fn stop_alone(&mut self, period: u64) {
         for _ in 0..100_000 {
             if self.runner.may_leave() {

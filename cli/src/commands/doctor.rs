@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::host_options::rate;
 use crate::output;
 
-/// How long a look at the segments may take.
+/// How long reading the segments may take.
 const PROBE: Duration = Duration::from_secs(10);
 
 /// Check what the servo loop needs of this machine, and say how to correct problems

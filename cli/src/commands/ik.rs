@@ -124,7 +124,7 @@ fn errors<const N: usize>(
     [apart.norm(), reached.rotation.angle_to(&pose.rotation)]
 }
 
-/// The answer on its way to standard output.
+/// Writes the results to standard output.
 struct Sheet {
     out: BufWriter<io::StdoutLock<'static>>,
     statuses: BTreeMap<&'static str, usize>,

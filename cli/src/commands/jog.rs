@@ -11,7 +11,7 @@ use crate::client::{self, ArmOption};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// How often the engine is told to go on.
+/// Time between two requests to the engine.
 const AGAIN: Duration = Duration::from_millis(50);
 
 /// How long the engine may take to answer.

@@ -201,7 +201,7 @@ fn table(robot: &Robot, mobility: &Mobility) -> io::Result<()> {
     end_effectors(&mut out, robot)
 }
 
-/// One line a joint.
+/// One line per joint.
 fn joint_table(out: &mut impl Write, robot: &Robot) -> io::Result<()> {
     let joints = &robot.joints;
     writeln!(

@@ -125,7 +125,7 @@ impl Run {
     }
 }
 
-/// A program on its way.
+/// A program that is running.
 struct Running {
     json: bool,
     host: Host,

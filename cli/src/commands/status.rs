@@ -22,7 +22,7 @@ pub(crate) struct Status {
     /// Show it continuously until Ctrl-C or the end of the engine
     #[arg(long)]
     watch: bool,
-    /// Print JSON; with --watch one object a line
+    /// Print JSON; with --watch one object per line
     #[arg(long)]
     json: bool,
 }

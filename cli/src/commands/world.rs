@@ -146,7 +146,7 @@ fn tell_run(world: &Path) -> Result<Exit, Failure> {
             writeln!(out, "; failed: {reason} (EndCanon({code}))")?;
         }
         (Some(_), _) => writeln!(out, "; ended")?,
-        (None, Some(step)) => writeln!(out, "; not ended, {step} was under way")?,
+        (None, Some(step)) => writeln!(out, "; not ended, {step} was not finished")?,
         (None, None) => writeln!(out, "; not ended")?,
     }
     Ok(Exit::Done)

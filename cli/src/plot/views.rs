@@ -9,7 +9,7 @@ const GAP: f64 = 30.0;
 const LEFT: f64 = 48.0;
 const BELOW: f64 = 40.0;
 const LEGEND: f64 = 24.0;
-/// Colours of the way from rest to full speed.
+/// Colours of the path from rest to full speed.
 const SPEEDS: [&str; 8] = [
     "#3b4cc0", "#4a6fdc", "#2c93d1", "#14a89b", "#4fb05a", "#b3a82a", "#e58a1f", "#d7301f",
 ];
@@ -226,7 +226,7 @@ fn targets(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
     }
 }
 
-/// What the colours of the way mean.
+/// The legend of the colours.
 fn speed_legend(svg: &mut Svg, drawing: &Drawing, [x, y]: [f64; 2], width: f64) {
     let peak = peak_speed(&drawing.rows);
     let label = format!("{:.0} mm/s", peak * 1e3);

@@ -122,17 +122,17 @@ impl<R: Robot> Driver<R> {
         self.missed_ever
     }
 
-    /// The clock of the session under way.
+    /// The clock of the current session.
     pub fn clock(&self) -> Option<Clock> {
         self.session.as_ref().map(|session| session.clock)
     }
 
-    /// The period of the session under way (ns).
+    /// The period of the current session (ns).
     pub fn period_ns(&self) -> Option<u64> {
         self.session.as_ref().map(|session| session.period_ns)
     }
 
-    /// The watchdog of the session under way (ns).
+    /// The watchdog of the current session (ns).
     pub fn watchdog_ns(&self) -> Option<u64> {
         self.session.as_ref().map(|session| session.watchdog_ns)
     }

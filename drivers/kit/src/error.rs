@@ -24,7 +24,7 @@ pub enum DriverError {
         /// Number of joints.
         joints: usize,
     },
-    /// An option is not a number that makes sense.
+    /// An option has an invalid value.
     #[error("{option} must be {wanted}, got {value}")]
     Value {
         /// The option.

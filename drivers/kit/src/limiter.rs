@@ -8,10 +8,10 @@
 //! A setpoint that continues the last reference within the limits is used as it is, bit for bit.
 //!
 //! # Source
-//! Own derivation. The share is chosen so that the joint, braked as fast as allowed, would stop at
-//! the target: the switching surface of a third-order time-optimal law, as in R. Zanasi, C. Guarino
-//! Lo Bianco, A. Tonielli, "Nonlinear filters for the generation of smooth trajectories",
-//! Automatica 36(3), 2000.
+//! Own derivation. The share is chosen so that the distance to the target, with its rate of change
+//! braked as fast as allowed, ends at zero: the switching surface of a third-order time-optimal
+//! law, as in R. Zanasi, C. Guarino Lo Bianco, A. Tonielli, "Nonlinear filters for the generation
+//! of smooth trajectories", Automatica 36(3), 2000.
 
 use crate::{Ramp, Reference};
 
@@ -54,7 +54,8 @@ impl Limiter {
         let acceleration =
             (self.acceleration - target.acceleration.abs()).max(CLOSING[1] * self.acceleration);
         let closing = [acceleration, CLOSING[0] * self.jerk];
-        // How far beyond the target the joint would stop if it braked now.
+        // The distance beyond the target at which its rate of change, braked from now on, reaches
+        // zero.
         let beyond = |share: f64| {
             let distance = low.mixed(&high, share).beyond(target);
             Ramp::new(&distance, 0.0, closing).end(&distance)

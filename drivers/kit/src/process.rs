@@ -259,7 +259,7 @@ fn wait_for_setpoint<R: Robot>(
     }
 }
 
-/// The engine of a lock-step session is gone: the arm stops in virtual time.
+/// The engine of a lock-step session has ended: the arm stops in virtual time.
 fn give_up<R: Robot>(link: &DriverLink, driver: &mut Driver<R>) {
     let (Some(period), Some(watchdog)) = (driver.period_ns(), driver.watchdog_ns()) else {
         return;

@@ -68,7 +68,7 @@ impl Ramp {
             .position
     }
 
-    /// The highest position on the way (rad).
+    /// The highest position of the motion (rad).
     pub(crate) fn top(&self, from: &Reference) -> f64 {
         let (mut at, mut top) = (*from, from.position);
         for (duration, jerk) in self.phases {

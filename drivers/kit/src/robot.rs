@@ -106,7 +106,7 @@ pub trait Robot {
     /// What the robot is like; asked once.
     fn about(&self) -> About;
 
-    /// How the joints are now, one entry a joint.
+    /// The present state of the joints, one entry per joint.
     fn measure(&mut self, joints: &mut [Measured]);
 
     /// Follow this for `period` (s), one entry per joint.

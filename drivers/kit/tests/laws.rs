@@ -135,7 +135,7 @@ impl Pair {
         setpoint
     }
 
-    /// A period of the engine: its plan goes on.
+    /// A period of the engine: its plan continues.
     fn engine(&mut self) {
         self.now += PERIOD;
         self.planned += PERIOD;

@@ -27,7 +27,7 @@ pub enum Health {
 /// One check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Check {
-    /// What was looked at.
+    /// What was checked.
     pub name: &'static str,
     /// How it is.
     pub health: Health,
@@ -53,7 +53,7 @@ impl Check {
     }
 }
 
-/// What to look at.
+/// What to check.
 #[derive(Clone, Debug)]
 pub struct DoctorOptions {
     /// The domain whose segments are checked, and in which the round trip is measured.

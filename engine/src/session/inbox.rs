@@ -109,7 +109,7 @@ impl Inbox {
         self.closed = true;
     }
 
-    /// Whether a command waits or is under way.
+    /// Whether a command waits or is being executed.
     pub(super) fn is_busy(&self) -> bool {
         self.flying > 0 || !self.queue.is_empty()
     }

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// What the shares of a jog are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogSpace {
-    /// One share a joint, root first.
+    /// One fraction per joint, root first.
     Joint,
     /// Along and about the x, y and z axes of the controlled point.
     Tool,
@@ -31,23 +31,23 @@ pub struct Jog {
 #[non_exhaustive]
 pub enum JogError {
     /// The number of speeds is not the number of axes, or one is not within -1 to 1.
-    #[error("a jog has {wanted} shares of speed from -1 to 1, got {got}")]
+    #[error("a jog has {wanted} speeds from -1 to 1, got {got}")]
     Speeds {
         /// How many axes there are.
         wanted: usize,
         /// What was given.
         got: String,
     },
-    /// A program is under way or waits.
-    #[error("a program is under way; canter abort ends it")]
+    /// A program is running or waiting.
+    #[error("a program is running; canter abort ends it")]
     Program,
     /// A pause or stop is in force.
-    #[error("the arm is held; canter resume lets it go")]
+    #[error("the arm is held; canter resume releases it")]
     Held,
     /// A fault is latched.
     #[error("a fault is latched ({0}); canter recover clears it")]
     Fault(String),
-    /// There is no way in that direction.
+    /// The arm cannot move in that direction.
     #[error("{0}")]
     Motion(String),
     /// The session is over.

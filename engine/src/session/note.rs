@@ -10,7 +10,7 @@ use planner::command_error::CommandError;
 pub enum Blame {
     /// A limit of a joint, or the guard of the cycle.
     Guard,
-    /// The driver, a tool, or the way to them.
+    /// The driver, a tool, or the communication with them.
     Driver,
 }
 

@@ -17,7 +17,7 @@ pub struct Status {
     pub driver: String,
     /// `unready`, `ready` or `ended`.
     pub state: &'static str,
-    /// Name of the command under way, if any.
+    /// Name of the current command, if any.
     pub command: Option<&'static str>,
     /// Commands that wait.
     pub queued: usize,

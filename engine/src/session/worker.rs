@@ -69,7 +69,7 @@ pub(super) struct Worker<'a, const N: usize> {
     steering: Steering,
     /// How many aborts were carried out: commands of another epoch wait or are dropped.
     epoch: u32,
-    /// Aborts of jogs that are under way.
+    /// Aborts of jogs that are not finished yet.
     pub(super) jog_aborts: u32,
     /// The chain in use, for computing the controlled point in other threads.
     seen: Arc<Mutex<Chain<N>>>,
@@ -78,7 +78,7 @@ pub(super) struct Worker<'a, const N: usize> {
     jogging: Option<Jogging>,
     /// Chains of the last reported commands, for recorded samples.
     chains: VecDeque<(u32, Chain<N>)>,
-    /// Number of the newest order when a refusal held the arm; a later `Resume` lets it go.
+    /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
     closing: bool,
@@ -231,7 +231,7 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Whether commands wait or are under way.
+    /// Whether commands wait or are being executed.
     pub(super) fn has_program(&self) -> bool {
         !self.flight.is_empty() || !self.ends.shared.inbox().is_empty()
     }
@@ -334,7 +334,7 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Hands over what fits into the ring; says whether all of it did.
+    /// Sends what fits into the ring; returns whether all of it did.
     fn feed(&mut self) -> bool {
         while let Some(work) = self.work.front() {
             let taken = match work {
@@ -388,7 +388,7 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     pub(super) fn say(&self, note: Note) {
-        // Nobody has to listen.
+        // The receiver may have been dropped.
         let _ = self.ends.notes.send(note);
     }
 }

@@ -13,12 +13,12 @@ use crate::run::{
 };
 use crate::world::{Change, Class, Model, StoredRun, Writer};
 
-/// A run of a plan: a new one, or one that goes on.
+/// A run of a plan: a new one, or one that is resumed.
 #[derive(Clone, Debug)]
 pub struct PulledRun {
     file: String,
     source: String,
-    /// Its number in the database, when it goes on.
+    /// Its number in the database, if it is resumed.
     id: Option<i64>,
     state: State,
 }
@@ -192,7 +192,7 @@ fn failed(code: i64, reason: String) -> Outcome {
 /// How a run ended.
 enum End {
     Over(Outcome),
-    /// The operator stopped it; it can go on.
+    /// The operator stopped it; it can be resumed.
     Interrupted(String),
 }
 

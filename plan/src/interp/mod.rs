@@ -23,7 +23,7 @@ use crate::world::Change;
 pub enum Code {
     /// All is well.
     Ok = 0,
-    /// There are no more steps; EndCanon(0) was given. Only from `execute`.
+    /// There are no more steps; EndCanon(0) was sent. Only from `execute`.
     EndOfPlan = 1,
     /// `init` was not called, or `exit` was.
     NotInitialised = 2,

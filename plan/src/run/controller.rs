@@ -21,7 +21,7 @@ use crate::PlanError;
 use crate::kitting::read;
 use crate::world::{Change, Model, Reader, StoredRun, Writer};
 
-/// What to do when a motion or an errand fails.
+/// What to do when a motion or a request to the factotum fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
     /// End the plan with EndCanon and a positive reason.
@@ -75,7 +75,7 @@ pub struct Controller<'a> {
     left: Option<(&'static str, i64, String)>,
 }
 
-/// What a motion or an errand did.
+/// Result of a motion or a request to the factotum.
 #[derive(Default)]
 struct Done {
     changes: Vec<Change>,

@@ -393,7 +393,7 @@ impl Context<'_> {
     }
 }
 
-/// Whether an object of the world meets a requirement, looked for at `place`.
+/// Whether an object of the world meets a requirement at `place`.
 ///
 /// The class, the stock keeping unit, the contents (the given number of the given kind, and nothing
 /// of another kind), the place, and all conditions must fit.

@@ -26,15 +26,15 @@ pub struct Delivery {
 /// What the factotum says about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FactotumStatus {
-    /// Ready, after this many errands.
+    /// Ready, after this many requests.
     Ready(usize),
-    /// The last errand failed.
+    /// The last request failed.
     Failed(String),
 }
 
 /// The agent that replaces, removes and refills. The controller commits its changes.
 pub trait Factotum {
-    /// Does an errand.
+    /// Executes a request.
     ///
     /// # Errors
     /// The reason why it failed; then nothing has changed.
@@ -45,7 +45,7 @@ pub trait Factotum {
         request: &Request,
     ) -> Result<Delivery, String>;
 
-    /// What an errand would do, without doing it.
+    /// The changes that a request would make, without making them.
     ///
     /// # Errors
     /// As [`Factotum::perform`].
@@ -151,7 +151,7 @@ fn copy(model: &Model, root: ObjectId) -> Vec<Item> {
 pub struct SimulatedFactotum {
     /// What it brings.
     pub stock: Stock,
-    /// How long an errand takes (s).
+    /// How long a request takes (s).
     pub seconds: f64,
     /// How often it still brings the supply of a requirement; without an entry, always.
     pub limits: BTreeMap<String, usize>,
@@ -160,7 +160,7 @@ pub struct SimulatedFactotum {
 }
 
 impl SimulatedFactotum {
-    /// A factotum with this stock, 5 s an errand.
+    /// A factotum with this stock, 5 s per request.
     #[must_use]
     pub fn new(stock: Stock) -> Self {
         Self {

@@ -63,7 +63,7 @@ pub(crate) struct Foresight<'a> {
 
 struct Search<'p> {
     program: &'p Program,
-    /// What goes on after the list.
+    /// The continuation after the list.
     rest: Vec<Frame>,
     list: &'p [usize],
     pairs: &'p [(usize, usize)],

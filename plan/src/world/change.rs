@@ -9,7 +9,7 @@ use super::{Location, Object, ObjectId, Scalar};
 pub enum Change {
     /// A new object; its number must be fresh ([`super::Model::fresh`]).
     Create(Object),
-    /// The object is gone. Objects located relative to it must be gone or moved before.
+    /// The object is removed. Objects located relative to it must be removed or moved before.
     Delete(ObjectId),
     /// The object is somewhere else.
     Place {

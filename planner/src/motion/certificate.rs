@@ -33,11 +33,11 @@ pub struct CrossingReport {
 /// above the largest value. 0 if there is no limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peaks {
-    /// Joint velocity, one a joint.
+    /// Joint velocity, one per joint.
     pub joint_velocity: Vec<f64>,
-    /// Joint acceleration, one a joint.
+    /// Joint acceleration, one per joint.
     pub joint_acceleration: Vec<f64>,
-    /// Joint jerk, one a joint.
+    /// Joint jerk, one per joint.
     pub joint_jerk: Vec<f64>,
     /// Speed of the controlled point.
     pub tool_speed: f64,

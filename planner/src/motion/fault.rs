@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Fault {
     /// A joint position jumps between two pieces, or from the start.
-    #[error("piece {piece} begins {jump:.1e} from where the arm is")]
+    #[error("piece {piece} begins {jump:.1e} away from the position of the arm")]
     Position {
         /// The piece that begins elsewhere.
         piece: usize,

@@ -1,5 +1,5 @@
-//! Moves by hand: as far as the arm can go in a direction, at a share of its speed. Whoever jogs
-//! ends the move before its end; so jogging has the same limits, path and guard as any move.
+//! Jogging: a move in one direction, as far as the arm can go, at a fraction of its speed. It is
+//! stopped before its end, so jogging has the same limits, path and guard as any move.
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use trajectory::ToolLimits;

@@ -1,7 +1,7 @@
-//! From a self-contained move and a start at rest to a certified trajectory.
+//! Plans a certified trajectory for a self-contained move from a start at rest.
 //!
-//! The planner is a pure function: the same move, arm and start give the same
-//! bytes. The dry run, the real run and the benchmarks call it alike.
+//! The planner is a pure function: the same move, arm and start give the same bytes. The dry run,
+//! the real run and the benchmarks all call it.
 
 mod active;
 mod cartesian;
@@ -47,11 +47,11 @@ pub struct PlannedMove<const N: usize> {
     pub certificate: MoveCertificate,
     /// Joints at the end, at rest.
     pub end: SVector<f64, N>,
-    /// For a smooth move: how its way was found.
+    /// For a smooth move: how its path was planned.
     pub blend: Option<Blend>,
 }
 
-/// How the way of a smooth move was found.
+/// How the path of a smooth move was planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
     /// Radius of the balls it was planned for, m: at most that of the command.

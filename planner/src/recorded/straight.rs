@@ -154,7 +154,7 @@ impl Line {
     }
 }
 
-/// Rotation vector of a turn, the shorter way, rad.
+/// Rotation vector of a rotation, the shorter way, rad.
 fn turn_of(turn: &UnitQuaternion<f64>) -> Vector3<f64> {
     let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
     let vector = turn.imag() * sign;

@@ -263,7 +263,7 @@ impl Files<'_> {
         if values.get_ref().len() == dof {
             return Ok(());
         }
-        let expected = format!("{dof} numbers, one a joint");
+        let expected = format!("{dof} numbers, one per joint");
         Err(self.value(values.span(), key, &expected))
     }
 

@@ -73,7 +73,7 @@ fn defaults(model: &Model) -> String {
         r#"description = {name}
 tip_link = {tip}
 
-# One value a joint, root first; rad for turning joints, m for sliding ones.
+# One value per joint, root first; rad for turning joints, m for sliding ones.
 # What the URDF gives goes before what stands here.
 [joints]
 source = "canter default"

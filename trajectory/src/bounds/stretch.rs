@@ -201,7 +201,7 @@ fn ends(stretch: &Stretch, q: usize) -> f64 {
         .max(stretch.control[q][4].norm())
 }
 
-/// Ratios below this are not told from zero.
+/// Ratios below this count as zero.
 const FLOOR: f64 = 1e-6;
 
 /// The intervals of a motion, and the bound of each finite limit of the tool.

@@ -68,7 +68,7 @@ struct Search {
     high: Option<f64>,
     /// Least distance of the approach, and its time.
     lowest: (f64, (usize, f64)),
-    /// The span at hand and its start.
+    /// The current span and its start.
     place: (usize, f64),
 }
 

@@ -56,8 +56,8 @@ fn asked_to_end(until_end_of_input: bool) -> Result<Arc<AtomicBool>, Failure> {
     Ok(stop)
 }
 
-/// Sets `stop` when standard input brings a byte, or a while after it ended because the starter
-/// is gone.
+/// Sets `stop` when standard input brings a byte, or some time after it ended because the starter
+/// has ended.
 fn end_with_input(stop: Arc<AtomicBool>) {
     thread::spawn(move || {
         if io::stdin().read_exact(&mut [0]).is_err() {

@@ -144,7 +144,7 @@ impl Folder {
         fs::File::open("/dev/urandom")?.read_exact(&mut noise)?;
         let name = format!("canter-mujoco-{:016x}", u64::from_ne_bytes(noise));
         let path = std::env::temp_dir().join(name);
-        // Fails where the name exists, whoever made it.
+        // Fails if the name exists.
         let made = DirBuilder::new().mode(0o700).create(&path);
         made.with_context(|| format!("cannot make {}", path.display()))?;
         let folder = Self(path);

@@ -36,7 +36,7 @@ impl Test {
     /// Tests all clauses.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let arm = self.arm.open()?;
-        // A first look, so that damaged shared memory is told soon.
+        // A first check, so that damaged shared memory is reported soon.
         damage::bounded(HANG, || {
             EngineLink::open(&arm).and_then(|link| link.joints(LOOK))
         })

@@ -15,7 +15,7 @@ const COMMAND: u32 = u32::MAX;
 /// The dead man's switch: least and most time without a request.
 const TIMEOUT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
 
-/// A jog under way.
+/// The current jog.
 #[derive(Clone, Debug)]
 pub(super) struct Jogging {
     request: Jog,
@@ -32,7 +32,7 @@ enum Phase {
     Waiting,
     /// On its way.
     Moving,
-    /// On its way to a stop.
+    /// It is stopping.
     Ending,
     /// The arm cannot move further; it rests until the switch is released.
     Stuck,

@@ -294,8 +294,7 @@ impl Task<'_> {
         result
     }
 
-    /// Control orientations that follow the progress of the control points
-    /// along the way.
+    /// Control orientations that follow the progress of the control points along the path.
     fn following<const D: usize>(
         &self,
         problem: &Problem<D>,

@@ -256,7 +256,7 @@ pub(crate) struct Way {
     inverse: f64,
 }
 
-/// The point of the way nearest to a given one.
+/// The point of the path nearest to a given one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Foot {
     /// Offset of the given point from it.
