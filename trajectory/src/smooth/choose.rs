@@ -234,7 +234,7 @@ fn narrow(options: &mut SmoothOptions, certificate: &Certificate, passes: &[Pass
 }
 
 /// Slows a motion down by a factor; its way stays.
-fn stretch(spans: &mut [Span], factor: f64) {
+pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
     for span in spans {
         span.start *= factor;
         span.duration *= factor;

@@ -15,6 +15,7 @@
 mod approach;
 mod certificate;
 mod choose;
+mod dense;
 mod exact_stop;
 mod lower_bound;
 mod options;
@@ -25,6 +26,8 @@ mod ramp;
 mod span;
 mod spline;
 mod windows;
+#[doc(hidden)]
+pub fn dense_lab(poses:&[nalgebra::Isometry3<f64>], options:&SmoothOptions)->Option<(f64,bool,usize,Certificate)>{let o=options.finite();let m=dense::plan(poses,&o)?;let (c,_)=certificate::certify(&m.spans,poses,&o);Some((m.duration(),c.holds(),m.spans.len(),c))}
 
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};

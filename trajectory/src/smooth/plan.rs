@@ -20,6 +20,8 @@ pub enum Method {
     ExactStop,
     /// The time-optimal spline.
     Spline,
+    /// A curve fitted through the balls of a dense list, and its fastest time law.
+    Fit,
 }
 
 /// A certified motion through a list of poses, as a curve of time.
