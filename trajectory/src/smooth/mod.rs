@@ -15,24 +15,22 @@
 mod approach;
 mod certificate;
 mod choose;
+mod crossing;
 mod dense;
 mod exact_stop;
 mod lower_bound;
 mod options;
-mod pass;
 mod plan;
 pub(crate) mod poly;
 mod ramp;
 mod span;
 mod spline;
 mod windows;
-#[doc(hidden)]
-pub fn dense_lab(poses:&[nalgebra::Isometry3<f64>], options:&SmoothOptions)->Option<(f64,bool,usize,Certificate)>{let o=options.finite();let m=dense::plan(poses,&o)?;let (c,_)=certificate::certify(&m.spans,poses,&o);Some((m.duration(),c.holds(),m.spans.len(),c))}
 
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
+pub use crossing::{Crossing, RESOLUTION};
 pub use lower_bound::least_time;
 pub use options::{SmoothError, SmoothOptions, angular_tolerance};
-pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};
 pub use windows::Windows;

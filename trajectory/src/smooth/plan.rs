@@ -2,11 +2,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::certificate::Certificate;
+use super::certificate::{Certificate, certify};
 use super::choose::Motion;
+use super::crossing::Crossing;
+use super::lower_bound::lower_bound;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::Pass;
 use super::span::Span;
+use super::{dense, exact_stop};
 use super::windows::Windows;
 use crate::{ToolCurve, ToolPoint};
 
@@ -34,7 +36,7 @@ pub struct SmoothPlan {
     start: Isometry3<f64>,
     goal: Isometry3<f64>,
     spans: Vec<Span>,
-    passes: Vec<Pass>,
+    crossings: Vec<Crossing>,
     certificate: Certificate,
     parts: Vec<(Method, usize)>,
     exact_stop: f64,
@@ -45,7 +47,7 @@ impl SmoothPlan {
     pub(crate) fn new(
         poses: &[Isometry3<f64>],
         motion: Motion,
-        (certificate, passes): (Certificate, Vec<Pass>),
+        (certificate, crossings): (Certificate, Vec<Crossing>),
         exact_stop: f64,
     ) -> Self {
         let (start, goal) = (poses[0], poses[poses.len() - 1]);
@@ -53,7 +55,7 @@ impl SmoothPlan {
             start,
             goal,
             spans: motion.spans,
-            passes,
+            crossings,
             certificate,
             parts: motion.parts,
             exact_stop,
@@ -68,8 +70,8 @@ impl SmoothPlan {
 
     /// How each intermediate pose is passed, in order.
     #[must_use]
-    pub fn passes(&self) -> &[Pass] {
-        &self.passes
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.crossings
     }
 
     /// What holds for every moment of the motion.
@@ -81,11 +83,15 @@ impl SmoothPlan {
     /// How the motion was made: the time-optimal spline, when every part was.
     #[must_use]
     pub fn method(&self) -> Method {
-        let stops = self.parts.iter().find(|part| part.0 != Method::Spline);
-        match (self.parts.is_empty(), stops) {
-            (true, _) => Method::Still,
-            (false, Some(stop)) => stop.0,
-            (false, None) => Method::Spline,
+        let made = |method| self.parts.iter().any(|part| part.0 == method);
+        if self.parts.is_empty() {
+            Method::Still
+        } else if made(Method::ExactStop) {
+            Method::ExactStop
+        } else if made(Method::Fit) {
+            Method::Fit
+        } else {
+            Method::Spline
         }
     }
 
@@ -96,9 +102,9 @@ impl SmoothPlan {
         let stops = self
             .parts
             .iter()
-            .filter(|part| part.0 != Method::Spline)
+            .filter(|part| part.0 == Method::ExactStop)
             .count();
-        if self.passes.is_empty() { 0 } else { stops }
+        if self.crossings.is_empty() { 0 } else { stops }
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -161,11 +167,41 @@ impl ToolCurve for SmoothPlan {
 /// let poses = corner.map(|[x, y]| Isometry3::translation(x, y, 0.0));
 /// let plan = smooth::plan(&poses, &smooth::SmoothOptions::new(0.001, limits))?;
 /// assert!(plan.certificate().holds());
-/// assert!(plan.passes()[0].deviation <= 0.001);
+/// assert!(plan.crossings()[0].deviation <= 0.001);
 /// assert!(plan.duration() <= plan.exact_stop());
 /// # Ok::<(), smooth::SmoothError>(())
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
+    options.check(poses)?;
+    match fitted(poses, &options.finite()) {
+        Some(fitted) if poses.len() > BOTH => Ok(fitted),
+        Some(fitted) => {
+            let plan = by_spline(poses, options)?;
+            let better = fitted.duration() < plan.duration();
+            Ok(if better { fitted } else { plan })
+        }
+        None => by_spline(poses, options),
+    }
+}
+
+/// Dense lists up to this length are planned in both ways.
+const BOTH: usize = 64;
+
+/// The certified motion along a fitted curve, where the list is dense in poses.
+fn fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<SmoothPlan> {
+    let motion = dense::plan(poses, options)?;
+    let exact_stop = exact_stop::duration(poses, &options.limits);
+    let mut whole = certify(&motion.spans, poses, options);
+    whole.0.lower_bound = lower_bound(poses, options);
+    let good = whole.0.holds() && motion.duration() <= exact_stop;
+    good.then(|| SmoothPlan::new(poses, motion, whole, exact_stop))
+}
+
+/// The motion by time-optimal splines, window by window.
+fn by_spline(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> Result<SmoothPlan, SmoothError> {
     let plan = Windows::new(poses, options)?.finish();
     // What keeps half of the tolerance keeps all of it. A second motion costs
     // little where poses are close to each other and fit in one window.
@@ -208,7 +244,7 @@ mod tests {
             plan.certificate().holds(),
             "{:?} {:?}",
             plan.certificate(),
-            plan.passes()
+            plan.crossings()
         );
         assert!(plan.duration() <= plan.exact_stop());
         plan

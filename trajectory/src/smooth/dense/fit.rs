@@ -65,14 +65,14 @@ pub(super) struct Fit<const D: usize> {
 
 impl<const D: usize> Fit<D> {
     /// The curve through balls around `points`, passed about at `parameters`, from the first point
-    /// to the last exactly; `None` when some ball cannot be kept. `radii` are shares of the
-    /// tolerance.
+    /// to the last exactly, or the point that is missed most when some ball cannot be kept.
+    /// `radii` are shares of the tolerance.
     pub(super) fn new(
         points: &[SVector<f64, D>],
         parameters: &[f64],
         radii: &[f64],
-    ) -> Option<Self> {
-        let spans = parameters.last()?.round() as usize;
+    ) -> Result<Self, usize> {
+        let spans = parameters.last().map_or(1, |end| end.round().max(1.0) as usize);
         let (targets, given) = targets(points, parameters, radii);
         let mut fitting = Fitting {
             fit: Self {
@@ -87,7 +87,10 @@ impl<const D: usize> Fit<D> {
         let found = fitting.run();
         let Fitting { mut fit, targets, .. } = fitting;
         fit.parameters = given.iter().map(|i| targets[*i].at).collect();
-        found.then_some(fit)
+        match found {
+            Ok(()) => Ok(fit),
+            Err(target) => Err(given.partition_point(|i| *i < target)),
+        }
     }
 
     /// Number of knot intervals.
@@ -170,22 +173,24 @@ struct Fitting<const D: usize> {
 }
 
 impl<const D: usize> Fitting<D> {
-    /// Fits until every ball holds; false when that cannot be reached.
-    fn run(&mut self) -> bool {
+    /// Fits until every ball holds; else the target that is missed most.
+    fn run(&mut self) -> Result<(), usize> {
+        let mut missed = self.targets.len() / 2;
         for round in 0..ROUNDS + MORE {
             if !self.solve() {
-                return false;
+                return Err(missed);
             }
             if round % MOVED == MOVED - 1 && round < ROUNDS {
                 self.reproject();
             }
-            let worst = self.reweigh(round < ROUNDS);
+            let (worst, target) = self.reweigh(round < ROUNDS);
             if round >= ROUNDS && worst <= 1.0 {
                 self.meet_ends();
-                return true;
+                return Ok(());
             }
+            missed = target;
         }
-        false
+        Err(missed)
     }
 
     /// Solves the least-squares problem for the present weights.
@@ -256,17 +261,20 @@ impl<const D: usize> Fitting<D> {
         }
     }
 
-    /// Changes the weights by the errors; the largest error over the radius of its ball.
+    /// Changes the weights by the errors; the largest error over the radius of its ball, and its
+    /// target.
     ///
     /// Neighbours change alike: a curve held at single places would bend there.
-    fn reweigh(&mut self, fall: bool) -> f64 {
+    fn reweigh(&mut self, fall: bool) -> (f64, usize) {
         let count = self.levels.len();
-        let (last, mut worst) = (self.targets.len() - 1, 0.0_f64);
+        let (last, mut worst) = (self.targets.len() - 1, (0.0_f64, 0));
         let mut errors = vec![0.0_f64; count];
-        for target in &self.targets[1..last] {
+        for (i, target) in self.targets[..last].iter().enumerate().skip(1) {
             let (span, x) = self.fit.locate(target.at);
             let error = size(&(self.fit.sum(span, basis::value(x)) - target.point)) / target.radius;
-            worst = if error <= worst { worst } else { error };
+            if error.is_nan() || error > worst.0 {
+                worst = (error, i);
+            }
             for slot in &mut errors[span..span + 2] {
                 *slot = slot.max(error);
             }

@@ -13,14 +13,14 @@ const FEWEST: f64 = 8.0;
 
 /// A map from the parameter of a curve to one that runs about like the time of its law.
 #[derive(Clone, Debug)]
-pub(super) struct Pace {
+pub(super) struct TimeParameter {
     /// Values of the curve's parameter, ascending.
     from: Vec<f64>,
     /// The new parameter there.
     to: Vec<f64>,
 }
 
-impl Pace {
+impl TimeParameter {
     /// From a curve and its law, averaged over `ramp` (s), with `spacing` (s) from one unit to the
     /// next. From either end, where the law rests, to the first place where it is fastest, the
     /// speed of that place counts: a curve whose parameter rests would have no direction.
