@@ -33,10 +33,7 @@ const KNOWN: [(&str, &str); 17] = [
     ("trajectory", "active, smooth, timing"),
     ("trajectory", "otg::line, otg::plan"),
     ("trajectory", "smooth::approach, smooth::pass"),
-    (
-        "trajectory",
-        "smooth::choose, smooth::plan, smooth::windows",
-    ),
+    ("trajectory", "smooth::plan, smooth::windows"),
     ("trajectory", "timing::lines, timing::state"),
     ("trajectory", "timing::moving, timing::tighten"),
 ];

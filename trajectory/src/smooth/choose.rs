@@ -5,8 +5,8 @@ use nalgebra::Isometry3;
 use super::certificate::{Certificate, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
+use super::method::Method;
 use super::options::SmoothOptions;
-use super::plan::Method;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
 
@@ -57,7 +57,12 @@ impl Motion {
     pub(crate) fn reversed(&self) -> Self {
         let total = self.duration();
         Self {
-            spans: self.spans.iter().rev().map(|span| span.reversed(total)).collect(),
+            spans: self
+                .spans
+                .iter()
+                .rev()
+                .map(|span| span.reversed(total))
+                .collect(),
             parts: self.parts.iter().rev().copied().collect(),
         }
     }

@@ -116,7 +116,9 @@ pub(crate) fn plan(poses: &[Isometry3<f64>], limits: &ToolLimits) -> Vec<Span> {
 
 /// Time of [`plan`], s: the sum of the least times of the legs.
 pub(crate) fn duration(poses: &[Isometry3<f64>], limits: &ToolLimits) -> f64 {
-    let legs = poses.windows(2).filter(|pair| !Line::new(pair[0], pair[1]).is_still());
+    let legs = poses
+        .windows(2)
+        .filter(|pair| !Line::new(pair[0], pair[1]).is_still());
     legs.map(|pair| least_time(1.0, Leg::new(&pair[0], &pair[1]).caps(limits).values()))
         .sum()
 }

@@ -6,25 +6,12 @@ use super::certificate::{Certificate, certify};
 use super::choose::Motion;
 use super::crossing::Crossing;
 use super::lower_bound::lower_bound;
+use super::method::Method;
 use super::options::{SmoothError, SmoothOptions};
 use super::span::Span;
-use super::{dense, exact_stop};
 use super::windows::Windows;
+use super::{dense, exact_stop};
 use crate::{ToolCurve, ToolPoint};
-
-/// How a motion, or a part of it, was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Method {
-    /// Nothing moves.
-    Still,
-    /// Straight legs with a stop at each pose.
-    ExactStop,
-    /// The time-optimal spline.
-    Spline,
-    /// A curve fitted through the balls of a dense list, and its fastest time law.
-    Fit,
-}
 
 /// A certified motion through a list of poses, as a curve of time.
 ///
@@ -198,10 +185,7 @@ fn fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<SmoothPla
 }
 
 /// The motion by time-optimal splines, window by window.
-fn by_spline(
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
-) -> Result<SmoothPlan, SmoothError> {
+fn by_spline(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     let plan = Windows::new(poses, options)?.finish();
     // What keeps half of the tolerance keeps all of it. A second motion costs
     // little where poses are close to each other and fit in one window.

@@ -181,7 +181,11 @@ mod tests {
         let frame = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.3, -0.2, 0.9));
         let mut placed = span.clone();
         placed.place(&frame);
-        assert_relative_eq!(placed.at(0.7).pose, frame * span.at(0.7).pose, epsilon = 1e-12);
+        assert_relative_eq!(
+            placed.at(0.7).pose,
+            frame * span.at(0.7).pose,
+            epsilon = 1e-12
+        );
     }
 
     /// The control forms interpolate the motion at the ends of any interval.

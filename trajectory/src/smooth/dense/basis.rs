@@ -50,7 +50,11 @@ pub(super) fn third(x: f64) -> [f64; ORDER] {
 /// Stegun, table 25.4).
 pub(super) fn gram() -> [[f64; ORDER]; ORDER] {
     let far = 0.5 * 0.6_f64.sqrt();
-    let places = [(0.5 - far, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + far, 5.0 / 18.0)];
+    let places = [
+        (0.5 - far, 5.0 / 18.0),
+        (0.5, 8.0 / 18.0),
+        (0.5 + far, 5.0 / 18.0),
+    ];
     let mut gram = [[0.0; ORDER]; ORDER];
     for (x, weight) in places {
         let w = third(x);

@@ -72,7 +72,8 @@ impl Chords {
             if cosine < BACK && between < SHORT {
                 let out = before.normalize() - after.normalize();
                 let range = self.corners[pair[0]] + 1..self.corners[pair[1] + 1];
-                let tip = range.max_by(|i, j| points[*i].dot(&out).total_cmp(&points[*j].dot(&out)));
+                let tip =
+                    range.max_by(|i, j| points[*i].dot(&out).total_cmp(&points[*j].dot(&out)));
                 turning.extend(tip);
             }
         }

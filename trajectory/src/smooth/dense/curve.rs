@@ -39,7 +39,11 @@ impl<const D: usize> Curve<D> {
     pub(super) fn pose(&self, at: f64) -> Isometry3<f64> {
         let point = self.fit.point(at);
         let place = self.origin + self.units.place(&point);
-        let turn = if D > 3 { self.units.rotation(&point) } else { self.rotation };
+        let turn = if D > 3 {
+            self.units.rotation(&point)
+        } else {
+            self.rotation
+        };
         Isometry3::from_parts(place.into(), turn)
     }
 

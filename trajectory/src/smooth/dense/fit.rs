@@ -72,7 +72,9 @@ impl<const D: usize> Fit<D> {
         parameters: &[f64],
         radii: &[f64],
     ) -> Result<Self, usize> {
-        let spans = parameters.last().map_or(1, |end| end.round().max(1.0) as usize);
+        let spans = parameters
+            .last()
+            .map_or(1, |end| end.round().max(1.0) as usize);
         let (targets, given) = targets(points, parameters, radii);
         let mut fitting = Fitting {
             fit: Self {
@@ -85,7 +87,9 @@ impl<const D: usize> Fit<D> {
             sides: std::array::from_fn(|_| vec![0.0; spans + ORDER - 1 + BAND]),
         };
         let found = fitting.run();
-        let Fitting { mut fit, targets, .. } = fitting;
+        let Fitting {
+            mut fit, targets, ..
+        } = fitting;
         fit.parameters = given.iter().map(|i| targets[*i].at).collect();
         match found {
             Ok(()) => Ok(fit),
@@ -122,8 +126,13 @@ impl<const D: usize> Fit<D> {
     /// The point at a parameter and its three derivatives.
     pub(super) fn derivatives(&self, at: f64) -> [SVector<f64, D>; 4] {
         let (span, x) = self.locate(at);
-        [basis::value(x), basis::first(x), basis::second(x), basis::third(x)]
-            .map(|weights| self.sum(span, weights))
+        [
+            basis::value(x),
+            basis::first(x),
+            basis::second(x),
+            basis::third(x),
+        ]
+        .map(|weights| self.sum(span, weights))
     }
 }
 
@@ -151,7 +160,12 @@ fn targets<const D: usize>(
             }
         }
         given.push(targets.len());
-        targets.push(Target { point: *point, radius, at, share: 0.0 });
+        targets.push(Target {
+            point: *point,
+            radius,
+            at,
+            share: 0.0,
+        });
     }
     // Each target weighs as much as the way it stands for.
     let last = targets.len() - 1;
@@ -209,7 +223,11 @@ impl<const D: usize> Fitting<D> {
         }
         let last = self.targets.len() - 1;
         for (i, target) in self.targets.iter().enumerate() {
-            let weight = if i == 0 || i == last { ENDS } else { self.weight(target) };
+            let weight = if i == 0 || i == last {
+                ENDS
+            } else {
+                self.weight(target)
+            };
             let (span, x) = self.fit.locate(target.at);
             let w = basis::value(x);
             for i in 0..ORDER {

@@ -67,7 +67,11 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
     } else {
         return None;
     };
-    let start = if backwards { given[given.len() - 1] } else { frame };
+    let start = if backwards {
+        given[given.len() - 1]
+    } else {
+        frame
+    };
     motion.spans.iter_mut().for_each(|span| span.place(&start));
     Some(if backwards { motion.reversed() } else { motion })
 }

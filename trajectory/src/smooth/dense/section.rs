@@ -11,8 +11,8 @@ use super::time_parameter::TimeParameter;
 use crate::smooth::certificate::{Certificate, certify};
 use crate::smooth::choose::{Motion, Then, corners, from_rest, stretch};
 use crate::smooth::crossing::Crossing;
+use crate::smooth::method::Method;
 use crate::smooth::options::SmoothOptions;
-use crate::smooth::plan::Method;
 use crate::smooth::span::Span;
 use crate::timing::Timed;
 use crate::{Boundary, JointLimits, TimingOptions, ToolLimits, time_path};
@@ -105,7 +105,9 @@ impl<'a, const D: usize> Section<'a, D> {
         for _ in 0..REFITS {
             let before = best.timed.certificate.duration;
             let next = self.timed(&self.time_parameters(&best), &radii, &limits);
-            let Some(next) = next.ok().filter(|next| next.timed.certificate.duration < before)
+            let Some(next) = next
+                .ok()
+                .filter(|next| next.timed.certificate.duration < before)
             else {
                 break;
             };
@@ -126,7 +128,9 @@ impl<'a, const D: usize> Section<'a, D> {
             if certificate.holds() {
                 return Ok(spans);
             }
-            worst = self.narrow(&mut radii, &certificate, &crossings).unwrap_or(worst);
+            worst = self
+                .narrow(&mut radii, &certificate, &crossings)
+                .unwrap_or(worst);
             if certificate.worst_limit() > 1.0 {
                 slow(&mut limits, 0.999 / over);
             }
@@ -207,10 +211,14 @@ impl<'a, const D: usize> Section<'a, D> {
         };
         for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
             let far = crossing.deviation / crossing.tolerance;
-            miss(crossing.index, far.max(crossing.angle / crossing.angular_tolerance));
+            miss(
+                crossing.index,
+                far.max(crossing.angle / crossing.angular_tolerance),
+            );
         }
         if certificate.corridor.ratio > 1.0 {
-            let after = crossings.partition_point(|crossing| crossing.time <= certificate.corridor.time);
+            let after =
+                crossings.partition_point(|crossing| crossing.time <= certificate.corridor.time);
             miss(after, certificate.corridor.ratio);
         }
         worst.map(|(_, index)| index)

@@ -48,7 +48,11 @@ pub(super) fn spans<const D: usize>(
     control.reverse();
     leave(&mut control);
     control.reverse();
-    control.windows(5).enumerate().map(|(k, control)| span(k, control, h)).collect()
+    control
+        .windows(5)
+        .enumerate()
+        .map(|(k, control)| span(k, control, h))
+        .collect()
 }
 
 /// Sets the first control poses to those of a start from rest with a jerk, in the direction and
@@ -79,8 +83,7 @@ fn span(k: usize, control: &[Isometry3<f64>], h: f64) -> Span {
     let mut point = [Vector3::zeros(); 5];
     let begin = control[0].translation.vector;
     for d in 0..3 {
-        let values: [f64; 5] =
-            std::array::from_fn(|i| control[i].translation.vector[d] - begin[d]);
+        let values: [f64; 5] = std::array::from_fn(|i| control[i].translation.vector[d] - begin[d]);
         for (c, value) in point.iter_mut().zip(power(&values, h)) {
             c[d] = value;
         }
@@ -93,6 +96,10 @@ fn span(k: usize, control: &[Isometry3<f64>], h: f64) -> Span {
         duration: h,
         point,
         base: rotations[0],
-        turns: if turned { turns(&rotations, h) } else { Vec::new() },
+        turns: if turned {
+            turns(&rotations, h)
+        } else {
+            Vec::new()
+        },
     }
 }

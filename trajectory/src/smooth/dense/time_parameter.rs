@@ -31,9 +31,13 @@ impl TimeParameter {
     ) -> Self {
         let total = law.duration();
         let half = SAMPLES / 2;
-        let steps = (SAMPLES as f64 * total / ramp).ceil().max(4.0 * half as f64) as usize;
+        let steps = (SAMPLES as f64 * total / ramp)
+            .ceil()
+            .max(4.0 * half as f64) as usize;
         let step = total / steps as f64;
-        let from: Vec<f64> = (0..=steps).map(|k| law.sample(k as f64 * step).position[0]).collect();
+        let from: Vec<f64> = (0..=steps)
+            .map(|k| law.sample(k as f64 * step).position[0])
+            .collect();
         let mut way = vec![0.0];
         let mut before = curve.fit.point(0.0);
         for (k, u) in from.iter().enumerate().skip(1) {
