@@ -51,7 +51,9 @@ impl<const N: usize> Planner<N> {
                 // No motion of these joints is shorter, whatever the tool may do.
                 let least = free.duration() / ease;
                 let hopeless = best.as_ref().is_some_and(|(time, _)| least >= *time);
-                (!hopeless).then(|| self.within_tool(motion, (start, goal), free)).transpose()
+                (!hopeless)
+                    .then(|| self.within_tool(motion, (start, goal), free))
+                    .transpose()
             });
             match found {
                 Ok(Some(found)) => {

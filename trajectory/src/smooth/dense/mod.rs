@@ -61,9 +61,9 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
         body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION
     };
     let mut motion = if !poses.windows(2).any(far) {
-        sections::<3>(&poses, options)
+        sections::<3>(&poses, options)?
     } else if options.angular_tolerance() > 1e3 * RESOLUTION {
-        sections::<7>(&poses, options)
+        sections::<7>(&poses, options)?
     } else {
         return None;
     };
@@ -121,7 +121,7 @@ fn moved(given: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
 }
 
 /// The motion through all sections between places where the way turns back.
-fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
+fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
     let units = Units::new(options);
     let points = units.points::<D>(poses);
     let turning = Chords::new(&points).turning_points(&points);
@@ -131,8 +131,8 @@ fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -
     };
     let mut from = 0;
     for to in turning.into_iter().chain([poses.len() - 1]) {
-        motion.append(Section::<D>::new(&poses[from..=to], options, units).motion());
+        motion.append(Section::<D>::new(&poses[from..=to], options, units).motion()?);
         from = to;
     }
-    motion
+    Some(motion)
 }

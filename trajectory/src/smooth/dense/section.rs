@@ -36,8 +36,8 @@ const FEW: usize = 12;
 const DEPTH: usize = 10;
 /// Poses around one that was missed whose balls become smaller.
 const NEAR: usize = 3;
-/// A ratio to a limit up to this is met by stretching time.
-const STRETCH: f64 = 1.01;
+/// A ratio to a limit up to this is met by stretching time; more is not worth it.
+const STRETCH: f64 = 1.15;
 
 /// A part of a dense list that begins and ends at rest.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +46,16 @@ pub(super) struct Section<'a, const D: usize> {
     options: &'a SmoothOptions,
     units: Units,
     depth: usize,
+}
+
+/// Why no curve was found.
+#[derive(Clone, Copy, Debug)]
+enum Failure {
+    /// A pose is missed, this one most.
+    Missed(usize),
+    /// The bounds of the motion are far above its limits: orientations that turn about changing
+    /// axes are bounded with room.
+    TooFast,
 }
 
 /// A curve and its time law.
@@ -69,38 +79,40 @@ impl<'a, const D: usize> Section<'a, D> {
         }
     }
 
-    /// A motion from rest to rest: fitted, or divided where a fit fails.
-    pub(super) fn motion(self) -> Motion {
+    /// A motion from rest to rest: fitted, or divided where a fit fails; `None` where the way of
+    /// planning does not suit the list.
+    pub(super) fn motion(self) -> Option<Motion> {
         let last = self.poses.len() - 1;
         if last < 2 {
-            return corners(self.poses, self.options);
+            return Some(corners(self.poses, self.options));
         }
         match self.fitted() {
             Ok(spans) => {
                 let parts = vec![(Method::Fit, spans.len())];
-                Motion { spans, parts }
+                Some(Motion { spans, parts })
             }
-            Err(_) if last < FEW => from_rest(self.poses, self.options, Then::More),
-            Err(_) if self.depth == 0 => corners(self.poses, self.options),
-            Err(worst) => {
+            Err(Failure::TooFast) => None,
+            Err(_) if last < FEW => Some(from_rest(self.poses, self.options, Then::More)),
+            Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
+            Err(Failure::Missed(worst)) => {
                 let at = worst.clamp(1, last - 1);
                 let part = |poses| Section {
                     poses,
                     depth: self.depth - 1,
                     ..self
                 };
-                let mut motion = part(&self.poses[..=at]).motion();
-                motion.append(part(&self.poses[at..]).motion());
-                motion
+                let mut motion = part(&self.poses[..=at]).motion()?;
+                motion.append(part(&self.poses[at..]).motion()?);
+                Some(motion)
             }
         }
     }
 
-    /// Certified spans along one curve, or the pose at which that fails.
-    fn fitted(&self) -> Result<Vec<Span>, usize> {
+    /// Certified spans along one curve.
+    fn fitted(&self) -> Result<Vec<Span>, Failure> {
         let points = self.units.points::<D>(self.poses);
         let mut radii = vec![1.0; points.len()];
-        let mut limits = self.limits();
+        let limits = self.limits();
         let mut best = self.timed(&Chords::new(&points).parameters(&points), &radii, &limits)?;
         for _ in 0..REFITS {
             let before = best.timed.certificate.duration;
@@ -128,15 +140,15 @@ impl<'a, const D: usize> Section<'a, D> {
             if certificate.holds() {
                 return Ok(spans);
             }
+            if certificate.worst_limit() > STRETCH {
+                return Err(Failure::TooFast);
+            }
             worst = self
                 .narrow(&mut radii, &certificate, &crossings)
                 .unwrap_or(worst);
-            if certificate.worst_limit() > 1.0 {
-                slow(&mut limits, 0.999 / over);
-            }
             best = self.timed(&best.curve.fit.parameters, &radii, &limits)?;
         }
-        Err(worst)
+        Err(Failure::Missed(worst))
     }
 
     /// The limits of the tool that rule the time law.
@@ -157,9 +169,9 @@ impl<'a, const D: usize> Section<'a, D> {
         parameters: &[f64],
         radii: &[f64],
         limits: &ToolLimits,
-    ) -> Result<TimedCurve<D>, usize> {
+    ) -> Result<TimedCurve<D>, Failure> {
         let points = self.units.points::<D>(self.poses);
-        let fit = Fit::new(&points, parameters, radii)?;
+        let fit = Fit::new(&points, parameters, radii).map_err(Failure::Missed)?;
         let curve = Curve::new(fit, self.units, &self.poses[0]);
         let options = TimingOptions {
             start: Boundary::Rest,
@@ -169,7 +181,7 @@ impl<'a, const D: usize> Section<'a, D> {
         let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
         match time_path(&curve, &free, limits, &options) {
             Ok(timed) => Ok(TimedCurve { curve, timed }),
-            Err(_) => Err(self.poses.len() / 2),
+            Err(_) => Err(Failure::Missed(self.poses.len() / 2)),
         }
     }
 
@@ -222,19 +234,5 @@ impl<'a, const D: usize> Section<'a, D> {
             miss(after, certificate.corridor.ratio);
         }
         worst.map(|(_, index)| index)
-    }
-}
-
-/// Scales all limits.
-fn slow(limits: &mut ToolLimits, factor: f64) {
-    for limit in [
-        &mut limits.speed,
-        &mut limits.acceleration,
-        &mut limits.jerk,
-        &mut limits.angular_speed,
-        &mut limits.angular_acceleration,
-        &mut limits.angular_jerk,
-    ] {
-        *limit *= factor;
     }
 }
