@@ -1,5 +1,6 @@
 use std::io;
 
+use engine::run_loop::RunLoopError;
 use ipc::IpcError;
 
 use crate::exit::Exit;
@@ -79,6 +80,16 @@ impl From<IpcError> for Failure {
             _ => Exit::NoPeer,
         };
         Self::new(exit, error)
+    }
+}
+
+/// A run that cannot be watched any longer.
+impl From<RunLoopError> for Failure {
+    fn from(error: RunLoopError) -> Self {
+        match error {
+            RunLoopError::Ipc(error) => error.into(),
+            RunLoopError::Samples(error) => error.into(),
+        }
     }
 }
 

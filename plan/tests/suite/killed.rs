@@ -128,7 +128,7 @@ fn a_killed_run_goes_on() {
             let report = run(&path, &mut SimulatedMotion::default());
             assert_eq!(
                 (report.outcome, report.counters.kits),
-                ("stopped", 2),
+                (RunOutcome::Stopped, 2),
                 "{report:#?}"
             );
         }
