@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use plan::run::{
-    Batch, Cell, Controller, Motion, MotionFailure, PlanRunReport, RunOptions, SimulatedFactotum,
-    SimulatedMotion, Situation, Stock, prepare,
+    Batch, Cell, Controller, Motion, MotionFailure, PlanRunReport, RunOptions, RunOutcome,
+    SimulatedFactotum, SimulatedMotion, Situation, Stock, prepare,
 };
 use plan::world::{Durability, Reader, Writer, import_toml};
 
