@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::canter::{canter, command};
+use crate::status::{status, wait_for};
 use system_tests::long_move::smooth_list;
 use system_tests::pipe::full_pipe;
 use system_tests::signal;
@@ -58,26 +59,6 @@ fn engine(arm: &str, stdout: Stdio) -> Peer {
     // Read on, so that it has a reader for as long as it lives.
     std::thread::spawn(move || std::io::copy(&mut stderr, &mut std::io::sink()));
     Peer(child)
-}
-
-fn status(arm: &str) -> Value {
-    let ran = canter(["status", "--json", "--arm", arm]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).unwrap()
-}
-
-fn wait_for(arm: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-    let deadline = Instant::now() + PATIENCE;
-    loop {
-        let now = status(arm);
-        if wanted(&now) {
-            return now;
-        }
-        assert!(
-            Instant::now() < deadline,
-            "{what} did not come about: {now}"
-        );
-    }
 }
 
 fn moves(now: &Value) -> bool {

@@ -14,6 +14,7 @@ use serde_json::Value;
 use system_tests::domain;
 
 use crate::canter::{canter, command};
+use crate::status::status;
 
 /// How long a test waits for something that must come.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -48,13 +49,6 @@ impl Drop for Engine {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
-}
-
-/// The status of an engine that is there.
-fn status(arm: &str) -> Value {
-    let ran = canter(["status", "--json", "--arm", arm]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).unwrap()
 }
 
 /// A program that was answered with "no engine" is not executed later.
