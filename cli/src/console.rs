@@ -7,6 +7,7 @@ use engine::run_loop::Operator;
 use engine::session::{Blame, Note, Session};
 
 use crate::exit::Exit;
+use crate::failure::Failure;
 use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::progress::Progress;
@@ -55,7 +56,7 @@ impl Console {
         session: &Session,
         samples: &SampleOptions<'_>,
         voice: Voice,
-    ) -> io::Result<Self> {
+    ) -> Result<Self, Failure> {
         let sink = samples.file.map(OutputFile::create).transpose()?;
         let recording = Recording::new(samples.joints, samples.rate_hz, sink)?;
         let terminal = io::stderr().is_terminal() && voice != Voice::Json;

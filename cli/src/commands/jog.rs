@@ -51,7 +51,7 @@ enum Axis {
 impl Jog {
     /// Asks again and again, then for rest.
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
-        let signals = SignalThread::start(printer, "once more to end at once")?;
+        let signals = SignalThread::start(printer, "once more to give up")?;
         signals.count_only();
         let client = Client::open(&self.arm.open()?, "canter jog")?;
         let (space, speeds) = self.request(&client)?;
