@@ -142,7 +142,7 @@ impl Operator for Console {
 
 /// What happened, as one JSON object on a line.
 pub(crate) fn tell_json(printer: &Printer, note: &Note) {
-    // A note has no key that is not a text: it can be written.
+    // All keys of a note are texts, so it can be written.
     if let Ok(text) = serde_json::to_string(note) {
         printer.line(&text);
     }

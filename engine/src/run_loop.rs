@@ -12,7 +12,7 @@ use crate::host::Host;
 use crate::queue::Given;
 use crate::session::{Blame, Note, Session, Status};
 
-/// How long the driver may take to agree to go on after a fault.
+/// Time limit for a new session with the driver after a fault.
 const RECOVERY: Duration = Duration::from_secs(5);
 
 /// Who watches a run: keeps its recording, is told what happens, and may end it.
@@ -197,7 +197,8 @@ impl<D, O: Operator> RunLoop<D, O> {
     /// The operator's file failed.
     pub fn finish(mut self) -> io::Result<(O, Status)> {
         let status = self.host.session.status();
-        // The sample of a period is complete when the next state came: the last ones are still out.
+        // The sample of a period is complete when the next state arrives: the last ones are still
+        // missing.
         self.host.session.close();
         self.operator.observe(&self.host.session)?;
         drop(self.host);

@@ -33,7 +33,7 @@ pub struct Greeting {
 }
 
 impl Greeting {
-    /// Answers; says whether iceoryx2 took the answer.
+    /// Answers; returns whether iceoryx2 took the answer.
     pub fn answer(self, ack: HelloAck) -> bool {
         self.request.send_copy(ack).is_ok()
     }
@@ -43,8 +43,7 @@ impl DriverLink {
     /// Opens the driver's end of `arm`, after cleaning up behind dead processes.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when a living process has it, and everything that can go wrong with
-    /// shared memory.
+    /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let end = LinkEnd::open(arm, DRIVER)?;
         let hello = end.handshake(|factory| {

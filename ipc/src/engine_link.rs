@@ -30,8 +30,7 @@ impl EngineLink {
     /// Opens the engine's end of `arm`, after cleaning up behind dead processes.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when a living process has it, and everything that can go wrong with
-    /// shared memory.
+    /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let end = LinkEnd::open(arm, ENGINE)?;
         let hello = end.handshake(|factory| {
@@ -75,7 +74,7 @@ impl EngineLink {
     ///
     /// # Errors
     /// [`IpcError::NoAnswer`] without a driver, [`IpcError::Refused`] with the driver's reason,
-    /// [`IpcError::BadMessage`] when the answer makes no sense.
+    /// [`IpcError::BadMessage`] when the answer is invalid.
     pub fn greet(&self, hello: &Hello, timeout: Duration) -> Result<HelloAck, IpcError> {
         let end = Instant::now() + timeout;
         let ack = loop {

@@ -48,8 +48,7 @@ where
     /// Opens an end of `arm`, after cleaning up behind dead processes.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when a living process has it, and everything that can go wrong with
-    /// shared memory.
+    /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub(crate) fn open(arm: &Arm, role: Role) -> Result<Self, IpcError> {
         let node = join(arm, role.name)?;
         let factory = topic::<S>(&node, arm, role.sends)?;
@@ -81,7 +80,7 @@ where
     /// Opens a port of the handshake by `port`, and reserves the memory of the answers.
     ///
     /// # Errors
-    /// Everything that can go wrong with shared memory.
+    /// Errors of shared memory.
     pub(crate) fn handshake<P, E: Debug>(
         &self,
         port: impl FnOnce(&PortFactory<Shared, Hello, (), HelloAck, ()>) -> Result<P, E>,

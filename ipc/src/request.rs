@@ -23,12 +23,12 @@ pub enum Verb {
         /// The program.
         program: String,
     },
-    /// Move by hand; stops when no further request comes in time.
+    /// Jog; the arm stops when no further request comes in time.
     Jog {
         /// `joint` or `tool`.
         space: String,
-        /// Speeds as shares of the largest, -1..=1: one a joint, or x, y, z, rx, ry, rz of the
-        /// tool's own axes; all 0 stops.
+        /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
+        /// tool frame; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,
@@ -37,7 +37,7 @@ pub enum Verb {
     Status,
     /// What has happened.
     Notes {
-        /// Number of the last note that is known; only later ones are asked for.
+        /// Number of the last note that the client has; only later ones are returned.
         since: u64,
     },
     /// Stop on the path and end the engine.
@@ -80,7 +80,7 @@ pub struct Request {
 pub struct Answer {
     /// Whether the engine does it.
     pub accepted: bool,
-    /// One sentence for a person; empty where there is nothing to say.
+    /// One sentence for the user; empty if there is nothing to say.
     pub message: String,
     /// Details for a program.
     pub body: serde_json::Value,
@@ -96,7 +96,7 @@ impl Answer {
         }
     }
 
-    /// As the bytes that go to the sender of request `id`; at most [`LONGEST_ANSWER`].
+    /// The bytes for the sender of request `id`; at most [`LONGEST_ANSWER`].
     pub(crate) fn encode(&self, id: RequestId) -> Result<Vec<u8>, serde_json::Error> {
         let encode = |answer: &Self| serde_json::to_vec(&Reply { id, answer });
         let text = encode(self)?;

@@ -61,7 +61,7 @@ fn run(name: &str, commands: u32) -> Run {
         }
         let seconds = start.elapsed().as_secs_f64();
         drop(executor);
-        // What was under way when the last event came.
+        // The periods in work when the last event came.
         samples.extend(std::iter::from_fn(|| monitor.sample()));
         stop.store(true, Ordering::Relaxed);
         driver.join().unwrap();

@@ -10,7 +10,7 @@ use system_tests::servo_arm::{JOINTS, limits};
 /// Engine, driver or a hostile process, by its first argument.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_servo-peer");
 
-/// An arm of its own for a test, with a driver that writes a log.
+/// A separate arm for a test, with a driver that writes a log.
 pub(crate) struct Scene {
     arm: String,
     folder: tempfile::TempDir,
@@ -48,7 +48,7 @@ impl Scene {
         )
     }
 
-    /// Both, with the arm on its way.
+    /// Both, with the arm moving.
     pub(crate) fn moving(&self) -> (Peer, Peer) {
         let driver = self.driver(0);
         let engine = self.engine();

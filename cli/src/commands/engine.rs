@@ -14,8 +14,8 @@ use crate::signals::SignalThread;
 
 /// Run the engine of an arm until Ctrl-C; programs come from `canter send`
 ///
-/// Prints a line for everything that happens; the arm waits for no reader. Ctrl-C stops on the path
-/// and ends; a second Ctrl-C brakes as fast as the joints can.
+/// Prints a line for each event; the arm does not wait for a reader. Ctrl-C stops on the path and
+/// ends; a second Ctrl-C brakes as fast as the joints can.
 #[derive(Args, Debug)]
 pub(crate) struct Engine {
     #[command(flatten)]
@@ -24,7 +24,7 @@ pub(crate) struct Engine {
     host: HostOptions,
     #[command(flatten)]
     refusal: RefusalOption,
-    /// Print one JSON object for everything that happens, one per line
+    /// Print one JSON object per event, one per line
     #[arg(long)]
     json: bool,
 }
@@ -73,7 +73,7 @@ struct EngineDesk {
 
 impl Operator for EngineDesk {
     fn observe(&mut self, session: &Session) -> io::Result<()> {
-        // Nobody reads the recording here; it must not grow.
+        // The recording is not used here; it must not grow.
         drop(session.samples());
         Ok(())
     }

@@ -22,8 +22,8 @@ use crate::simulation::Simulation;
 /// Starts the engine and, unless told otherwise, the simulated driver, runs the program, prints a
 /// line for each command that is done, and ends both. The whole program is planned first: one that
 /// cannot be executed moves nothing. Ctrl-C stops on the path and ends; a second Ctrl-C brakes as
-/// fast as the joints can. The arm waits for nobody who reads: where standard output is closed or
-/// not read, the program goes on to its end, lines are dropped and counted, and the exit code is 8.
+/// fast as the joints can. The arm does not wait for a reader: if standard output is closed or not
+/// read, the program runs to its end, lines are dropped and counted, and the exit code is 8.
 #[derive(Args, Debug)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -37,7 +37,7 @@ pub(crate) struct Run {
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
-    /// Print one JSON object for everything that happens, one per line
+    /// Print one JSON object per event, one per line
     #[arg(long)]
     json: bool,
 }
@@ -52,7 +52,7 @@ impl Run {
             return Ok(program.exit());
         }
         // The simulated arm starts where the dry run does, so that a program that cannot be
-        // executed starts nothing. Where another arm stands is known to its driver only.
+        // executed starts nothing. The position of another arm is known to its driver only.
         let mut plan = None;
         if self.host.driver != DriverChoice::External {
             plan = self.plan(&program, &robot, None)?;
@@ -95,8 +95,8 @@ impl Run {
         Ok(exit)
     }
 
-    /// Plans the whole program from `start`, or from home, and reports what is refused; no plan if
-    /// it may not be run. With a policy that lives with refusals it always may.
+    /// Plans the whole program from `start`, or from home, and reports refused commands; no plan if
+    /// it may not be run. With a policy that allows refusals it always may.
     fn plan(
         &self,
         program: &ProgramFile,
@@ -138,7 +138,7 @@ fn execute(
     };
     console.finish()?;
     let exit = match end {
-        // The end was reached, but not everything on the way was done.
+        // The end was reached, but not every command was executed.
         RunEnd::Done if summary.done < summary.commands => Exit::Refused,
         RunEnd::Done => Exit::Done,
         RunEnd::Refused { .. } => Exit::Refused,

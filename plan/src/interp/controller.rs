@@ -11,12 +11,12 @@ use crate::run::{
 };
 use crate::world::{Change, Class, Model, StoredRun, Writer};
 
-/// A run of a plan: a new one, or one that goes on.
+/// A run of a plan: a new one, or one that is resumed.
 #[derive(Clone, Debug)]
 pub struct PulledRun {
     file: String,
     source: String,
-    /// Its number in the database, when it goes on.
+    /// Its number in the database, if it is resumed.
     id: Option<i64>,
     state: State,
 }
@@ -33,7 +33,7 @@ impl PulledRun {
         }
     }
 
-    /// The run of the database goes on: it was killed or interrupted, or its motion failed.
+    /// Resumes the run of the database: it was killed or interrupted, or its motion failed.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when it has ended.
@@ -76,7 +76,7 @@ impl PulledRun {
     }
 }
 
-/// Where a plan is pulled: the world, what moves the arm, and how.
+/// What a plan is executed with: the world, the interface to the arm, and options.
 pub struct Pull<'a> {
     /// The controller's connection.
     pub writer: Writer,
@@ -94,7 +94,7 @@ pub struct Pull<'a> {
 /// has it.
 ///
 /// # Errors
-/// [`PlanError`] of the database; what goes wrong in the plan is in the report.
+/// [`PlanError`] of the database; errors of the plan are in the report.
 pub fn pull(
     interpreter: &mut dyn PlanInterpreter,
     run: PulledRun,

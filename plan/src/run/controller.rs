@@ -69,7 +69,7 @@ impl<'a> Controller<'a> {
     /// Prepares a new run of a plan.
     ///
     /// # Errors
-    /// [`PlanError`] when plan, parameters or world do not fit; nothing has moved then.
+    /// [`PlanError`] when plan, parameters or world do not match; nothing has moved then.
     pub fn start(
         mut cell: Cell<'a>,
         source: &str,
@@ -107,8 +107,8 @@ impl<'a> Controller<'a> {
         Ok(Self::new(cell, run, program, source.to_owned(), options))
     }
 
-    /// Prepares to go on with the last run of the database: one that was killed or interrupted, or
-    /// in which the arm or the factotum failed.
+    /// Prepares to resume the last run of the database: one that was killed or interrupted, or in
+    /// which the arm or the factotum failed.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when there is none, or it has ended.
@@ -172,7 +172,7 @@ impl<'a> Controller<'a> {
     /// Executes the plan to its end, or until the operator stops the arm.
     ///
     /// # Errors
-    /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
+    /// [`PlanError`] of the database; errors of the plan are in the report.
     pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<PlanRunReport, PlanError> {
         self.execution.run(&mut self.steps, observer)
     }

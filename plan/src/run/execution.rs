@@ -17,13 +17,13 @@ use crate::world::{Change, Model, Writer};
 /// Most warnings of one run that are kept.
 const MOST_WARNINGS: usize = 100;
 
-/// What to do when a motion or an errand fails.
+/// What to do when a motion or a request to the factotum fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
     /// End the plan with EndCanon and a positive reason.
     Stop,
-    /// Clear the failure, bring the arm back to where the step began, and try the step again, at
-    /// most this often for one step.
+    /// Clear the failure, move the arm back to where the step began, and try the step again, at
+    /// most this often per step.
     Repair {
         /// Attempts for one step.
         attempts: usize,
@@ -101,7 +101,7 @@ pub(crate) struct Execution<'a> {
     pub(crate) run: Run,
 }
 
-/// What a motion or an errand did.
+/// Result of a motion or a request to the factotum.
 #[derive(Default)]
 struct Done {
     changes: Vec<Change>,
@@ -150,7 +150,7 @@ impl Execution<'_> {
     /// Executes the plan to its end, or until the operator stops the arm.
     ///
     /// # Errors
-    /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
+    /// [`PlanError`] of the database; errors of the plan are in the report.
     pub(crate) fn run(
         &mut self,
         steps: &mut dyn Steps,
@@ -159,7 +159,8 @@ impl Execution<'_> {
         let began = Instant::now();
         let mut left = match self.open(steps) {
             Ok(()) => None,
-            // An arm that cannot be brought back now may be helped, and the run goes on later.
+            // If the arm cannot be moved back now, an operator may help, and the run is resumed
+            // later.
             Err(failure) if self.run.resumed && !failure.stopped => Some(Left {
                 outcome: RunOutcome::Failed,
                 code: steps.motion_failed(),
@@ -211,9 +212,9 @@ impl Execution<'_> {
         Ok(())
     }
 
-    /// Brings the arm from wherever it is to where the model has it. The gripper is left alone: a
-    /// step that was under way is executed again from its beginning, and all steps come to the same
-    /// end when some of their motion has been made before.
+    /// Moves the arm from anywhere to its place in the model. The gripper does not move: an
+    /// unfinished step is executed again from its beginning, and all steps have the same result if
+    /// part of their motion was made before.
     fn bring_back(&mut self) -> Result<(), MotionFailure> {
         let Some(arm) = self.motion.arm() else {
             return Ok(());
@@ -266,7 +267,7 @@ impl Execution<'_> {
             ..
         } = next.step;
         let seconds = done.seconds;
-        // An errand takes time, but nothing of the arm's.
+        // A request to the factotum takes time, but does not move the arm.
         if done.binding.is_none() {
             state.counters.motion_s += seconds;
         }
@@ -287,7 +288,7 @@ impl Execution<'_> {
         Ok(())
     }
 
-    /// Ends the plan, or leaves it to be resumed where the operator stopped it.
+    /// Ends the plan, or leaves it for a resume if the operator stopped it.
     fn give_up(&mut self, trouble: Trouble, mark: &str) -> Went {
         match trouble {
             Trouble::Failed(code, reason) => {
@@ -312,7 +313,7 @@ impl Execution<'_> {
         }
     }
 
-    /// Changes of the world and state of the plan, together or not at all.
+    /// Commits changes of the world and state of the plan, together or not at all.
     fn commit(&mut self, changes: &[Change], state: State) -> Result<(), PlanError> {
         self.run.model.apply_all(changes)?;
         let outcome = state.outcome.as_ref().map(Outcome::to_json).transpose()?;

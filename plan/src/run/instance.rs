@@ -22,7 +22,10 @@ impl Machine<'_> {
     ) -> Result<Step> {
         let declared = self.program.scope.lookup(&variable.text);
         let Some((_, Type::Object(class))) = declared else {
-            return Err(PlanError::Value(format!("{} is no object", variable.text)));
+            return Err(PlanError::Value(format!(
+                "{} is not an object",
+                variable.text
+            )));
         };
         let part = self.component(class, component, &state)?;
         let mut fresh = self.model.clone();
