@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
-use servo::{Control, Event, Runner, Tick};
+use servo::{Control, Event, Monitor, Runner, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
 
 thread_local! {
@@ -82,9 +82,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     let mut config = executor_config(arm, Clock::LockStep);
     config.record = false;
     let (mut runner, mut sender, remote, mut monitor) = Runner::<JOINTS>::new(config);
-    let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
-    ack.session = 1;
-    ack.position[..JOINTS].copy_from_slice(home().as_slice());
+    let ack = welcome();
     runner.open(&ack);
 
     let mut state = State {
@@ -112,20 +110,13 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     // Connections are made when the first messages pass.
     (0..100).for_each(&mut period);
 
-    let (mut next, mut finished) = (0, 0);
-    let (mut heap, mut waited) = (0, 0);
+    let (mut next, mut finished, mut heap, mut waited) = (0, 0, 0, 0);
     for block in 0..100 {
         while sender.room() > 4000 && feed(&mut sender, next) {
             next += 1;
         }
-        remote.control(match block % 10 {
-            3 => Control::Pause,
-            6 => Control::Override(0.4),
-            8 => Control::Stop { fast: true },
-            _ => Control::Resume,
-        });
-        if block % 10 == 7 {
-            remote.control(Control::Override(1.0));
+        for order in orders(block) {
+            remote.control(order);
         }
         let before = (heap_calls(), waits());
         let first = 100 + block * 1000;
@@ -134,13 +125,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         let (after_heap, after_waits) = (heap_calls(), waits());
         heap += after_heap - before.0 - counting_costs();
         waited += after_waits - before.1;
-        while let Some(event) = monitor.event() {
-            match event {
-                Event::Finished { .. } => finished += 1,
-                Event::Faulted { fault, .. } => panic!("{fault}"),
-                _ => {}
-            }
-        }
+        finished += count_finished(&mut monitor);
     }
     assert!(finished > 40, "only {finished} commands");
     assert_eq!(remote.counters().published, 100_100);
@@ -149,6 +134,38 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         (0, 0),
         "heap calls and waits in the periods"
     );
+}
+
+/// The driver's answer to the handshake.
+fn welcome() -> HelloAck {
+    let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
+    ack.session = 1;
+    ack.position[..JOINTS].copy_from_slice(home().as_slice());
+    ack
+}
+
+/// What an operator wants in a block of periods.
+fn orders(block: u64) -> Vec<Control> {
+    match block % 10 {
+        3 => vec![Control::Pause],
+        6 => vec![Control::Override(0.4)],
+        7 => vec![Control::Resume, Control::Override(1.0)],
+        8 => vec![Control::Stop { fast: true }],
+        _ => vec![Control::Resume],
+    }
+}
+
+/// How many commands were finished since the last call.
+fn count_finished(monitor: &mut Monitor<JOINTS>) -> usize {
+    let mut finished = 0;
+    while let Some(event) = monitor.event() {
+        match event {
+            Event::Finished { .. } => finished += 1,
+            Event::Faulted { fault, .. } => panic!("{fault}"),
+            _ => {}
+        }
+    }
+    finished
 }
 
 /// Heap calls of one [`waits`]: it runs between the two readings of the first counter.

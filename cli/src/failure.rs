@@ -1,5 +1,6 @@
 use std::io;
 
+use engine::run_loop::RunLoopError;
 use ipc::IpcError;
 
 use crate::exit::Exit;
@@ -92,6 +93,16 @@ impl std::fmt::Display for Unwritable {
 }
 
 impl std::error::Error for Unwritable {}
+
+/// A run that cannot be watched any longer.
+impl From<RunLoopError> for Failure {
+    fn from(error: RunLoopError) -> Self {
+        match error {
+            RunLoopError::Ipc(error) => error.into(),
+            RunLoopError::Samples(error) => error.into(),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

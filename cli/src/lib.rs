@@ -12,6 +12,7 @@
 
 mod client;
 mod commands;
+mod console;
 mod damage;
 mod equipment;
 mod exit;
@@ -20,7 +21,6 @@ mod host_options;
 mod input;
 mod logging;
 mod mobility;
-mod moving_arm;
 mod output;
 mod output_file;
 mod pddl_file;

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use plan::run::PlanRunReport;
+use plan::run::{PlanRunReport, RunOutcome};
 use serde::Serialize;
 
 use crate::output;
@@ -11,7 +11,7 @@ use crate::output;
 #[derive(Debug, Serialize)]
 pub(crate) struct PlanReport {
     /// `stopped` at the end of the plan, `failed`, or `interrupted` by the operator.
-    outcome: &'static str,
+    outcome: RunOutcome,
     /// Reason given to EndCanon: 0, or positive when the plan failed.
     code: i64,
     /// In words; null when all went well.
@@ -55,8 +55,8 @@ impl From<PlanRunReport> for PlanReport {
 }
 
 impl PlanReport {
-    /// `stopped`, `failed` or `interrupted`.
-    pub(crate) fn outcome(&self) -> &str {
+    /// How the run ended.
+    pub(crate) fn outcome(&self) -> RunOutcome {
         self.outcome
     }
 
@@ -75,7 +75,7 @@ impl PlanReport {
             return output::json_to(out, self);
         }
         match (&self.reason, self.outcome) {
-            (Some(reason), "interrupted") => writeln!(out, "interrupted: {reason}")?,
+            (Some(reason), RunOutcome::Interrupted) => writeln!(out, "interrupted: {reason}")?,
             (Some(reason), outcome) => {
                 writeln!(out, "{outcome}: {reason} (EndCanon({}))", self.code)?;
             }

@@ -178,7 +178,8 @@ impl ProgramFile {
     pub(crate) fn plan(
         &self,
         robot: &Robot,
-        (rate_hz, start): (f64, Option<Vec<f64>>),
+        rate_hz: f64,
+        start: Option<Vec<f64>>,
         on_refusal: FailurePolicy,
     ) -> Result<Plan, Failure> {
         let options = PlanOptions {

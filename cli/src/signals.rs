@@ -28,9 +28,21 @@ pub(crate) struct SignalThread {
 
 #[derive(Debug)]
 struct Shared {
-    steering: Mutex<Option<Steering>>,
+    acts_on: Mutex<Target>,
     count: AtomicUsize,
     order: AtomicU32,
+}
+
+/// What a signal acts on.
+#[derive(Debug, Default)]
+enum Target {
+    /// The process: it ends.
+    #[default]
+    Process,
+    /// The motion: it stops.
+    Motion(Steering),
+    /// Whoever asks for the count.
+    Count,
 }
 
 impl SignalThread {
@@ -41,7 +53,7 @@ impl SignalThread {
     pub(crate) fn start(printer: &Printer, word: &'static str) -> io::Result<Self> {
         let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
         let shared = Arc::new(Shared {
-            steering: Mutex::default(),
+            acts_on: Mutex::default(),
             count: AtomicUsize::new(0),
             order: AtomicU32::new(0),
         });
@@ -56,12 +68,17 @@ impl SignalThread {
 
     /// From now on a signal stops this motion.
     pub(crate) fn steer(&self, session: &Session) {
-        self.shared.set(Some(session.steering()));
+        self.shared.set(Target::Motion(session.steering()));
     }
 
     /// From now on nothing moves: a signal ends the process.
     pub(crate) fn release(&self) {
-        self.shared.set(None);
+        self.shared.set(Target::Process);
+    }
+
+    /// From now on a first signal is only counted: who asks for the count stops the arm.
+    pub(crate) fn count_only(&self) {
+        self.shared.set(Target::Count);
     }
 
     /// Number of signals; the order to the arm is given before a signal is counted.
@@ -78,18 +95,21 @@ impl SignalThread {
 }
 
 impl Shared {
-    fn set(&self, steering: Option<Steering>) {
-        *self.steering.lock().unwrap_or_else(PoisonError::into_inner) = steering;
+    fn set(&self, target: Target) {
+        *self.acts_on.lock().unwrap_or_else(PoisonError::into_inner) = target;
     }
 
     fn obey(&self, printer: &Printer, word: &str) {
-        let steering = self.steering.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(steering) = &*steering else {
-            exit(Exit::Stopped as i32);
-        };
-        let fast = self.count.load(Ordering::Acquire) > 0;
-        let order = steering.control(Control::Stop { fast });
-        self.order.store(order, Ordering::Release);
+        let target = self.acts_on.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*target {
+            Target::Process => exit(Exit::Stopped as i32),
+            Target::Motion(steering) => {
+                let fast = self.count.load(Ordering::Acquire) > 0;
+                let order = steering.control(Control::Stop { fast });
+                self.order.store(order, Ordering::Release);
+            }
+            Target::Count => {}
+        }
         let before = self.count.fetch_add(1, Ordering::AcqRel);
         if before == 0 {
             printer.note(&format!("canter: stopping on the path; {word}"));

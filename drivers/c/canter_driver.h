@@ -1,5 +1,5 @@
 /* The messages of Canter's driver protocol; see docs/driver-protocol.md.
- * Generated from the Rust types by ipc/tests/c_header.rs: do not edit. */
+ * Generated from the Rust types by ipc/tests/c_header: do not edit. */
 #ifndef CANTER_DRIVER_H
 #define CANTER_DRIVER_H
 

@@ -7,7 +7,7 @@ use crcl::ReadOptions;
 use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
-use servo::{Control, ExecutorError};
+use servo::ExecutorError;
 
 use crate::control::ControlThread;
 use crate::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
@@ -142,10 +142,7 @@ impl<D> Host<D> {
         } = self;
         channels.requests.serve(|request| {
             let status = session.status();
-            // Any client that may stop a motion may resume it; only the owner decides what is
-            // executed.
-            let free = matches!(request.ask, Verb::Resume | Verb::Override { .. });
-            if !free && let Err(refusal) = ownership.admit(&request, !status.idle) {
+            if let Err(refusal) = ownership.admit(&request, !status.idle) {
                 return refusal;
             }
             match request.ask {
@@ -165,7 +162,7 @@ impl<D> Host<D> {
                     speeds,
                     timeout_ms,
                 } => jog(session, &space, speeds, timeout_ms),
-                ask => control(session, &ask),
+                _ => Answer::refuse("this engine cannot do that"),
             }
         })
     }
@@ -254,28 +251,4 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
         Ok(()) => Answer::accept(Value::Null),
         Err(error) => Answer::refuse(error.to_string()),
     }
-}
-
-/// Executes requests that act on the current motion, for clients that do not use the control
-/// channel.
-fn control(session: &Session, ask: &Verb) -> Answer {
-    let control = match ask {
-        Verb::Pause => Control::Pause,
-        Verb::Resume => Control::Resume,
-        Verb::Override { share } if (0.0..=1.0).contains(share) => Control::Override(*share),
-        Verb::Override { share } => {
-            return Answer::refuse(format!("an override is 0 to 1, got {share}"));
-        }
-        Verb::Stop { fast } => Control::Stop { fast: *fast },
-        Verb::Abort => Control::Abort,
-        Verb::Recover => {
-            return match session.recover() {
-                Ok(_) => Answer::accept(Value::Null),
-                Err(error) => Answer::refuse(error.to_string()),
-            };
-        }
-        _ => return Answer::refuse("this engine cannot do that"),
-    };
-    session.control(control);
-    Answer::accept(Value::Null)
 }

@@ -2,8 +2,9 @@
 //! and the host that serves clients.
 //!
 //! The planner's thread of the [`session`] takes a command from the [`queue`], plans it and sends
-//! the pieces to the servo thread. The [`host`] answers the requests of other processes. With
-//! [`arm_motion`] a kitting plan moves an arm. [`doctor`] checks the machine.
+//! the pieces to the servo thread. The [`host`] answers the requests of other processes, and the
+//! [`run_loop`] has commands executed while an operator watches. With [`arm_motion`] a kitting plan
+//! moves an arm. [`doctor`] checks the machine.
 //!
 //! This crate has no planning of its own, never names iceoryx2, prints nothing and reads no
 //! environment variable.
@@ -15,4 +16,5 @@ pub mod doctor;
 pub mod host;
 pub mod queue;
 mod recent;
+pub mod run_loop;
 pub mod session;

@@ -69,7 +69,7 @@ impl Client {
     pub fn ask(&self, ask: Verb, timeout: Duration) -> Result<Answer, IpcError> {
         let id = RequestId::new();
         let ticket = ask
-            .can_be_withdrawn()
+            .commands()
             .then(|| Ticket::issue(self.arm.domain(), id))
             .transpose()?;
         let request = Request {

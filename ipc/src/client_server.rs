@@ -117,7 +117,7 @@ impl ClientServer {
         match serde_json::from_slice::<Request>(bytes) {
             Ok(request) => {
                 let id = request.id;
-                if request.ask.can_be_withdrawn() && !ticket::take(self.arm.domain(), id) {
+                if request.ask.commands() && !ticket::take(self.arm.domain(), id) {
                     return None;
                 }
                 handle(request).encode(id).ok()

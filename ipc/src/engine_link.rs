@@ -4,23 +4,26 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::client::Client;
-use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{BackpressureStrategy, Node};
+use iceoryx2::prelude::BackpressureStrategy;
 
-use crate::node::{Shared, exchange, inhabitants, join, topic};
-use crate::{Arm, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint, State, Verdict, room, text_of};
+use crate::link_end::{LinkEnd, Role};
+use crate::node::Shared;
+use crate::{Arm, Hello, HelloAck, IpcError, MAX_JOINTS, Setpoint, State, Verdict, text_of};
+
+/// The engine's place in the link.
+const ENGINE: Role = Role {
+    name: "engine",
+    sends: "setpoint",
+    receives: "state",
+};
 
 /// The engine's end: sends setpoints, receives states, opens sessions. There is one for each arm
 /// among all processes. It stays in the thread that opened it.
 #[derive(Debug)]
 pub struct EngineLink {
-    arm: Arm,
-    setpoints: Publisher<Shared, Setpoint, ()>,
-    states: Subscriber<Shared, State, ()>,
     hello: Client<Shared, Hello, (), HelloAck, ()>,
-    // Last, so that it is dropped after its ports.
-    _node: Node<Shared>,
+    // Last: the node in it is dropped after all ports.
+    end: LinkEnd<Setpoint, State>,
 }
 
 impl EngineLink {
@@ -29,43 +32,14 @@ impl EngineLink {
     /// # Errors
     /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
-        let node = join(arm, "engine")?;
-        let fail = |operation, cause: String| IpcError::Failed {
-            service: arm.to_string(),
-            operation,
-            cause,
-        };
-        let factory = topic::<Setpoint>(&node, arm, "setpoint")?;
-        let setpoints = factory
-            .publisher_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .max_loaned_samples(2)
-            .create()
-            .map_err(|cause| match cause {
-                PublisherCreateError::ExceedsMaxSupportedPublishers => IpcError::Taken {
-                    arm: arm.to_string(),
-                    role: "engine",
-                    owner: inhabitants(&factory, &node),
-                },
-                other => fail("opening the setpoints", format!("{other:?}")),
-            })?;
-        let states = topic::<State>(&node, arm, "state")?
-            .subscriber_builder()
-            .create()
-            .map_err(|cause| fail("opening the states", format!("{cause:?}")))?;
-        let hello = exchange::<Hello, HelloAck>(&node, arm, "hello")?
-            .client_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|cause| fail("opening the handshake", format!("{cause:?}")))?;
-        room::reserve(arm.domain())?;
-        Ok(Self {
-            arm: arm.clone(),
-            setpoints,
-            states,
-            hello,
-            _node: node,
-        })
+        let end = LinkEnd::open(arm, ENGINE)?;
+        let hello = end.handshake(|factory| {
+            factory
+                .client_builder()
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+        })?;
+        Ok(Self { hello, end })
     }
 
     /// How many joints the driver has, from the states that it sends also without a session. Not
@@ -85,7 +59,7 @@ impl EngineLink {
             }
         }
         Err(IpcError::NoAnswer {
-            arm: self.arm.to_string(),
+            arm: self.arm().to_string(),
             role: "driver",
             waited_ms: timeout.as_millis() as u64,
         })
@@ -93,7 +67,7 @@ impl EngineLink {
 
     /// The arm.
     pub fn arm(&self) -> &Arm {
-        &self.arm
+        self.end.arm()
     }
 
     /// Asks the driver for a session and waits up to `timeout`. Not for the cycle.
@@ -109,7 +83,7 @@ impl EngineLink {
             }
             if Instant::now() >= end {
                 return Err(IpcError::NoAnswer {
-                    arm: self.arm.to_string(),
+                    arm: self.arm().to_string(),
                     role: "driver",
                     waited_ms: timeout.as_millis() as u64,
                 });
@@ -117,14 +91,14 @@ impl EngineLink {
         };
         if ack.verdict != Verdict::Welcome as u32 {
             return Err(IpcError::Refused {
-                arm: self.arm.to_string(),
+                arm: self.arm().to_string(),
                 driver: text_of(&ack.name),
                 reason: text_of(&ack.reason),
             });
         }
         let joints = hello.joints as usize;
         ack.check(joints).map_err(|cause| IpcError::BadMessage {
-            arm: self.arm.to_string(),
+            arm: self.arm().to_string(),
             cause,
         })?;
         Ok(ack)
@@ -133,7 +107,7 @@ impl EngineLink {
     /// Sends one request and waits for its answer; `None` when no driver took it.
     fn greet_once(&self, hello: &Hello, end: Instant) -> Result<Option<HelloAck>, IpcError> {
         let fail = |cause: String| IpcError::Failed {
-            service: self.arm.to_string(),
+            service: self.arm().to_string(),
             operation: "the handshake",
             cause,
         };
@@ -162,24 +136,16 @@ impl EngineLink {
     /// Sends a setpoint; says whether iceoryx2 took it. Does not wait, and does not allocate once
     /// the driver is connected. A slow reader loses its oldest message.
     pub fn send(&self, setpoint: Setpoint) -> bool {
-        self.setpoints.send_copy(setpoint).is_ok()
+        self.end.send(setpoint)
     }
 
     /// The oldest state that was not read yet, unchecked. Does not wait.
     pub fn next_state(&self) -> Option<State> {
-        self.states.receive().ok().flatten().map(|sample| *sample)
+        self.end.next()
     }
 
     /// The newest state, unchecked; older ones are dropped. Does not wait.
     pub fn last_state(&self) -> Option<State> {
-        let mut last = None;
-        // The number is limited, so a flood of states does not block the cycle.
-        for _ in 0..64 {
-            match self.next_state() {
-                Some(state) => last = Some(state),
-                None => break,
-            }
-        }
-        last
+        self.end.last()
     }
 }

@@ -24,6 +24,7 @@ mod driver_link;
 mod engine_link;
 mod error;
 mod hello;
+mod link_end;
 mod node;
 mod observer;
 mod ownership;

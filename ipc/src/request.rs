@@ -8,7 +8,8 @@ use crate::RequestId;
 /// and for no others.
 pub const LONGEST_ANSWER: usize = 16 << 10;
 
-/// What an operator asks of a running engine.
+/// What an operator asks of a running engine. What acts on the current motion (stop, pause, resume,
+/// override, abort, recover) is not among it: that is a [`crate::ControlAsk`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "verb", rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -22,24 +23,6 @@ pub enum Verb {
         /// The program.
         program: String,
     },
-    /// Stop on the path and stay there until `Resume`.
-    Pause,
-    /// Go on along the path.
-    Resume,
-    /// Share of the planned speed.
-    Override {
-        /// 0..=1.
-        share: f64,
-    },
-    /// Stop on the path.
-    Stop {
-        /// As fast as the joints can, instead of gently.
-        fast: bool,
-    },
-    /// Stop on the path and drop the queue.
-    Abort,
-    /// Clear a latched fault and open a new session with the driver.
-    Recover,
     /// Jog; the arm stops when no further request comes in time.
     Jog {
         /// `joint` or `tool`.
@@ -62,24 +45,13 @@ pub enum Verb {
 }
 
 impl Verb {
-    /// Whether the request is withdrawn when the client stops waiting. Stop, pause and abort are
-    /// executed all the same.
-    pub fn can_be_withdrawn(&self) -> bool {
-        self.commands()
-    }
-
-    /// Whether only the client that commands the arm may ask this. Any client may stop, pause and
-    /// ask for the status.
+    /// Whether it has an effect on arm or engine. Only the client that commands the arm may ask
+    /// this; and it is withdrawn when the client gives up waiting.
     pub fn commands(&self) -> bool {
-        matches!(
-            self,
-            Self::Submit { .. }
-                | Self::Resume
-                | Self::Override { .. }
-                | Self::Recover
-                | Self::Jog { .. }
-                | Self::Shutdown
-        )
+        match self {
+            Self::Submit { .. } | Self::Jog { .. } | Self::Shutdown => true,
+            Self::Status | Self::Notes { .. } => false,
+        }
     }
 }
 

@@ -197,17 +197,17 @@ fn one_client_commands_at_a_time() {
         ask,
     };
     let mut ownership = Ownership::default();
-    ownership.admit(&ask(&here, Verb::Resume), false).unwrap();
+    ownership.admit(&ask(&here, Verb::Shutdown), false).unwrap();
     let refusal = ownership
-        .admit(&ask(&there, Verb::Resume), true)
+        .admit(&ask(&there, Verb::Shutdown), true)
         .unwrap_err();
     assert!(refusal.message.contains("first"), "{}", refusal.message);
+    ownership.admit(&ask(&there, Verb::Status), true).unwrap();
     ownership
-        .admit(&ask(&there, Verb::Stop { fast: true }), true)
+        .admit(&ask(&there, Verb::Shutdown), false)
         .unwrap();
-    ownership.admit(&ask(&there, Verb::Resume), false).unwrap();
-    ownership.admit(&ask(&gone, Verb::Resume), false).unwrap();
-    ownership.admit(&ask(&here, Verb::Resume), true).unwrap();
+    ownership.admit(&ask(&gone, Verb::Shutdown), false).unwrap();
+    ownership.admit(&ask(&here, Verb::Shutdown), true).unwrap();
 }
 
 /// `canter shutdown`: the engine answers and has ended before the client polls again.
@@ -252,13 +252,6 @@ fn a_request_without_an_answer_is_withdrawn() {
         })
         .unwrap();
     assert_eq!(asked, [], "nothing is left to be done");
-
-    // To stop is done all the same.
-    let gave_up = client.ask(Verb::Stop { fast: true }, Duration::from_millis(30));
-    assert!(
-        matches!(gave_up, Err(IpcError::NoAnswer { .. })),
-        "{gave_up:?}"
-    );
 }
 
 /// An engine that has taken a request and is slow is waited for.

@@ -39,4 +39,4 @@ pub use monitor::Monitor;
 pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};
-pub use segment_sender::{Full, SegmentSender, ToolOrder};
+pub use segment_sender::{Full, SegmentSender, ToolOrder, Work};

@@ -25,12 +25,14 @@ pub struct ToolOrder {
 
 /// What goes through the ring.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Work<const N: usize> {
+pub enum Work<const N: usize> {
+    /// A piece of a planned motion.
     Motion(Segment<N>),
+    /// An order to a tool.
     Tool(ToolOrder),
 }
 
-/// Work and the epoch it belongs to: an abort begins a new epoch and drops older work.
+/// Work and the epoch it belongs to: an abort begins a new epoch and drops what is older.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item<const N: usize> {
     pub(super) epoch: u32,
@@ -85,7 +87,11 @@ impl<const N: usize> SegmentSender<N> {
         self.ring.slots()
     }
 
-    fn hand_over(&mut self, work: Work<N>) -> Result<(), Full> {
+    /// Hands over a segment or a tool order.
+    ///
+    /// # Errors
+    /// [`Full`] when there is no room now.
+    pub fn hand_over(&mut self, work: Work<N>) -> Result<(), Full> {
         self.ring
             .push(Item {
                 epoch: self.epoch,

@@ -15,6 +15,16 @@ struct Run {
     seconds: f64,
 }
 
+/// Whether this command is done, and none after it.
+fn has_finished(events: &[Event], last: u32) -> bool {
+    let done = events.iter().rev().find_map(|event| match event {
+        Event::Finished { command, .. } => Some(*command),
+        Event::Faulted { fault, .. } => panic!("{fault}"),
+        _ => None,
+    });
+    done == Some(last)
+}
+
 /// Commands 0 to `commands`, a gripper order after the first.
 fn run(name: &str, commands: u32) -> Run {
     let arm = system_tests::domain::arm(&format!("servo/{name}"));
@@ -40,22 +50,9 @@ fn run(name: &str, commands: u32) -> Run {
         }
         let (mut events, mut samples) = (Vec::new(), Vec::new());
         let patience = Instant::now();
-        loop {
-            while let Some(sample) = monitor.sample() {
-                samples.push(sample);
-            }
-            while let Some(event) = monitor.event() {
-                events.push(event);
-            }
-            let last = Some(commands - 1);
-            let done = events.iter().rev().find_map(|event| match event {
-                Event::Finished { command, .. } => Some(*command),
-                Event::Faulted { fault, .. } => panic!("{fault}"),
-                _ => None,
-            });
-            if done == last {
-                break;
-            }
+        while !has_finished(&events, commands - 1) {
+            samples.extend(std::iter::from_fn(|| monitor.sample()));
+            events.extend(std::iter::from_fn(|| monitor.event()));
             assert!(
                 patience.elapsed() < Duration::from_secs(120),
                 "not done: {events:?}"
@@ -65,9 +62,7 @@ fn run(name: &str, commands: u32) -> Run {
         let seconds = start.elapsed().as_secs_f64();
         drop(executor);
         // The periods in work when the last event came.
-        while let Some(sample) = monitor.sample() {
-            samples.push(sample);
-        }
+        samples.extend(std::iter::from_fn(|| monitor.sample()));
         stop.store(true, Ordering::Relaxed);
         driver.join().unwrap();
         Run {

@@ -1,91 +1,14 @@
 //! An engine and a driver as separate processes, and what the driver received.
 
-use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+pub(crate) use system_tests::peer::{PATIENCE, Peer};
 use system_tests::servo_arm::{JOINTS, limits};
 
-/// How long a test waits for something that must come.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
-
-/// A process that ends with the test.
-pub(crate) struct Peer {
-    pub(crate) child: Child,
-    input: Option<ChildStdin>,
-    lines: Receiver<String>,
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-impl Peer {
-    pub(crate) fn start(words: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_servo-peer"));
-        let mut child = system_tests::domain::join(&mut command)
-            .args(words)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let (send, lines) = channel();
-        let input = child.stdin.take();
-        for stream in [
-            Box::new(child.stdout.take().unwrap()) as Box<dyn std::io::Read + Send>,
-            Box::new(child.stderr.take().unwrap()),
-        ] {
-            let send = send.clone();
-            thread::spawn(move || {
-                for line in BufReader::new(stream).lines().map_while(Result::ok) {
-                    if send.send(line).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        Self {
-            child,
-            input,
-            lines,
-        }
-    }
-
-    /// Waits for a line with `text` in it.
-    pub(crate) fn wait_for(&self, text: &str) -> String {
-        let end = Instant::now() + PATIENCE;
-        let mut seen = Vec::new();
-        while let Ok(line) = self
-            .lines
-            .recv_timeout(end.saturating_duration_since(Instant::now()))
-        {
-            if line.contains(text) {
-                return line;
-            }
-            seen.push(line);
-        }
-        panic!(
-            "no line with {text:?}; the last were {:?}",
-            &seen[seen.len().saturating_sub(5)..]
-        );
-    }
-
-    pub(crate) fn say(&mut self, line: &str) {
-        writeln!(self.input.as_mut().unwrap(), "{line}").unwrap();
-    }
-
-    pub(crate) fn signal(&self, signal: i32) {
-        system_tests::signal::send(&self.child, signal);
-    }
-}
+/// Engine, driver or a hostile process, by its first argument.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_servo-peer");
 
 /// A separate arm for a test, with a driver that writes a log.
 pub(crate) struct Scene {
@@ -107,16 +30,22 @@ impl Scene {
     }
 
     pub(crate) fn driver(&self, number: u32) -> Peer {
-        Peer::start(&["driver", &self.arm, self.log(number).to_str().unwrap()])
+        Peer::start(
+            PROGRAM,
+            &["driver", &self.arm, self.log(number).to_str().unwrap()],
+        )
     }
 
     pub(crate) fn engine(&self) -> Peer {
-        Peer::start(&["engine", &self.arm])
+        Peer::start(PROGRAM, &["engine", &self.arm])
     }
 
     /// A driver that does something wrong.
     pub(crate) fn hostile(&self, kind: &str) -> Peer {
-        Peer::start(&["hostile", &self.arm, self.log(0).to_str().unwrap(), kind])
+        Peer::start(
+            PROGRAM,
+            &["hostile", &self.arm, self.log(0).to_str().unwrap(), kind],
+        )
     }
 
     /// Both, with the arm moving.

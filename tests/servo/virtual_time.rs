@@ -161,8 +161,17 @@ fn faulted(change: impl Fn(State) -> Option<State> + Copy, periods: u64) -> Faul
     fault.expect("a fault was reported")
 }
 
+/// The fault that the next state brings about when it is changed like this.
+fn fault_of(change: impl Fn(&mut State) + Copy) -> Fault {
+    let changed = |mut state: State| {
+        change(&mut state);
+        Some(state)
+    };
+    faulted(changed, 1)
+}
+
 #[test]
-fn what_a_driver_may_do_wrong() {
+fn a_silent_driver_is_lost() {
     let lost = faulted(|_| None, 150);
     assert!(
         matches!(
@@ -173,43 +182,26 @@ fn what_a_driver_may_do_wrong() {
         ),
         "{lost}"
     );
-    let other = faulted(
-        |state| {
-            Some(State {
-                session: 9,
-                ..state
-            })
-        },
-        150,
-    );
-    assert!(matches!(other, Fault::DriverLost { .. }));
-    let nan = faulted(
-        |mut state| {
-            state.position[2] = f64::NAN;
-            Some(state)
-        },
-        1,
-    );
-    assert!(matches!(nan, Fault::BadState(_)), "{nan}");
-    let nonsense = faulted(
-        |state| {
-            Some(State {
-                driver_state: 99,
-                ..state
-            })
-        },
-        1,
-    );
-    assert!(matches!(nonsense, Fault::BadState(_)));
-    let joints = faulted(|state| Some(State { joints: 7, ..state }), 1);
-    assert!(matches!(joints, Fault::BadState(_)));
-    let far = faulted(
-        |mut state| {
-            state.position[1] += 0.5;
-            Some(state)
-        },
-        1,
-    );
+    let other = |mut state: State| {
+        state.session = 9;
+        Some(state)
+    };
+    let other = faulted(other, 150);
+    assert!(matches!(other, Fault::DriverLost { .. }), "{other}");
+}
+
+#[test]
+fn what_a_driver_may_do_wrong() {
+    let bad: [fn(&mut State); 3] = [
+        |state| state.position[2] = f64::NAN,
+        |state| state.driver_state = 99,
+        |state| state.joints = 7,
+    ];
+    for change in bad {
+        let fault = fault_of(change);
+        assert!(matches!(fault, Fault::BadState(_)), "{fault}");
+    }
+    let far = fault_of(|state| state.position[1] += 0.5);
     assert!(
         matches!(far, Fault::Limit(trip) if trip.joint == 1),
         "{far}"
@@ -218,19 +210,11 @@ fn what_a_driver_may_do_wrong() {
         far.to_string().starts_with("joint 2: following error 0.5"),
         "{far}"
     );
-    let stopped = faulted(
-        |state| {
-            let driver_state = DriverState::Stopping as u32;
-            let fault = FaultCode::Hardware as u32;
-            Some(State {
-                driver_state,
-                fault,
-                fault_joint: 3,
-                ..state
-            })
-        },
-        1,
-    );
+    let stopped = fault_of(|state| {
+        state.driver_state = DriverState::Stopping as u32;
+        state.fault = FaultCode::Hardware as u32;
+        state.fault_joint = 3;
+    });
     assert_eq!(
         stopped.to_string(),
         "driver fault at joint 4: a fault of the hardware"

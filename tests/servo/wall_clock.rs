@@ -5,11 +5,31 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ipc::Clock;
-use servo::{Control, Event, Executor, ExecutorError, Fault};
-use system_tests::servo_arm::{driver_options, executor_config, feed, planned};
+use servo::{Control, Event, Executor, ExecutorError, Fault, Recorded};
+use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed, planned};
 
 fn arm(name: &str) -> ipc::Arm {
     system_tests::domain::arm(&format!("wall/{name}"))
+}
+
+/// Every sample is on the plan of its command, no earlier than planned.
+fn assert_on_plan(events: &[Event], samples: &[Recorded<JOINTS>]) {
+    let mut started = [u64::MAX; 3];
+    for event in events {
+        match event {
+            Event::Started { command, tick } => started[*command as usize] = *tick,
+            Event::Faulted { fault, .. } => panic!("{fault}"),
+            _ => {}
+        }
+    }
+    for sample in samples.iter().filter(|sample| sample.tick >= started[0]) {
+        // Late periods are left out and delay the plan.
+        let passed = (sample.tick - started[sample.command as usize]) as f64 * 0.001;
+        assert!(sample.path_time <= passed + 1e-9);
+        let plan = planned(sample.command, sample.path_time);
+        let distance = (sample.setpoint.position - plan).amax();
+        assert!(distance < 1e-9, "{distance} rad from the plan");
+    }
 }
 
 /// Programs run by the clock: the samples are the plan's, the periods add up.
@@ -49,22 +69,7 @@ fn the_periods_add_up() {
         assert_eq!(counters.published, samples.len() as u64);
         assert_eq!(counters.ticks, last + 1, "{counters:?}");
         assert_eq!((counters.unsent, counters.lost_reports), (0, 0));
-        let mut started = [u64::MAX; 3];
-        for event in &events {
-            match event {
-                Event::Started { command, tick } => started[*command as usize] = *tick,
-                Event::Faulted { fault, .. } => panic!("{fault}"),
-                _ => {}
-            }
-        }
-        for sample in samples.iter().filter(|sample| sample.tick >= started[0]) {
-            // Late periods are left out and delay the plan.
-            let passed = (sample.tick - started[sample.command as usize]) as f64 * 0.001;
-            assert!(sample.path_time <= passed + 1e-9);
-            let plan = planned(sample.command, sample.path_time);
-            let distance = (sample.setpoint.position - plan).amax();
-            assert!(distance < 1e-9, "{distance} rad from the plan");
-        }
+        assert_on_plan(&events, &samples);
         println!(
             "{counters:?}; wake-up p50 {} ns p99 {} ns; work p50 {} ns p99 {} ns",
             remote.latency().quantile(0.5),

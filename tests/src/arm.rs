@@ -41,6 +41,15 @@ pub struct Tool {
     pub workstation_from_holder: Option<Isometry3<f64>>,
 }
 
+impl Tool {
+    fn read(tool: &Table) -> Self {
+        Self {
+            flange_from_tcp: pose(&tool["flange_from_tcp"]),
+            workstation_from_holder: tool.get("workstation_from_holder").map(pose),
+        }
+    }
+}
+
 impl Arm {
     /// Reads `robots/<name>`.
     ///
@@ -63,9 +72,8 @@ impl Arm {
             .collect();
         let limit = |from_urdf: &str, from_toml: &str| {
             let given = file["joints"].get(from_toml).map(numbers);
-            given
-                .or_else(|| attribute(&urdf, &names, from_urdf))
-                .expect("a limit for every joint")
+            let limit = given.or_else(|| attribute(&urdf, &names, from_urdf));
+            limit.expect("a limit for every joint")
         };
         let [lower, upper, velocity, acceleration, jerk] = [
             limit("lower", ""),
@@ -84,32 +92,24 @@ impl Arm {
             .filter_map(Value::as_table)
             .collect();
         let mounted = file.get("mounted").map(|name| {
-            tools
-                .iter()
-                .position(|tool| tool["name"] == *name)
-                .expect("mounted tool is listed")
+            let mounted = tools.iter().position(|tool| tool["name"] == *name);
+            mounted.expect("mounted tool is listed")
         });
-        let limits = &file["tool_limits"];
+        let limits = |name: &str| number(&file["tool_limits"][name]);
         Self {
             workstation_from_base: pose(&file["base"]),
             acceleration,
             jerk,
-            tool_speed: number(&limits["speed_m_per_s"]),
-            tool_acceleration: number(&limits["acceleration_m_per_s2"]),
-            tool_jerk: number(&limits["jerk_m_per_s3"]),
+            tool_speed: limits("speed_m_per_s"),
+            tool_acceleration: limits("acceleration_m_per_s2"),
+            tool_jerk: limits("jerk_m_per_s3"),
             angular: [
-                number(&limits["angular_speed_rad_per_s"]),
-                number(&limits["angular_acceleration_rad_per_s2"]),
-                number(&limits["angular_jerk_rad_per_s3"]),
+                limits("angular_speed_rad_per_s"),
+                limits("angular_acceleration_rad_per_s2"),
+                limits("angular_jerk_rad_per_s3"),
             ],
             home: numbers(&file["home"]["joints_rad_or_m"]),
-            tools: tools
-                .iter()
-                .map(|tool| Tool {
-                    flange_from_tcp: pose(&tool["flange_from_tcp"]),
-                    workstation_from_holder: tool.get("workstation_from_holder").map(pose),
-                })
-                .collect(),
+            tools: tools.into_iter().map(Tool::read).collect(),
             mounted,
             joints,
             chain,

@@ -5,7 +5,10 @@
 
 pub mod arm;
 pub mod domain;
+pub mod long_move;
 pub mod motion;
+pub mod peer;
+pub mod pipe;
 pub mod repository;
 pub mod servo_arm;
 pub mod signal;

@@ -1,7 +1,6 @@
 //! An engine that moves an arm, and the load beside it (a busy planner, a full pipe, busy clients).
 
-use std::io::Write;
-use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -9,6 +8,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ipc::{Arm, Client, Verb};
+use system_tests::long_move::smooth_list;
+use system_tests::pipe::full_pipe;
 use system_tests::signal;
 
 /// The load during the motion.
@@ -192,41 +193,8 @@ fn program(poses: usize) -> String {
         );
     }
     if poses > 0 {
-        text.push_str("SetIntermediatePointTolerance(5)\nMoveSmoothlyTo({\n");
-        for index in 0..poses {
-            let turn = index as f64 / 40.0 * std::f64::consts::TAU;
-            let up = 400.0 - 80.0 * index as f64 / poses as f64;
-            let comma = if index + 1 == poses { "" } else { "," };
-            text.push_str(&format!(
-                "{{{{{:.3}, {:.3}, {up:.3}}}, {{0,0,-1}}, {{1,1,0}}}}{comma}\n",
-                400.0 + 60.0 * turn.sin(),
-                -200.0 + 60.0 * (1.0 - turn.cos()),
-            ));
-        }
-        text.push_str(&format!("}}, {poses})\n"));
+        text.push_str(&smooth_list(poses, -200.0));
     }
     text.push_str("EndCanon(0)\n");
     text
-}
-
-/// A pipe that takes nothing: it is full and nobody reads. Its reader, and the end to write to.
-fn full_pipe() -> (OwnedFd, Stdio) {
-    let mut ends = [0; 2];
-    #[expect(unsafe_code, reason = "the standard library's pipe has no size")]
-    // SAFETY: the array has room for two numbers; what comes back is ours alone.
-    let (reader, writer) = unsafe {
-        assert_eq!(libc::pipe2(ends.as_mut_ptr(), libc::O_CLOEXEC), 0);
-        libc::fcntl(ends[1], libc::F_SETPIPE_SZ, 4096);
-        (OwnedFd::from_raw_fd(ends[0]), OwnedFd::from_raw_fd(ends[1]))
-    };
-    let mut file = std::fs::File::from(writer);
-    #[expect(unsafe_code, reason = "the standard library does not show the flag")]
-    // SAFETY: the file is open; the calls take numbers only.
-    unsafe {
-        let flags = libc::fcntl(file.as_raw_fd(), libc::F_GETFL);
-        libc::fcntl(file.as_raw_fd(), libc::F_SETFL, flags | libc::O_NONBLOCK);
-        while file.write(&[b'x'; 512]).is_ok() {}
-        libc::fcntl(file.as_raw_fd(), libc::F_SETFL, flags);
-    }
-    (reader, Stdio::from(file))
 }

@@ -3,7 +3,6 @@
 //! --nocapture`; `SEED` sets the seed.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
-mod peer;
 mod scene;
 
 use std::thread;

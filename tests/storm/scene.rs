@@ -6,10 +6,12 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use ipc::{DriverState, FaultCode, Observer, State};
+use system_tests::peer::Peer;
 use system_tests::servo_arm::JOINTS;
 use system_tests::witness::Worst;
 
-use crate::peer::Peer;
+/// Engine or driver, by its first argument.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_shuttle-peer");
 
 /// How long something that must come may take.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -71,8 +73,8 @@ impl Arm {
         let folder = tempfile::tempdir().unwrap();
         let observer = Observer::open(&system_tests::domain::arm(&name)).unwrap();
         let file = folder.path().join("0");
-        let driver = Peer::start(&["driver", &name, file.to_str().unwrap()]);
-        let engine = Peer::start(&["engine", &name]);
+        let driver = Peer::start(PROGRAM, &["driver", &name, file.to_str().unwrap()]);
+        let engine = Peer::start(PROGRAM, &["engine", &name]);
         Self {
             name,
             folder,
@@ -254,7 +256,7 @@ impl Arm {
     fn kill_engine(&mut self) {
         self.engine.kill();
         self.latch(&[FaultCode::Watchdog, FaultCode::Stalled], "engine killed");
-        self.engine = Peer::start(&["engine", &self.name]);
+        self.engine = Peer::start(PROGRAM, &["engine", &self.name]);
         // It opens a session by itself.
         if self.engine.line_with(&["Started"], PATIENCE).is_none() {
             self.broken("a new engine does not start");
@@ -266,7 +268,7 @@ impl Arm {
     fn new_driver(&mut self) {
         let file = self.file(self.drivers);
         self.drivers += 1;
-        self.driver = Peer::start(&["driver", &self.name, file.to_str().unwrap()]);
+        self.driver = Peer::start(PROGRAM, &["driver", &self.name, file.to_str().unwrap()]);
         self.recover();
     }
 

@@ -335,7 +335,12 @@ fn pipes_and_devices_are_refused() {
             ran.stderr
         );
     }
-    // Standard input may be anything, but not without end.
+}
+
+/// Standard input may be anything, but not without end.
+#[test]
+fn input_without_end_is_refused() {
+    let (zero, robot) = ("/dev/zero", ["--robot", "ur5e"]);
     let ran = ended(&["check", "-"], zero);
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     assert!(ran.stderr.contains("at most 256 MiB"), "{}", ran.stderr);

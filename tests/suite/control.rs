@@ -2,13 +2,15 @@
 //! that has passed.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::canter::{canter, command};
+use crate::status::{status, wait_for};
+use system_tests::long_move::smooth_list;
+use system_tests::pipe::full_pipe;
 use system_tests::signal;
 
 /// How long a test waits for something that must come.
@@ -44,29 +46,6 @@ impl Peer {
     }
 }
 
-/// A pipe that takes nothing: it is full and nobody reads. Both its ends.
-fn full_pipe() -> (OwnedFd, Stdio) {
-    let mut ends = [0; 2];
-    #[expect(unsafe_code, reason = "the standard library's pipe has no size")]
-    // SAFETY: the array has room for two numbers; what comes back is ours alone.
-    let (reader, writer) = unsafe {
-        assert_eq!(libc::pipe2(ends.as_mut_ptr(), libc::O_CLOEXEC), 0);
-        let size = libc::fcntl(ends[1], libc::F_SETPIPE_SZ, 4096);
-        assert!(size > 0);
-        (OwnedFd::from_raw_fd(ends[0]), OwnedFd::from_raw_fd(ends[1]))
-    };
-    let mut file = std::fs::File::from(writer);
-    #[expect(unsafe_code, reason = "the standard library does not show the flag")]
-    // SAFETY: the file is open; the calls take numbers only.
-    unsafe {
-        let flags = libc::fcntl(file.as_raw_fd(), libc::F_GETFL);
-        libc::fcntl(file.as_raw_fd(), libc::F_SETFL, flags | libc::O_NONBLOCK);
-        while file.write(&[b'x'; 512]).is_ok() {}
-        libc::fcntl(file.as_raw_fd(), libc::F_SETFL, flags);
-    }
-    (reader, Stdio::from(file))
-}
-
 fn engine(arm: &str, stdout: Stdio) -> Peer {
     let mut child = command(["engine", "--robot", "ur5e", "--arm", arm])
         .stderr(Stdio::piped())
@@ -82,26 +61,6 @@ fn engine(arm: &str, stdout: Stdio) -> Peer {
     Peer(child)
 }
 
-fn status(arm: &str) -> Value {
-    let ran = canter(["status", "--json", "--arm", arm]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).unwrap()
-}
-
-fn wait_for(arm: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-    let deadline = Instant::now() + PATIENCE;
-    loop {
-        let now = status(arm);
-        if wanted(&now) {
-            return now;
-        }
-        assert!(
-            Instant::now() < deadline,
-            "{what} did not come about: {now}"
-        );
-    }
-}
-
 fn moves(now: &Value) -> bool {
     now["time_scaling"].as_f64() > Some(0.9)
 }
@@ -110,20 +69,10 @@ fn moves(now: &Value) -> bool {
 fn slow_then_long(poses: usize) -> String {
     let mut text = "InitCanon()\nSetRelativeSpeed(100)\n\
         MoveTo({{400, -200, 400}, {0,0,-1}, {1,1,0}})\nSetAbsoluteSpeed(10)\n\
-        MoveStraightTo({{400, 200, 400}, {0,0,-1}, {1,1,0}})\nSetRelativeSpeed(60)\n\
-        SetIntermediatePointTolerance(5)\nMoveSmoothlyTo({\n"
+        MoveStraightTo({{400, 200, 400}, {0,0,-1}, {1,1,0}})\nSetRelativeSpeed(60)\n"
         .to_owned();
-    for index in 0..poses {
-        let turn = index as f64 / 40.0 * std::f64::consts::TAU;
-        let up = 400.0 - 80.0 * index as f64 / poses as f64;
-        let comma = if index + 1 == poses { "" } else { "," };
-        text.push_str(&format!(
-            "{{{{{:.3}, {:.3}, {up:.3}}}, {{0,0,-1}}, {{1,1,0}}}}{comma}\n",
-            400.0 + 60.0 * turn.sin(),
-            200.0 + 60.0 * (turn.cos() - 1.0),
-        ));
-    }
-    text.push_str(&format!("}}, {poses})\nEndCanon(0)\n"));
+    text.push_str(&smooth_list(poses, 200.0));
+    text.push_str("EndCanon(0)\n");
     text
 }
 

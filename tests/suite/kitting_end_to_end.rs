@@ -14,7 +14,7 @@ use crate::plans::{Work, objects, own, report, run, world};
 
 /// Largest distance of the controlled point from a pose: the planned end is exact to less than a
 /// micrometre, the rest is the following error of the driver (m, rad).
-const END_TOLERANCE: (f64, f64) = (1e-4, 1e-3);
+const END_TOLERANCE: [f64; 2] = [1e-4, 1e-3];
 
 /// Standstill (servo ticks) in which the gripper acts: it takes 0.2 s, and a part of that later the
 /// servos have settled.
@@ -35,7 +35,7 @@ fn pose(value: &Value) -> Isometry3<f64> {
 }
 
 /// Whether two poses are within a distance (m) and an angle (rad).
-fn near(one: &Isometry3<f64>, other: &Isometry3<f64>, (distance, angle): (f64, f64)) -> bool {
+fn near(one: &Isometry3<f64>, other: &Isometry3<f64>, [distance, angle]: [f64; 2]) -> bool {
     let difference = one.inv_mul(other);
     difference.translation.vector.norm() < distance && difference.rotation.angle() < angle
 }
@@ -63,7 +63,7 @@ pub(crate) fn assert_kits(world: &Value, kits: usize) {
         for part in parts {
             let at = |design: &&Value| {
                 design["sku"] == part["properties"]["hasPart_SkuRef"]
-                    && near(&pose(&part["pose"]), &pose(&design["pose"]), (1e-6, 1e-5))
+                    && near(&pose(&part["pose"]), &pose(&design["pose"]), [1e-6, 1e-5])
             };
             let found = wanted.iter().position(at);
             wanted.remove(found.unwrap_or_else(|| panic!("{part} is at no place of the design")));

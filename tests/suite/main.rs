@@ -24,6 +24,7 @@ mod runs;
 mod session;
 mod shared_memory;
 mod soak;
+mod status;
 mod world_in_use;
 
 /// Every file of this folder is a module above: otherwise it would never run.

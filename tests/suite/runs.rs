@@ -2,11 +2,12 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, ChildStdout, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::Value;
 
 use crate::canter::{canter, command};
+use crate::status::{status, wait_for};
 use system_tests::signal;
 
 /// An arm name that no other test uses.
@@ -340,27 +341,6 @@ impl Drop for Engine {
     fn drop(&mut self) {
         // It has ended, unless the test is failing.
         let _ = self.0.kill();
-    }
-}
-
-fn status(arm: &str) -> Value {
-    let ran = canter(["status", "--json", "--arm", arm]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).unwrap()
-}
-
-/// Waits until the status is as wanted.
-fn wait_for(arm: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    loop {
-        let now = status(arm);
-        if wanted(&now) {
-            return now;
-        }
-        assert!(
-            Instant::now() < deadline,
-            "{what} did not come about: {now}"
-        );
     }
 }
 

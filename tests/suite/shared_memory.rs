@@ -3,6 +3,7 @@
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -13,6 +14,7 @@ use serde_json::Value;
 use system_tests::domain;
 
 use crate::canter::{canter, command};
+use crate::status::status;
 
 /// How long a test waits for something that must come.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -47,13 +49,6 @@ impl Drop for Engine {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
-}
-
-/// The status of an engine that is there.
-fn status(arm: &str) -> Value {
-    let ran = canter(["status", "--json", "--arm", arm]);
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    serde_json::from_str(&ran.stdout).unwrap()
 }
 
 /// A program that was answered with "no engine" is not executed later.
@@ -199,6 +194,18 @@ fn kill_all(mut engine: Engine, domain: &Domain) {
     }
 }
 
+/// Exit code and output of a command in a domain; it must not die of a signal.
+fn said_in(domain: &Path, words: &[&str], context: &str) -> (i32, String) {
+    let mut command = command(words);
+    command.env(DOMAIN_VARIABLE, domain);
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let heard = String::from_utf8_lossy(&output.stdout).into_owned();
+    let signal = output.status.signal();
+    assert_eq!(signal, None, "{words:?} after {context}: {said}");
+    (output.status.code().unwrap(), said + &heard)
+}
+
 /// However segments are damaged, while an engine runs or after it was killed: no client dies of a
 /// signal or hangs, each says what repairs the damage, and after the repair everything works.
 #[test]
@@ -209,19 +216,8 @@ fn damaged_segments_are_named_and_repaired() {
         for alive in [false, true] {
             let place = folder.path().join(format!("{number}-{alive}"));
             let domain = Domain::open(&place).unwrap();
-            let words = |words: &[&str]| {
-                let mut command = command(words);
-                command.env(DOMAIN_VARIABLE, &place);
-                let output = command.output().unwrap();
-                let said = String::from_utf8_lossy(&output.stderr).into_owned();
-                let heard = String::from_utf8_lossy(&output.stdout).into_owned();
-                let signal = output.status.signal();
-                assert_eq!(
-                    signal, None,
-                    "{words:?} after {damage}, alive {alive}: {said}"
-                );
-                (output.status.code().unwrap(), said + &heard)
-            };
+            let context = format!("{damage}, alive {alive}");
+            let words = |words: &[&str]| said_in(&place, words, &context);
             let engine = Engine::start("memory/damaged", &["--domain", place.to_str().unwrap()]);
             let engine = if alive {
                 let (code, said) = words(&["doctor", "--repair"]);
@@ -248,10 +244,10 @@ fn damaged_segments_are_named_and_repaired() {
                 let (code, said) = words(asking);
                 looked += 1;
                 told += u32::from(said.contains("doctor --repair"));
-                assert_ne!(code, 0, "{asking:?} after {damage}, alive {alive}: {said}");
+                assert_ne!(code, 0, "{asking:?} after {context}: {said}");
             }
             let (_, said) = words(&["doctor", "--seconds", "0.1"]);
-            println!("{damage}, alive {alive}: {said}");
+            println!("{context}: {said}");
             if let Some(engine) = engine {
                 kill_all(engine, &domain);
             }
@@ -268,46 +264,48 @@ fn damaged_segments_are_named_and_repaired() {
     assert!(told * 2 > looked, "{told} of {looked}");
 }
 
+/// Fills the memory under an engine that moves, and says what each command came to.
+const FILL: &str = r#"
+    mount -t tmpfs -o size=48m,mode=1777 tmpfs /dev/shm || exit 77
+    before=$(df --output=used -k /dev/shm | tail -1)
+    $CANTER engine --robot ur5e --arm memory/full > $OUT/engine.txt 2>&1 &
+    engine=$!
+    for i in $(seq 200); do
+        $CANTER status --arm memory/full > /dev/null 2>&1 && break
+        sleep 0.1
+    done
+    after=$(df --output=used -k /dev/shm | tail -1)
+    echo "used $((after - before)) KiB"
+    $CANTER send --no-wait examples/pick_and_place.canon --arm memory/full
+    sleep 0.5
+    dd if=/dev/zero of=/dev/shm/fill bs=64k > /dev/null 2>&1
+    dd if=/dev/zero of=/dev/shm/fill2 bs=4k > /dev/null 2>&1
+    $CANTER status --arm memory/full > $OUT/status.txt 2>&1
+    echo "status $?"
+    $CANTER run examples/pick_and_place.canon --robot ur5e --arm memory/other > $OUT/run.txt 2>&1
+    echo "run $?"
+    $CANTER doctor --seconds 0.1 > $OUT/doctor.txt 2>&1
+    echo "doctor $?"
+    sleep 0.5
+    kill -0 $engine && echo "engine lives"
+    rm /dev/shm/fill /dev/shm/fill2
+    $CANTER status --json --arm memory/full > $OUT/later.txt 2>&1
+    echo "later $?"
+    dd if=/dev/zero of=/dev/shm/fill bs=4k > /dev/null 2>&1
+    kill -INT $engine
+    wait $engine
+    echo "engine $?"
+    cat $OUT/status.txt $OUT/run.txt $OUT/doctor.txt
+"#;
+
 /// In a separate `/dev/shm` of 48 MiB: a moving engine continues when the memory is full, clients
 /// report what is missing, and SIGINT stops the arm.
 #[test]
 fn a_full_shared_memory_is_named() {
-    const SCRIPT: &str = r#"
-        mount -t tmpfs -o size=48m,mode=1777 tmpfs /dev/shm || exit 77
-        before=$(df --output=used -k /dev/shm | tail -1)
-        $CANTER engine --robot ur5e --arm memory/full > $OUT/engine.txt 2>&1 &
-        engine=$!
-        for i in $(seq 200); do
-            $CANTER status --arm memory/full > /dev/null 2>&1 && break
-            sleep 0.1
-        done
-        after=$(df --output=used -k /dev/shm | tail -1)
-        echo "used $((after - before)) KiB"
-        $CANTER send --no-wait examples/pick_and_place.canon --arm memory/full
-        sleep 0.5
-        dd if=/dev/zero of=/dev/shm/fill bs=64k > /dev/null 2>&1
-        dd if=/dev/zero of=/dev/shm/fill2 bs=4k > /dev/null 2>&1
-        $CANTER status --arm memory/full > $OUT/status.txt 2>&1
-        echo "status $?"
-        $CANTER run examples/pick_and_place.canon --robot ur5e --arm memory/other > $OUT/run.txt 2>&1
-        echo "run $?"
-        $CANTER doctor --seconds 0.1 > $OUT/doctor.txt 2>&1
-        echo "doctor $?"
-        sleep 0.5
-        kill -0 $engine && echo "engine lives"
-        rm /dev/shm/fill /dev/shm/fill2
-        $CANTER status --json --arm memory/full > $OUT/later.txt 2>&1
-        echo "later $?"
-        dd if=/dev/zero of=/dev/shm/fill bs=4k > /dev/null 2>&1
-        kill -INT $engine
-        wait $engine
-        echo "engine $?"
-        cat $OUT/status.txt $OUT/run.txt $OUT/doctor.txt
-    "#;
     let folder = tempfile::tempdir().unwrap();
     let mut unshare = Command::new("unshare");
     let output = domain::join(&mut unshare)
-        .args(["-m", "sh", "-c", SCRIPT])
+        .args(["-m", "sh", "-c", FILL])
         .current_dir(system_tests::repository::root())
         .env("CANTER", env!("CARGO_BIN_EXE_canter-under-test"))
         .env("OUT", folder.path())

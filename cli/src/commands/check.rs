@@ -35,7 +35,7 @@ impl Check {
         if let Some(robot) = &robot
             && file.exit() != Exit::Unreadable
         {
-            let plan = file.plan(robot, (1000.0, None), FailurePolicy::Skip)?;
+            let plan = file.plan(robot, 1000.0, None, FailurePolicy::Skip)?;
             file.add_refusals(&plan.refusals);
         }
         if self.json {

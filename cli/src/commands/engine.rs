@@ -1,6 +1,10 @@
-use clap::Args;
-use engine::session::Note;
+use std::io;
 
+use clap::Args;
+use engine::run_loop::{Operator, RunEnd, RunLoop};
+use engine::session::{Note, Session};
+
+use crate::console::tell_json;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{HostOptions, RefusalOption};
@@ -34,47 +38,56 @@ impl Engine {
         }
         let signals = SignalThread::start(printer, "once more to brake hard")?;
         let length = crcl::LengthUnit::default();
-        let mut host =
-            self.host
-                .start(&robot, self.robot.place(), length, self.refusal.policy())?;
+        let host = self
+            .host
+            .start(&robot, self.robot.place(), length, self.refusal.policy())?;
         signals.steer(&host.session);
         printer.note(&format!(
             "canter: engine of {} at {}, driver {}",
             robot.name, host.arm, host.session.driver
         ));
-        let exit = loop {
-            if signals.has_stopped(&host.session) {
-                let idle = host.session.status().idle;
-                break if idle { Exit::Done } else { Exit::Stopped };
-            }
-            if signals.count() > 1 {
-                break Exit::Stopped;
-            }
-            if host.is_shut_down() {
-                break Exit::Done;
-            }
-            let note = host.turn()?;
-            // The recording is not used here; it must not grow.
-            drop(host.session.samples());
-            let Some(note) = note else { continue };
-            self.tell(printer, &note);
-            if matches!(note, Note::Closed) {
-                break Exit::Internal;
-            }
+        let desk = EngineDesk {
+            signals,
+            printer: printer.clone(),
+            json: self.json,
         };
-        drop(host);
-        signals.release();
+        let mut running = RunLoop::new(host, desk);
+        let exit = match running.serve()? {
+            RunEnd::Stopped if running.session().status().idle => Exit::Done,
+            RunEnd::Stopped => Exit::Stopped,
+            RunEnd::ShutDown => Exit::Done,
+            _ => Exit::Internal,
+        };
+        let (desk, _) = running.finish()?;
+        desk.signals.release();
         Ok(exit)
     }
+}
 
-    fn tell(&self, printer: &Printer, note: &Note) {
-        if !self.json {
-            return printer.line(&line(note));
+/// The operator of an engine that runs until it is ended.
+struct EngineDesk {
+    signals: SignalThread,
+    printer: Printer,
+    json: bool,
+}
+
+impl Operator for EngineDesk {
+    fn observe(&mut self, session: &Session) -> io::Result<()> {
+        // The recording is not used here; it must not grow.
+        drop(session.samples());
+        Ok(())
+    }
+
+    fn hear(&mut self, note: &Note) {
+        if self.json {
+            tell_json(&self.printer, note);
+        } else {
+            self.printer.line(&line(note));
         }
-        // All keys of a note are texts, so it can be written.
-        if let Ok(text) = serde_json::to_string(note) {
-            printer.line(&text);
-        }
+    }
+
+    fn has_stopped(&self, session: &Session) -> bool {
+        self.signals.has_stopped(session) || self.signals.count() > 1
     }
 }
 

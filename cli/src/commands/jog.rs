@@ -1,15 +1,14 @@
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use ipc::{Client, Verb};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::client::{self, ArmOption};
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::printer::Printer;
+use crate::signals::SignalThread;
 
 /// Time between two requests to the engine.
 const AGAIN: Duration = Duration::from_millis(50);
@@ -51,11 +50,9 @@ enum Axis {
 
 impl Jog {
     /// Asks again and again, then for rest.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        let stop = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&stop))?;
-        }
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
+        let signals = SignalThread::start(printer, "once more to give up")?;
+        signals.count_only();
         let client = Client::open(&self.arm.open()?, "canter jog")?;
         let (space, speeds) = self.request(&client)?;
         let ask = |speeds: Vec<f64>| -> Result<(), Failure> {
@@ -70,7 +67,7 @@ impl Jog {
         let end = self
             .seconds
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
-        while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| Instant::now() < end) {
+        while signals.count() == 0 && end.is_none_or(|end| Instant::now() < end) {
             ask(speeds.clone())?;
             let left = end.map_or(AGAIN, |end| end.saturating_duration_since(Instant::now()));
             sleep(AGAIN.min(left));

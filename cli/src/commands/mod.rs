@@ -84,7 +84,7 @@ impl Command {
             Self::Engine(command) => command.run(printer),
             Self::Fk(command) => command.run(),
             Self::Ik(command) => command.run(),
-            Self::Jog(command) => command.run(),
+            Self::Jog(command) => command.run(printer),
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),

@@ -53,7 +53,7 @@ impl Plan {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
-        let plan = program.plan(&robot, (self.rate, None), FailurePolicy::Abort)?;
+        let plan = program.plan(&robot, self.rate, None, FailurePolicy::Abort)?;
         for refusal in &plan.refusals {
             program.report_refusal(refusal);
         }

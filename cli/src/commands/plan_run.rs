@@ -4,27 +4,33 @@ use std::path::PathBuf;
 use clap::Args;
 use crcl::LengthUnit;
 use engine::arm_motion::ArmMotion;
+use engine::run_loop::RunLoop;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
     Cell, Controller, Event, Motion, PlanRunReport, Policy, Program, RobotOptions, RunOptions,
-    SimulatedFactotum, Stock, parameters, prepare,
+    RunOutcome, SimulatedFactotum, Stock, parameters, prepare,
 };
 use plan::world::{Model, Reader, StoredRun, Writer};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 
+use crate::console::{Console, SampleOptions, Voice, exit_of};
 use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::HostOptions;
 use crate::input;
-use crate::moving_arm::MovingArm;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::printer::Printer;
 use crate::robot::{RobotOption, with_joints};
+use crate::signals::SignalThread;
+use crate::simulation::Simulation;
 use crate::world_file::{Database, refused};
+
+/// An engine with its operator.
+type MovingArm = RunLoop<Option<Simulation>, Console>;
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -149,9 +155,16 @@ impl PlanRun {
     fn moving_arm(&self, robot: &Robot, printer: &Printer) -> Result<MovingArm, Failure> {
         let place = self.robot.place();
         let (metres, policy) = (LengthUnit::Meter, FailurePolicy::Abort);
-        let host = self.host.start(robot, place, metres, policy)?;
-        let (joints, rate) = (robot.dof(), self.host.rate);
-        MovingArm::new(host, (joints, rate), self.samples.as_deref(), printer)
+        let mut host = self.host.start(robot, place, metres, policy)?;
+        host.own("canter plan-run");
+        let samples = SampleOptions {
+            joints: robot.dof(),
+            rate_hz: self.host.rate,
+            file: self.samples.as_deref(),
+        };
+        let signals = SignalThread::start(printer, "once more to brake hard")?;
+        let console = Console::new(printer, signals, &host.session, &samples, Voice::Messages)?;
+        Ok(RunLoop::new(host, console))
     }
 
     fn parameters(&self) -> Result<BTreeMap<String, String>, Failure> {
@@ -174,11 +187,15 @@ impl PlanRun {
     fn options(&self, robot: &Robot) -> RunOptions {
         RunOptions {
             robot: self.robot_options(robot),
-            policy: match self.repair {
-                0 => Policy::Stop,
-                attempts => Policy::Repair { attempts },
-            },
+            policy: self.policy(),
             choose_order: !self.written_order,
+        }
+    }
+
+    fn policy(&self) -> Policy {
+        match self.repair {
+            0 => Policy::Stop,
+            attempts => Policy::Repair { attempts },
         }
     }
 
@@ -283,10 +300,10 @@ impl Task<'_> {
         controller.run(&mut |event| command.observe(printer, event))
     }
 
-    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<PlanRunReport, Failure> {
+    fn pddl(self, robot: &Robot, motion: &mut dyn Motion) -> Result<PlanRunReport, Failure> {
         let (command, printer) = (self.command, self.printer);
         let table = action_table(command.actions.as_deref())?;
-        let options = &command.robot_options(robot);
+        let options = command.robot_options(robot);
         let mut interpreter = PddlInterpreter::new(&self.database.path, table, options.clone());
         let run = match self.stored {
             Some(stored) => PulledRun::resume(stored).map_err(refused)?,
@@ -297,18 +314,14 @@ impl Task<'_> {
             }
         };
         interpreter.go_on(run.source(), run.done());
-        let mut step = |number| {
-            if command.verbose {
-                printer.note(&format!("done     step {number}"));
-            }
-        };
-        let writer = &mut self.writer;
         let place = Pull {
-            writer,
+            writer: self.writer,
             motion,
-            options,
+            robot: options,
+            policy: command.policy(),
         };
-        pull(&mut interpreter, run, place, &mut step).map_err(refused)
+        let mut observer = |event: &Event| command.observe(printer, event);
+        pull(&mut interpreter, run, place, &mut observer).map_err(refused)
     }
 }
 
@@ -328,13 +341,21 @@ fn execute<const N: usize>(
     .into();
     let arm = motion.into_mover();
     let blame = arm.as_ref().and_then(MovingArm::blame);
-    let off_path = arm.map(MovingArm::finish).transpose()?;
+    let off_path = match arm {
+        Some(arm) => {
+            let (console, _) = arm.finish()?;
+            let worst = console.recording().worst();
+            console.finish()?;
+            Some(worst)
+        }
+        None => None,
+    };
     let mut text = Vec::new();
     report.write(&mut text, command.json, off_path)?;
     printer.lines(text);
     Ok(match report.outcome() {
-        "stopped" => Exit::Done,
-        "interrupted" => Exit::Stopped,
-        _ => blame.unwrap_or(Exit::Refused),
+        RunOutcome::Stopped => Exit::Done,
+        RunOutcome::Interrupted => Exit::Stopped,
+        RunOutcome::Failed => blame.map_or(Exit::Refused, exit_of),
     })
 }

@@ -1,22 +1,21 @@
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use clap::Args;
-use engine::session::{Blame, Note};
+use engine::run_loop::{RunEnd, RunLoop};
+use engine::session::Status;
 use planner::dry_run::{FailurePolicy, Plan};
 use planner::robot::Robot;
 use serde_json::json;
 
+use crate::console::{Console, SampleOptions, Voice, exit_of};
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::{DriverChoice, Host, HostOptions, RefusalOption};
-use crate::output_file::OutputFile;
+use crate::host_options::{DriverChoice, HostOptions, RefusalOption};
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
-use crate::progress::Progress;
-use crate::recording::Recording;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;
+use crate::simulation::Simulation;
 
 /// Run a program on an arm
 ///
@@ -54,59 +53,48 @@ impl Run {
         }
         // The simulated arm starts where the dry run does, so that a program that cannot be
         // executed starts nothing. The position of another arm is known to its driver only.
-        let mut plans = 0;
         let mut plan = None;
         if self.host.driver != DriverChoice::External {
-            let Some(ours) = self.plan(&program, &robot, None)? else {
+            plan = self.plan(&program, &robot, None)?;
+            if plan.is_none() {
                 return Ok(Exit::Refused);
-            };
-            plans += ours.plans;
-            plan = Some(ours);
+            }
         }
         if self.json {
             printer.expect_json();
         }
         let signals = SignalThread::start(printer, "once more to brake hard")?;
-        let mut host = self.host.start(
-            &robot,
-            self.robot.place(),
-            program.default_length(),
-            self.refusal.policy(),
-        )?;
+        let (place, length) = (self.robot.place(), program.default_length());
+        let mut host = self
+            .host
+            .start(&robot, place, length, self.refusal.policy())?;
         host.own("canter run");
         let start = host.session.start.clone();
-        let plan = match plan.filter(|plan| plan.start == start) {
-            Some(plan) => plan,
-            None => {
-                let Some(plan) = self.plan(&program, &robot, Some(start))? else {
-                    return Ok(Exit::Refused);
-                };
-                plans += plan.plans;
-                plan
-            }
-        };
-        let sink = self
-            .samples
-            .as_deref()
-            .map(OutputFile::create)
-            .transpose()?;
-        let recording = Recording::new(robot.dof(), self.host.rate, sink)?;
-        let progress = Progress::new(printer, io::stderr().is_terminal() && !self.json);
-        signals.steer(&host.session);
-        Running {
-            json: self.json,
-            host,
-            signals,
-            printer: printer.clone(),
-            recording,
-            progress,
-            plans,
+        let mut plans = plan.as_ref().map_or(0, |plan| plan.plans);
+        let mut plan = plan.filter(|plan| plan.start == start);
+        if plan.is_none() {
+            plan = self.plan(&program, &robot, Some(start))?;
+            plans += plan.as_ref().map_or(0, |plan| plan.plans);
         }
-        .finish_program(&program, plan)
+        let Some(plan) = plan else {
+            return Ok(Exit::Refused);
+        };
+        let samples = SampleOptions {
+            joints: robot.dof(),
+            rate_hz: self.host.rate,
+            file: self.samples.as_deref(),
+        };
+        let voice = if self.json { Voice::Json } else { Voice::Lines };
+        let console = Console::new(printer, signals, &host.session, &samples, voice)?;
+        let (exit, summary) = execute(RunLoop::new(host, console), &program, plan, plans)?;
+        printer.line(&if self.json {
+            summary.json(exit)
+        } else {
+            summary.text()
+        });
+        Ok(exit)
     }
-}
 
-impl Run {
     /// Plans the whole program from `start`, or from home, and reports refused commands; no plan if
     /// it may not be run. With a policy that allows refusals it always may.
     fn plan(
@@ -116,7 +104,7 @@ impl Run {
         start: Option<Vec<f64>>,
     ) -> Result<Option<Plan>, Failure> {
         let policy = self.refusal.policy();
-        let plan = program.plan(robot, (self.host.rate, start), policy)?;
+        let plan = program.plan(robot, self.host.rate, start, policy)?;
         for refusal in &plan.refusals {
             program.report_refusal(refusal);
         }
@@ -125,141 +113,85 @@ impl Run {
     }
 }
 
-/// A program that is running.
-struct Running {
-    json: bool,
-    host: Host,
-    signals: SignalThread,
-    printer: Printer,
-    recording: Recording<OutputFile>,
-    progress: Progress,
-    /// How many moves were planned before the session began.
+/// Has the program executed as it was planned, after `plans` moves were planned for it.
+fn execute(
+    mut running: RunLoop<Option<Simulation>, Console>,
+    program: &ProgramFile,
+    plan: Plan,
     plans: u64,
+) -> Result<(Exit, Summary), Failure> {
+    let ids = running
+        .session()
+        .execute(program.program(), plan)
+        .map_err(|full| Failure::new(Exit::Refused, full))?;
+    let end = running.wait_for(&ids)?;
+    let driver = running.session().driver.clone();
+    let (console, status) = running.finish()?;
+    let summary = Summary {
+        commands: program.program().commands.len(),
+        done: console.done(),
+        driver,
+        duration_s: console.recording().duration(),
+        off_path_m: console.recording().worst(),
+        plans: plans + status.plans,
+        status,
+    };
+    console.finish()?;
+    let exit = match end {
+        // The end was reached, but not every command was executed.
+        RunEnd::Done if summary.done < summary.commands => Exit::Refused,
+        RunEnd::Done => Exit::Done,
+        RunEnd::Refused { .. } => Exit::Refused,
+        RunEnd::Stopped | RunEnd::ShutDown => Exit::Stopped,
+        RunEnd::Faulted { blame, .. } => exit_of(blame),
+        RunEnd::Closed => Exit::Internal,
+    };
+    Ok((exit, summary))
 }
 
-impl Running {
-    fn finish_program(mut self, program: &ProgramFile, plan: Plan) -> Result<Exit, Failure> {
-        let count = program.program().commands.len();
-        let ids = self
-            .host
-            .session
-            .execute(program.program(), plan)
-            .map_err(|full| Failure::new(Exit::Refused, full))?;
-        let last = ids.last().copied().unwrap_or(0);
-        let mut done = 0;
-        let exit = loop {
-            if self.signals.has_stopped(&self.host.session) {
-                break Exit::Stopped;
-            }
-            let note = self.host.turn()?;
-            self.recording.take(&self.host.session.samples())?;
-            self.progress.show(&self.host.session.status());
-            if self.host.is_shut_down() {
-                break Exit::Stopped;
-            }
-            let Some(note) = note else { continue };
-            self.tell(&note);
-            done += usize::from(matches!(note, Note::Done { .. }));
-            if let Some(exit) = self.over(&note, last) {
-                break exit;
-            }
-        };
-        self.finish(exit, done, count)
+/// What a run came to.
+struct Summary {
+    commands: usize,
+    done: usize,
+    driver: String,
+    duration_s: f64,
+    off_path_m: f64,
+    /// How many moves were planned, before the session and in it.
+    plans: u64,
+    /// Where the session was at the end.
+    status: Status,
+}
+
+impl Summary {
+    fn json(&self, exit: Exit) -> String {
+        json!({
+            "event": "summary",
+            "schema": 1,
+            "exit": exit as u8,
+            "commands": self.commands,
+            "done": self.done,
+            "robot": self.status.robot,
+            "driver": self.driver,
+            "duration_s": self.duration_s,
+            "plans": self.plans,
+            "cycles": self.status.cycles,
+            "off_path_m": self.off_path_m,
+        })
+        .to_string()
     }
 
-    /// The exit code for a note, if it is the last one.
-    fn over(&self, note: &Note, last: u32) -> Option<Exit> {
-        match note {
-            Note::Done { id, .. } if *id == last => Some(Exit::Done),
-            Note::Refused { id, dropped, .. } if *dropped > 0 || *id == last => Some(Exit::Refused),
-            Note::Aborted { .. } => Some(Exit::Stopped),
-            Note::Faulted {
-                blame: Blame::Guard,
-                ..
-            } => Some(Exit::Aborted),
-            Note::Faulted { .. } => Some(Exit::DriverFault),
-            Note::Closed => Some(Exit::Internal),
-            _ => None,
-        }
-    }
-
-    /// One line for what happened.
-    fn tell(&mut self, note: &Note) {
-        let printer = &self.printer;
-        if self.json {
-            // All keys of a note are texts, so it can be written.
-            if let Ok(text) = serde_json::to_string(note) {
-                printer.line(&text);
-            }
-            return;
-        }
-        match note {
-            Note::Done {
-                line, name, ticks, ..
-            } => {
-                let seconds = *ticks as f64 * self.recording.period();
-                printer.line(&format!(
-                    "done     line {line:4}  {name:30} {seconds:9.3} s"
-                ));
-            }
-            Note::Message { text } => printer.line(&format!("message  {text}")),
-            Note::Refused {
-                line, name, error, ..
-            } => printer.note(&format!(
-                "canter: error: line {line}: {name}: {}",
-                error.message
-            )),
-            Note::Faulted { reason, .. } => printer.note(&format!("canter: error: {reason}")),
-            Note::Ended { reason } if *reason > 0 => {
-                printer.note(&format!("canter: the program ended with reason {reason}"));
-            }
-            _ => {}
-        }
-    }
-
-    /// Ends session and driver, writes the rest of the samples, sums up.
-    fn finish(mut self, exit: Exit, done: usize, count: usize) -> Result<Exit, Failure> {
-        let duration = self.recording.duration();
-        let status = self.host.session.status();
-        // The sample of a period is complete when the next state arrives: the last ones are still
-        // missing.
-        self.host.session.close();
-        self.recording.take(&self.host.session.samples())?;
-        let driver = self.host.session.driver.clone();
-        let tracking = self.recording.worst();
-        let exit = match exit {
-            // The end was reached, but not every command was executed.
-            Exit::Done if done < count => Exit::Refused,
-            exit => exit,
-        };
-        drop(self.host);
-        self.signals.release();
-        self.recording.finish()?;
-        if self.json {
-            let summary = json!({
-                "event": "summary",
-                "schema": 1,
-                "exit": exit as u8,
-                "commands": count,
-                "done": done,
-                "robot": status.robot,
-                "driver": driver,
-                "duration_s": duration,
-                "plans": self.plans + status.plans,
-                "cycles": status.cycles,
-                "off_path_m": tracking,
-            });
-            self.printer.line(&summary.to_string());
-            return Ok(exit);
-        }
-        let cycles = status.cycles;
-        self.printer.line(&format!(
-            "{done} of {count} commands done in {duration:.3} s; {} periods, {} of them late; \
-             driver {driver} at most {:.3} mm off the path",
+    fn text(&self) -> String {
+        let cycles = &self.status.cycles;
+        format!(
+            "{} of {} commands done in {:.3} s; {} periods, {} of them late; driver {} at most \
+             {:.3} mm off the path",
+            self.done,
+            self.commands,
+            self.duration_s,
             cycles.ticks,
             cycles.skipped,
-            tracking * 1e3
-        ));
-        Ok(exit)
+            self.driver,
+            self.off_path_m * 1e3
+        )
     }
 }

@@ -101,7 +101,7 @@ pub fn run<R: Robot>(
     while !stop.load(Ordering::Relaxed) {
         match driver.clock() {
             Some(Clock::LockStep) => {
-                report.periods += lock_step(&link, &mut driver, (&mut log, stop))
+                report.periods += lock_step(&link, &mut driver, &mut log, stop)
             }
             _ => {
                 if driver.clock().is_some() && granted.is_none() {
@@ -190,7 +190,8 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
 fn lock_step<R: Robot>(
     link: &DriverLink,
     driver: &mut Driver<R>,
-    (log, stop): (&mut Log, &AtomicBool),
+    log: &mut Log,
+    stop: &AtomicBool,
 ) -> u64 {
     let Some(period) = driver.period_ns() else {
         return 0;

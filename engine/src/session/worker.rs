@@ -23,7 +23,7 @@ use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
-use servo::{Executor, ExecutorConfig, Monitor, Remote, SegmentSender, Steering, ToolOrder};
+use servo::{Executor, ExecutorConfig, Monitor, Remote, SegmentSender, Steering, ToolOrder, Work};
 
 /// Largest number of commands in work, the one that moves among them.
 const AHEAD: usize = 8;
@@ -35,12 +35,6 @@ pub(super) struct Ends {
     pub orders: Receiver<Order>,
     pub notes: Sender<Note>,
     pub shared: Arc<Shared>,
-}
-
-/// What still has to go through the ring.
-pub(super) enum Work<const N: usize> {
-    Motion(Segment<N>),
-    Tool(ToolOrder),
 }
 
 /// A command that left the queue and is not yet reported.
@@ -73,6 +67,7 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) jog_aborts: u32,
     /// The chain in use, for computing the controlled point in other threads.
     seen: Arc<Mutex<Chain<N>>>,
+    /// What still has to go through the ring.
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     jogging: Option<Jogging>,
@@ -337,11 +332,7 @@ impl<const N: usize> Worker<'_, N> {
     /// Sends what fits into the ring; returns whether all of it did.
     fn feed(&mut self) -> bool {
         while let Some(work) = self.work.front() {
-            let taken = match work {
-                Work::Motion(segment) => self.sender.push(*segment),
-                Work::Tool(order) => self.sender.tool(*order),
-            };
-            if taken.is_err() {
+            if self.sender.hand_over(*work).is_err() {
                 return false;
             }
             self.work.pop_front();

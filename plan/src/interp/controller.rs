@@ -1,15 +1,13 @@
 //! A controller that pulls a plan through the interface and has it executed.
 
-use std::time::Instant;
-
 use crcl::Command;
 
 use super::{Code, CommandSink, PlanInterpreter};
 use crate::PlanError;
-use crate::pddl::read_plan;
+use crate::pddl::{PlanStep, read_plan};
 use crate::run::{
-    Batch, Counters, Motion, MotionFailure, Outcome, PlanRunReport, Robot, RobotOptions, State,
-    Tool, situation,
+    Act, Batch, Counters, Delivery, Event, Execution, Motion, NextStep, Outcome, PlanRunReport,
+    Policy, Request, RobotOptions, Run, RunOutcome, State, Step, Steps, Tool, place_arm,
 };
 use crate::world::{Change, Class, Model, StoredRun, Writer};
 
@@ -78,8 +76,88 @@ impl PulledRun {
     }
 }
 
-/// Reason given to EndCanon when the motion failed.
-const MOTION_FAILED: i64 = 100;
+/// What a plan is executed with: the world, the interface to the arm, and options.
+pub struct Pull<'a> {
+    /// The controller's connection.
+    pub writer: Writer,
+    /// What moves the arm.
+    pub motion: &'a mut dyn Motion,
+    /// How robot statements become commands.
+    pub robot: RobotOptions,
+    /// What to do on failure.
+    pub policy: Policy,
+}
+
+/// Opens a plan, pulls it step by step, has each step's motion executed, commits its effects
+/// together with the state of the run, and closes the plan. For a run that goes on the interpreter
+/// must begin with the step that was under way; the arm is first brought back to where the world
+/// has it.
+///
+/// # Errors
+/// [`PlanError`] of the database; errors of the plan are in the report.
+pub fn pull(
+    interpreter: &mut dyn PlanInterpreter,
+    run: PulledRun,
+    place: Pull<'_>,
+    observer: &mut dyn FnMut(&Event),
+) -> Result<PlanRunReport, PlanError> {
+    let Pull {
+        mut writer,
+        motion,
+        robot,
+        policy,
+    } = place;
+    let resumed = run.id.is_some();
+    let mut model = writer.model()?;
+    if !resumed {
+        place_arm(&mut writer, motion, &mut model)?;
+    }
+    let mut opening = Collector::default();
+    let mut code = interpreter.init();
+    if code == Code::Ok {
+        code = interpreter.open_plan(&run.file, "PDDL", &mut opening);
+    }
+    if code != Code::Ok {
+        let reason = interpreter.last_error().to_owned();
+        interpreter.exit();
+        return Ok(unopened(code, reason, run.state.counters));
+    }
+    let mut execution = Execution {
+        run: Run {
+            id: run.begin(&mut writer)?,
+            resumed,
+            state: run.state,
+            model,
+            warnings: Vec::new(),
+        },
+        writer,
+        motion,
+        robot,
+        policy,
+    };
+    let mut steps = PulledSteps {
+        interpreter,
+        actions: read_plan(&run.source).unwrap_or_default(),
+        opening: opening.batch,
+        closing: None,
+    };
+    let report = execution.run(&mut steps, observer);
+    steps.interpreter.close_plan();
+    steps.interpreter.exit();
+    report
+}
+
+/// The report of a plan that cannot be opened; nothing has moved.
+fn unopened(code: Code, reason: String, counters: Counters) -> PlanRunReport {
+    PlanRunReport {
+        outcome: RunOutcome::Failed,
+        code: code as i64,
+        reason: Some(reason),
+        counters,
+        wall_s: 0.0,
+        warnings: Vec::new(),
+    }
+}
 
 /// Collects the commands of one step.
 #[derive(Default)]
@@ -102,219 +180,90 @@ impl CommandSink for Collector {
     }
 }
 
-/// Why a plan was not pulled to its end.
-enum Trouble {
-    Motion(MotionFailure),
-    World(PlanError),
+/// The steps that an interpreter gives.
+struct PulledSteps<'a> {
+    interpreter: &'a mut dyn PlanInterpreter,
+    /// The plan's actions, for people.
+    actions: Vec<PlanStep>,
+    opening: Batch,
+    /// What the interpreter gave with its last code.
+    closing: Option<Batch>,
 }
 
-impl From<MotionFailure> for Trouble {
-    fn from(failure: MotionFailure) -> Self {
-        Self::Motion(failure)
+impl Steps for PulledSteps<'_> {
+    /// The interpreter reads the database itself.
+    fn refresh(&mut self, _model: &mut Model) -> Result<(), PlanError> {
+        Ok(())
     }
-}
 
-impl From<PlanError> for Trouble {
-    fn from(error: PlanError) -> Self {
-        Self::World(error)
+    fn opening(&self, _model: &Model, _resumed: bool) -> Batch {
+        self.opening.clone()
     }
-}
 
-/// What a plan is executed with: the world, the interface to the arm, and options.
-pub struct Pull<'a> {
-    /// The controller's connection.
-    pub writer: &'a mut Writer,
-    /// What moves the arm.
-    pub motion: &'a mut dyn Motion,
-    /// How robot statements become commands.
-    pub options: &'a RobotOptions,
-}
-
-/// Opens a plan, pulls it step by step, has each step's motion executed, commits its effects
-/// together with the state of the run, and closes the plan. `observer` gets the number of each
-/// finished step. For a resumed run the interpreter must begin with the unfinished step; the arm is
-/// first moved back to its place in the world.
-///
-/// # Errors
-/// [`PlanError`] of the database; errors of the plan are in the report.
-pub fn pull(
-    interpreter: &mut dyn PlanInterpreter,
-    run: PulledRun,
-    place: Pull<'_>,
-    observer: &mut dyn FnMut(usize),
-) -> Result<PlanRunReport, PlanError> {
-    let began = Instant::now();
-    let resumed = run.id.is_some();
-    if let Some(arm) = place.motion.arm().filter(|_| !resumed) {
-        let changes = place.writer.model()?.arm_changes(&arm)?;
-        place.writer.commit(&changes, None)?;
-    }
-    let mut opening = Collector::default();
-    let mut code = interpreter.init();
-    if code == Code::Ok {
-        code = interpreter.open_plan(&run.file, "PDDL", &mut opening);
-    }
-    if code != Code::Ok {
-        let reason = interpreter.last_error().to_owned();
-        interpreter.exit();
-        let end = End::Over(failed(code as i64, reason));
-        return Ok(end.report(run.state.counters, began));
-    }
-    let steps = read_plan(&run.source).unwrap_or_default();
-    let mut puller = Puller {
-        id: run.begin(place.writer)?,
-        actions: steps.iter().map(ToString::to_string).collect(),
-        place,
-        state: run.state,
-    };
-    let end = match puller.run(interpreter, (opening.batch, resumed), observer) {
-        Ok(Code::EndOfPlan) => Ok(End::Over(Outcome::Stopped)),
-        Ok(code) => {
-            let reason = interpreter.last_error().to_owned();
-            Ok(End::Over(failed(code as i64, reason)))
-        }
-        Err(Trouble::Motion(failure)) => Ok(puller.after(&failure)),
-        Err(Trouble::World(error)) => Err(error),
-    };
-    interpreter.close_plan();
-    interpreter.exit();
-    let end = end?;
-    if let End::Over(outcome) = &end {
-        puller.save(&[], Some(outcome))?;
-    }
-    Ok(end.report(puller.state.counters, began))
-}
-
-fn failed(code: i64, reason: String) -> Outcome {
-    Outcome::Failed { code, reason }
-}
-
-/// How a run ended.
-enum End {
-    Over(Outcome),
-    /// The operator stopped it; it can be resumed.
-    Interrupted(String),
-}
-
-impl End {
-    fn report(self, counters: Counters, began: Instant) -> PlanRunReport {
-        let (outcome, code, reason) = match self {
-            Self::Over(Outcome::Stopped) => ("stopped", 0, None),
-            Self::Over(Outcome::Failed { code, reason }) => ("failed", code, Some(reason)),
-            Self::Interrupted(reason) => ("interrupted", 0, Some(reason)),
-        };
-        PlanRunReport {
-            outcome,
-            code,
-            reason,
-            counters,
-            wall_s: began.elapsed().as_secs_f64(),
-            warnings: Vec::new(),
-        }
-    }
-}
-
-/// A plan that is being pulled.
-struct Puller<'a> {
-    id: i64,
-    /// The plan's actions as texts, for people.
-    actions: Vec<String>,
-    place: Pull<'a>,
-    state: State,
-}
-
-impl Puller<'_> {
-    /// Pulls steps until the interpreter has no more; returns its last code.
-    fn run(
+    fn next(
         &mut self,
-        interpreter: &mut dyn PlanInterpreter,
-        (opening, resumed): (Batch, bool),
-        observer: &mut dyn FnMut(usize),
-    ) -> Result<Code, Trouble> {
-        self.perform(&opening)?;
-        if resumed {
-            self.bring_back()?;
-        }
-        loop {
-            let mut collector = Collector::default();
-            let code = interpreter.execute(&mut collector);
-            if code != Code::Ok {
-                let ended = self.perform(&collector.batch);
-                return if code == Code::EndOfPlan {
-                    ended.map(|()| code)
-                } else {
-                    Ok(code)
-                };
+        state: &State,
+        model: &Model,
+        _motion: &mut dyn Motion,
+    ) -> Result<NextStep, Outcome> {
+        let mut collector = Collector::default();
+        let code = self.interpreter.execute(&mut collector);
+        let batch = collector.batch;
+        let mut next = state.clone();
+        let act = match code {
+            Code::Ok => {
+                count(&mut next.counters, model, &batch);
+                Act::Motion(batch)
             }
-            self.step(&collector.batch)?;
-            observer(self.state.counters.statements);
-        }
-    }
-
-    fn bring_back(&mut self) -> Result<(), Trouble> {
-        let Some(arm) = self.place.motion.arm() else {
-            return Ok(());
+            code => {
+                self.closing = Some(batch).filter(|batch| !batch.commands.is_empty());
+                if code != Code::EndOfPlan {
+                    let reason = self.interpreter.last_error().to_owned();
+                    let code = code as i64;
+                    return Err(Outcome::Failed { code, reason });
+                }
+                Act::End
+            }
         };
-        let model = &self.place.writer.model()?;
-        let options = self.place.options;
-        match (Robot { model, options }).way_back(&arm)? {
-            Some(batch) => self.perform(&batch),
-            None => Ok(()),
-        }
+        let number = state.counters.statements + 1;
+        let action = self.actions.get(number - 1);
+        let text = action.map(ToString::to_string).unwrap_or_default();
+        Ok(NextStep {
+            name: action.map_or_else(String::new, |action| action.name.clone()),
+            line: action.map_or(0, |action| action.line),
+            mark: format!("step {number}, ({text})"),
+            step: Step {
+                name: "action",
+                span: crate::kitting::ast::Span::default(),
+                act,
+                changes: Vec::new(),
+                state: next,
+                warning: None,
+            },
+        })
     }
 
-    /// Executes the commands of a step, then commits its effects with the state of the run.
-    fn step(&mut self, batch: &Batch) -> Result<(), Trouble> {
-        let number = self.state.counters.statements + 1;
-        let before = self.place.writer.model()?;
-        let action = self.actions.get(number - 1).map_or("", String::as_str);
-        let mark = format!("step {number}, ({action}),");
-        self.place.writer.mark_under_way(self.id, &mark)?;
-        self.perform(batch)?;
-        count(&mut self.state.counters, &before, batch);
-        self.state.counters.statements = number;
-        Ok(self.save(&batch.changes, None)?)
+    fn errand(&mut self, _model: &Model, _request: &Request) -> Result<Delivery, String> {
+        Err("an interpreter behind the interface asks for no errands".to_owned())
     }
 
-    fn perform(&mut self, batch: &Batch) -> Result<(), Trouble> {
-        if batch.commands.is_empty() {
-            return Ok(());
-        }
-        let start = situation(&self.place.writer.model()?)?;
-        let seconds = self.place.motion.execute(&start, batch)?;
-        self.state.counters.motion_s += seconds;
-        self.state.counters.commands += batch.commands.len();
-        Ok(())
+    fn closing(&mut self, reason: i64) -> Batch {
+        self.closing.take().unwrap_or_else(|| {
+            let mut batch = Batch::default();
+            batch.push(Command::EndCanon { reason });
+            batch
+        })
     }
 
-    /// The result of the run after a failure of the motion. Unless the operator stopped it, the arm
-    /// gets EndCanon.
-    fn after(&mut self, failure: &MotionFailure) -> End {
-        let number = self.state.counters.statements + 1;
-        let reason = format!("step {number}: {failure}");
-        if failure.stopped {
-            return End::Interrupted(reason);
-        }
-        let (mut end, code) = (Batch::default(), MOTION_FAILED);
-        end.push(Command::EndCanon { reason: code });
-        // The motion has failed already; this failure is not reported.
-        let _ = self.perform(&end);
-        End::Over(failed(code, reason))
-    }
-
-    fn save(&mut self, changes: &[Change], outcome: Option<&Outcome>) -> Result<(), PlanError> {
-        let (state, outcome) = (
-            self.state.to_json()?,
-            outcome.map(Outcome::to_json).transpose()?,
-        );
-        let run = (self.id, state.as_str(), outcome.as_deref());
-        self.place.writer.commit(changes, Some(run))?;
-        Ok(())
+    fn motion_failed(&self) -> i64 {
+        Outcome::PULLED_MOTION
     }
 }
 
-/// Counts what a step did to a world.
+/// Counts a step and what it does to a world.
 fn count(counters: &mut Counters, before: &Model, batch: &Batch) {
+    counters.statements += 1;
+    counters.commands += batch.commands.len();
     let attached = batch.tools.iter().filter(|(_, tool)| tool.is_some());
     counters.end_effector_changes += attached.count();
     let effector = before.effector().map(|effector| effector.id);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crcl::{AngleUnit, Command, LengthUnit};
+use crcl::Command;
 
 use super::{Code, CommandSink, PlanInterpreter};
 use crate::PlanError;
@@ -79,23 +79,6 @@ impl PddlInterpreter {
         self.table.interpret(step, &model, &self.options)
     }
 
-    fn opening(&self) -> Vec<Command> {
-        let mut commands = vec![
-            Command::InitCanon,
-            Command::SetLengthUnits {
-                unit: LengthUnit::Meter,
-            },
-            Command::SetAngleUnits {
-                unit: AngleUnit::Radian,
-            },
-        ];
-        if let Some(percent) = self.options.percent {
-            commands.push(Command::SetRelativeSpeed { percent });
-            commands.push(Command::SetRelativeAcceleration { percent });
-        }
-        commands
-    }
-
     fn end(&mut self, sink: &mut dyn CommandSink, code: Code, message: String) -> Code {
         if let Some((steps, next)) = &mut self.plan {
             *next = steps.len() + 1;
@@ -156,6 +139,7 @@ impl PlanInterpreter for PddlInterpreter {
             }
         }
         if !self
+            .options
             .opening()
             .into_iter()
             .all(|command| sink.command(command))

@@ -7,7 +7,6 @@ use super::effects::conflicts;
 use super::statements::distance;
 use super::types::{Role, Scope, Type};
 use crate::finding::Finding;
-use crate::run::matches;
 use crate::world::{Class, Model};
 
 /// Checks names, types, the shape of the lists, preconditions and, with a world, the requirements
@@ -478,38 +477,6 @@ impl Checker<'_> {
         if let Some(stuck) = triples.iter().find(|t| !done.contains(&t.index)) {
             let message = format!("entry {} waits for itself", stuck.index);
             self.error("plan::precondition", message, stuck.statement.span);
-        }
-    }
-
-    /// What must be in the workstation is in it.
-    fn against_world(&mut self) {
-        let (Some(world), plan) = (self.world, self.plan) else {
-            return;
-        };
-        let about = |name: &str| plan.about.iter().find(|field| field.name == name);
-        if let (Some(field), Ok(workstation)) = (about("PlanWorkstation"), world.workstation())
-            && field.value != workstation.name
-        {
-            let message = format!("the world is {}, not {}", workstation.name, field.value);
-            self.error("plan::world", message, field.span);
-        }
-        if let Some(field) = about("TargetSKU")
-            && world.design(&field.value).is_none()
-        {
-            let message = format!("the world has no kit design {}", field.value);
-            self.error("plan::world", message, field.span);
-        }
-        for requirement in &plan.requirements {
-            let place = requirement.location.unwrap_or(Keyword::Workstation);
-            let skus = requirement.sku.iter().chain(&requirement.contents_type);
-            skus.for_each(|sku| self.check_sku(sku, requirement.span));
-            if !world
-                .objects()
-                .any(|object| matches(world, plan, requirement, object, place))
-            {
-                let message = format!("the world has nothing that meets {}", requirement.name);
-                self.error("plan::world", message, requirement.span);
-            }
         }
     }
 }

@@ -154,6 +154,21 @@ impl Checker<'_> {
         found.unwrap_or(Type::Unknown)
     }
 
+    /// Whether there is a function that takes so many arguments; tells about it if not.
+    fn takes(&mut self, function: &str, arguments: usize, at: &Expression) -> bool {
+        let Some((_, count)) = FUNCTIONS.iter().find(|(known, _)| *known == function) else {
+            let message = format!("unknown function {function}");
+            self.error("plan::unknown_function", message, at.span);
+            return false;
+        };
+        if arguments != *count {
+            let message = format!("{function} takes {count} argument(s), found {arguments}");
+            self.error("plan::arguments", message, at.span);
+            return false;
+        }
+        true
+    }
+
     fn infer_call(
         &mut self,
         function: &str,
@@ -161,20 +176,7 @@ impl Checker<'_> {
         at: &Expression,
         subject: Option<Class>,
     ) -> Type {
-        let Some((_, count)) = FUNCTIONS.iter().find(|(known, _)| *known == function) else {
-            self.error(
-                "plan::unknown_function",
-                format!("unknown function {function}"),
-                at.span,
-            );
-            return Type::Unknown;
-        };
-        if arguments.len() != *count {
-            let message = format!(
-                "{function} takes {count} argument(s), found {}",
-                arguments.len()
-            );
-            self.error("plan::arguments", message, at.span);
+        if !self.takes(function, arguments.len(), at) {
             return Type::Unknown;
         }
         match (function, arguments) {

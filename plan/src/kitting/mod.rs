@@ -2,6 +2,7 @@
 
 pub mod ast;
 mod check;
+mod check_world;
 pub(crate) mod effects;
 mod infer;
 mod parser;

@@ -2,11 +2,11 @@
 
 use nalgebra::Isometry3;
 
-use super::machine::{Machine, Result};
+use super::machine::{Component, Machine, Result};
 use super::state::{State, Step, nothing};
 use super::value::Value;
 use crate::PlanError;
-use crate::kitting::ast::{Expression, Name, Span};
+use crate::kitting::ast::{Name, Span};
 use crate::kitting::types::Type;
 use crate::world::class::derived_property;
 use crate::world::{Change, Class, Location, Object, Scalar};
@@ -16,11 +16,10 @@ impl Machine<'_> {
     pub(super) fn create(
         &self,
         variable: &Name,
-        (part, property): (&Expression, &str),
+        component: &Component<'_>,
         span: Span,
         mut state: State,
     ) -> Result<Step> {
-        let part = self.model.object(self.context(&state).object(part)?)?;
         let declared = self.program.scope.lookup(&variable.text);
         let Some((_, Type::Object(class))) = declared else {
             return Err(PlanError::Value(format!(
@@ -28,31 +27,13 @@ impl Machine<'_> {
                 variable.text
             )));
         };
-        let component = derived_property(class, property).map(|(component, _)| component);
-        if !component.is_some_and(|component| part.class.is_a(component)) {
-            let message = format!("{} cannot be the {property} of a {class}", part.name);
-            return Err(PlanError::Value(message));
-        }
-        if class.is_composite() && self.model.composite_of(part.id).is_some() {
-            return Err(PlanError::Value(format!(
-                "{} is already part of another",
-                part.name
-            )));
-        }
+        let part = self.component(class, component, &state)?;
         let mut fresh = self.model.clone();
         let name = fresh.free_name(class.name());
         let id = fresh.fresh();
         let mut object = Object::new(id, name, class, part.location);
         if class == Class::KitInstance {
-            let design = self.program.plan.about("TargetSKU").to_owned();
-            let tray = self
-                .model
-                .design(&design)
-                .map(|design| design.tray_sku.as_str());
-            if tray != part.sku() {
-                let message = format!("{} is not the tray of the design {design}", part.name);
-                return Err(PlanError::Value(message));
-            }
+            let design = self.design_for(part)?;
             object
                 .properties
                 .insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
@@ -79,6 +60,34 @@ impl Machine<'_> {
             changes,
             ..nothing("CreateInstance", span, state)
         })
+    }
+
+    /// The object that can become this component of a new object of `class`.
+    fn component(&self, class: Class, component: &Component<'_>, state: &State) -> Result<&Object> {
+        let part = self.context(state).object(component.part)?;
+        let part = self.model.object(part)?;
+        let property = component.property;
+        let wanted = derived_property(class, property).map(|(component, _)| component);
+        if !wanted.is_some_and(|wanted| part.class.is_a(wanted)) {
+            let message = format!("{} cannot be the {property} of a {class}", part.name);
+            return Err(PlanError::Value(message));
+        }
+        if class.is_composite() && self.model.composite_of(part.id).is_some() {
+            let message = format!("{} is already part of another", part.name);
+            return Err(PlanError::Value(message));
+        }
+        Ok(part)
+    }
+
+    /// The plan's design of a kit, if its tray is this one.
+    fn design_for(&self, tray: &Object) -> Result<String> {
+        let design = self.program.plan.about("TargetSKU").to_owned();
+        let wanted = self.model.design(&design);
+        if wanted.map(|design| design.tray_sku.as_str()) != tray.sku() {
+            let message = format!("{} is not the tray of the design {design}", tray.name);
+            return Err(PlanError::Value(message));
+        }
+        Ok(design)
     }
 
     /// The one component takes the place of the object.

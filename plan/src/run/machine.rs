@@ -26,6 +26,14 @@ pub(crate) trait Chooser {
 
 pub(super) type Result<T> = std::result::Result<T, PlanError>;
 
+/// The component that a new object is made of.
+pub(super) struct Component<'a> {
+    /// The object that becomes the component.
+    pub(super) part: &'a Expression,
+    /// The property of the new object that it becomes.
+    pub(super) property: &'a str,
+}
+
 /// Executes steps of one program against one model.
 pub(crate) struct Machine<'a> {
     pub(crate) program: &'a Program,
@@ -185,6 +193,24 @@ impl Machine<'_> {
         Ok(())
     }
 
+    /// A pose relative to a reference object.
+    fn pose_value(
+        &self,
+        reference: &Expression,
+        pose: &Expression,
+        state: &State,
+    ) -> Result<Value> {
+        let context = self.context(state);
+        let reference = context.object(reference)?;
+        let place = context.in_workstation(&context.pose(pose)?)?;
+        let pose = self.model.workstation_from(reference)?.inv_mul(&place);
+        Ok(Value::Pose(PoseValue {
+            reference,
+            pose,
+            known: true,
+        }))
+    }
+
     fn execute(&self, action: &Action, span: Span, mut state: State) -> Result<Step> {
         let name = action.name();
         match action {
@@ -212,15 +238,7 @@ impl Machine<'_> {
                 reference,
                 pose,
             } => {
-                let context = self.context(&state);
-                let reference = context.object(reference)?;
-                let place = context.in_workstation(&context.pose(pose)?)?;
-                let pose = self.model.workstation_from(reference)?.inv_mul(&place);
-                let value = Value::Pose(PoseValue {
-                    reference,
-                    pose,
-                    known: true,
-                });
+                let value = self.pose_value(reference, pose, &state)?;
                 self.assign(variable, value, &mut state)?;
                 Ok(nothing(name, span, state))
             }
@@ -228,7 +246,10 @@ impl Machine<'_> {
                 variable,
                 object,
                 property,
-            } => self.create(variable, (object, property), span, state),
+            } => {
+                let part = object;
+                self.create(variable, &Component { part, property }, span, state)
+            }
             Action::DestroyInstance { variable } => self.destroy(variable, span, state),
             Action::FactotumRefill { variable } => {
                 self.errand(Errand::Refill, variable, span, state)

@@ -103,19 +103,21 @@ impl Chooser for Foresight<'_> {
             best: None,
             branches: 0,
         };
-        let mut at = Some((0.0, state.clone(), model.clone()));
+        let start = Foreseen {
+            time: 0.0,
+            state: state.clone(),
+            model: model.clone(),
+        };
+        let mut at = Some(start.clone());
         for member in &first {
-            at = at.and_then(|(time, state, model)| {
-                self.follow(program, list[*member], time, (&state, &model))
-            });
+            at = at.and_then(|from| self.follow(program, list[*member], &from));
         }
         // The frame of the members ends with them: the rest of the plan continues in the frame
         // below.
         let rest = search.rest.clone();
-        let slowest =
-            at.map(|(time, state, model)| time + self.tail(program, &rest, &state, &model));
+        let slowest = at.map(|at| at.time + self.tail(program, &rest, &at));
         search.best = slowest.map(|time| (time, first.clone()));
-        self.search(&mut search, &mut Vec::new(), (0.0, state, model));
+        self.search(&mut search, &mut Vec::new(), &start);
         match (search.best, slowest) {
             (Some((time, order)), Some(slowest)) => (order, slowest - time),
             (Some((_, order)), None) => (order, 0.0),
@@ -124,20 +126,21 @@ impl Chooser for Foresight<'_> {
     }
 }
 
+/// Where a simulation has come to.
+#[derive(Clone)]
+struct Foreseen {
+    /// Time since the list began (s).
+    time: f64,
+    state: State,
+    model: Model,
+}
+
 impl Foresight<'_> {
-    fn search(
-        &mut self,
-        search: &mut Search<'_>,
-        order: &mut Vec<usize>,
-        (time, state, model): (f64, &State, &Model),
-    ) {
+    fn search(&mut self, search: &mut Search<'_>, order: &mut Vec<usize>, from: &Foreseen) {
+        let best = |search: &Search<'_>| search.best.as_ref().map(|(best, _)| best - 1e-9);
         if order.len() == search.length {
-            let time = time + self.tail(search.program, &search.rest, state, model);
-            if search
-                .best
-                .as_ref()
-                .is_none_or(|(best, _)| time < best - 1e-9)
-            {
+            let time = from.time + self.tail(search.program, &search.rest, from);
+            if best(search).is_none_or(|best| time < best) {
                 search.best = Some((time, order.clone()));
             }
             return;
@@ -148,31 +151,25 @@ impl Foresight<'_> {
             }
             search.branches += 1;
             let node = search.list[member];
-            let Some((later, state, model)) =
-                self.follow(search.program, node, time, (state, model))
-            else {
+            let Some(later) = self.follow(search.program, node, from) else {
                 continue;
             };
-            if search
-                .best
-                .as_ref()
-                .is_some_and(|(best, _)| later >= best - 1e-9)
-            {
+            if best(search).is_some_and(|best| later.time >= best) {
                 continue;
             }
             order.push(member);
-            self.search(search, order, (later, &state, &model));
+            self.search(search, order, &later);
             order.pop();
         }
     }
 
     /// Time of the next motion after the list (s): it begins where the list ended.
-    fn tail(&mut self, program: &Program, rest: &[Frame], state: &State, model: &Model) -> f64 {
+    fn tail(&mut self, program: &Program, rest: &[Frame], from: &Foreseen) -> f64 {
         let mut state = State {
             stack: rest.to_vec(),
-            ..state.clone()
+            ..from.state.clone()
         };
-        let mut model = model.clone();
+        let mut model = from.model.clone();
         for _ in 0..MOST_STATEMENTS {
             let machine = Machine {
                 program,
@@ -201,18 +198,12 @@ impl Foresight<'_> {
     }
 
     /// Simulates a node; none when it fails or ends the plan.
-    fn follow(
-        &mut self,
-        program: &Program,
-        node: usize,
-        time: f64,
-        (state, model): (&State, &Model),
-    ) -> Option<(f64, State, Model)> {
-        let mut time = time;
-        let mut model = model.clone();
+    fn follow(&mut self, program: &Program, node: usize, from: &Foreseen) -> Option<Foreseen> {
+        let mut time = from.time;
+        let mut model = from.model.clone();
         let mut state = State {
             stack: vec![Frame::new(node)],
-            ..state.clone()
+            ..from.state.clone()
         };
         for _ in 0..MOST_STATEMENTS {
             let machine = Machine {
@@ -243,7 +234,7 @@ impl Foresight<'_> {
                 // The member has ended; a Stop or Quit in it ends the whole plan.
                 Act::Exhausted => {
                     state.outcome = None;
-                    return Some((time, state, model));
+                    return Some(Foreseen { time, state, model });
                 }
                 Act::End => return None,
             }

@@ -9,8 +9,8 @@ use super::state::Counters;
 pub enum Event {
     /// A statement was executed and committed.
     Statement {
-        /// Its name.
-        name: &'static str,
+        /// Its name, or that of the action.
+        name: String,
         /// Line of the plan, from 1.
         line: usize,
         /// Statements so far.
@@ -28,11 +28,33 @@ pub enum Event {
     Retry(String),
 }
 
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunOutcome {
+    /// The plan came to its end.
+    Stopped,
+    /// The plan gave up, or the motion or the factotum failed.
+    Failed,
+    /// The operator stopped the arm: the run can be resumed.
+    Interrupted,
+}
+
+impl std::fmt::Display for RunOutcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stopped => "stopped",
+            Self::Failed => "failed",
+            Self::Interrupted => "interrupted",
+        })
+    }
+}
+
 /// How a run went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanRunReport {
-    /// `stopped` (by Stop), `failed`, or `interrupted` by the operator: then it can be resumed.
-    pub outcome: &'static str,
+    /// How it ended.
+    pub outcome: RunOutcome,
     /// Reason given to EndCanon: 0, or positive.
     pub code: i64,
     /// In words; none when all went well.

@@ -1,6 +1,6 @@
 //! The four robot statements as canonical commands, with heights from shapes.
 
-use crcl::Command;
+use crcl::{AngleUnit, Command, LengthUnit};
 use nalgebra::Isometry3;
 
 use super::batch::{Batch, Tool, canonical};
@@ -32,6 +32,28 @@ impl Default for RobotOptions {
             stack: true,
             percent: None,
         }
+    }
+}
+
+impl RobotOptions {
+    /// The commands that every plan begins with: metres, radians, and the speed where one is asked
+    /// for.
+    #[must_use]
+    pub fn opening(&self) -> Vec<Command> {
+        let mut commands = vec![
+            Command::InitCanon,
+            Command::SetLengthUnits {
+                unit: LengthUnit::Meter,
+            },
+            Command::SetAngleUnits {
+                unit: AngleUnit::Radian,
+            },
+        ];
+        if let Some(percent) = self.percent {
+            commands.push(Command::SetRelativeSpeed { percent });
+            commands.push(Command::SetRelativeAcceleration { percent });
+        }
+        commands
     }
 }
 

@@ -26,13 +26,26 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Code of a statement that cannot be executed.
+    pub(crate) const STATEMENT: i64 = 2;
+
+    /// Code of a failed motion.
+    pub(crate) const MOTION: i64 = 3;
+
+    /// Code of a failed errand.
+    pub(crate) const FACTOTUM: i64 = 4;
+
+    /// Code of a failed motion of a plan that comes through the interface of [`crate::interp`],
+    /// whose own codes are smaller.
+    pub(crate) const PULLED_MOTION: i64 = 100;
+
     /// Whether the arm or the factotum failed, not the plan: then the step can be tried again.
     #[must_use]
     pub fn can_be_resumed(&self) -> bool {
         matches!(
             self,
             Self::Failed {
-                code: 3 | 4 | 100,
+                code: Self::MOTION | Self::FACTOTUM | Self::PULLED_MOTION,
                 ..
             }
         )

@@ -249,32 +249,18 @@ impl Import {
         self.model
             .apply(&Change::Create(object))
             .map_err(|error| fail(node, error))?;
-        let (mut reference, mut relation, mut pose) = (None, Relation::In, Isometry3::identity());
-        if let Some(location) = child(node, "PrimaryLocation") {
-            let kind = location
-                .attributes()
-                .find(|a| a.name() == "type")
-                .map_or("", |a| a.value());
-            relation = match kind {
-                "PoseLocationInType" => Relation::PoseIn,
-                "PoseLocationOnType" => Relation::PoseOn,
-                "RelativeLocationInType" => Relation::In,
-                "RelativeLocationOnType" => Relation::On,
-                _ => Relation::Pose,
-            };
-            if relation.has_pose() {
-                pose = self.pose(location)?;
-            }
-            reference = text_of(location, "RefObjectName").map(str::to_owned);
-        }
-        self.places.push(Placed {
+        let mut placed = Placed {
             id,
             parent,
-            reference,
-            relation,
-            pose,
+            reference: None,
+            relation: Relation::In,
+            pose: Isometry3::identity(),
             name,
-        });
+        };
+        if let Some(location) = child(node, "PrimaryLocation") {
+            self.place(location, &mut placed)?;
+        }
+        self.places.push(placed);
         if class == Class::Robot {
             self.volumes(node, id)?;
         }
@@ -285,6 +271,26 @@ impl Import {
                 self.object(nested, class, Some(id), depth + 1)?;
             }
         }
+        Ok(())
+    }
+
+    /// Reads where an object is.
+    fn place(&self, location: Node<'_, '_>, placed: &mut Placed) -> Result<(), PlanError> {
+        let kind = location
+            .attributes()
+            .find(|a| a.name() == "type")
+            .map_or("", |a| a.value());
+        placed.relation = match kind {
+            "PoseLocationInType" => Relation::PoseIn,
+            "PoseLocationOnType" => Relation::PoseOn,
+            "RelativeLocationInType" => Relation::In,
+            "RelativeLocationOnType" => Relation::On,
+            _ => Relation::Pose,
+        };
+        if placed.relation.has_pose() {
+            placed.pose = self.pose(location)?;
+        }
+        placed.reference = text_of(location, "RefObjectName").map(str::to_owned);
         Ok(())
     }
 

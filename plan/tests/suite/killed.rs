@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use plan::run::{
-    Batch, Cell, Controller, Motion, MotionFailure, PlanRunReport, RunOptions, SimulatedFactotum,
-    SimulatedMotion, Situation, Stock, prepare,
+    Batch, Cell, Controller, Motion, MotionFailure, PlanRunReport, RunOptions, RunOutcome,
+    SimulatedFactotum, SimulatedMotion, Situation, Stock, prepare,
 };
 use plan::world::{Durability, Reader, Writer, import_toml};
 
@@ -128,7 +128,7 @@ fn a_killed_run_goes_on() {
             let report = run(&path, &mut SimulatedMotion::default());
             assert_eq!(
                 (report.outcome, report.counters.kits),
-                ("stopped", 2),
+                (RunOutcome::Stopped, 2),
                 "{report:#?}"
             );
         }

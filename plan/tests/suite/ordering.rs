@@ -1,7 +1,7 @@
 //! Lists that leave the order open.
 
-use plan::run::{Event, SimulatedMotion};
-use plan::world::{Change, Location};
+use plan::run::{Counters, Event, RunOutcome, SimulatedMotion};
+use plan::world::{Change, Location, Model};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, RngSeed, TestRng, TestRunner};
 
@@ -16,6 +16,45 @@ fn config(cases: u32) -> Config {
     }
 }
 
+/// The workstation with its three supplies in any order along the table, each pushed about a
+/// little; the kit's box and the trays stay.
+fn scattered(random: &mut impl FnMut() -> f64) -> Model {
+    let mut world = Trial::own(1).world;
+    let mut places = [-0.21, 0.0, 0.21];
+    for last in (1..3).rev() {
+        places.swap(last, (random() * (last + 1) as f64) as usize % (last + 1));
+    }
+    for (name, y) in ["SupplyA", "SupplyB", "SupplyC"].into_iter().zip(places) {
+        let supply = world.named(name).unwrap();
+        let mut pose = supply.location.pose;
+        pose.translation.x += 0.06 * (random() - 0.5);
+        pose.translation.y = y + 0.04 * (random() - 0.5);
+        let location = Location {
+            pose,
+            ..supply.location
+        };
+        let object = supply.id;
+        world.apply(&Change::Place { object, location }).unwrap();
+    }
+    world
+}
+
+/// One kit in a world, and the lines of the plan in the order in which they were executed.
+fn run_in(world: &Model, choose: bool) -> (Counters, Vec<usize>) {
+    let mut trial = Trial::own(1);
+    trial.world = world.clone();
+    trial.options.choose_order = choose;
+    let result = trial.run();
+    let report = result.report;
+    assert_eq!(report.outcome, RunOutcome::Stopped, "{report:#?}");
+    let line = |event: &Event| match event {
+        Event::Statement { line, .. } => Some(*line),
+        _ => None,
+    };
+    let order = result.events.iter().filter_map(line).collect();
+    (report.counters, order)
+}
+
 /// On 100 random layouts the chosen order is never slower than the written one.
 #[test]
 fn chosen_orders_are_never_slower() {
@@ -24,38 +63,8 @@ fn chosen_orders_are_never_slower() {
     let (mut written_s, mut chosen_s) = (0.0, 0.0);
     let (mut better, mut changed) = (0, 0);
     for layout in 0..100 {
-        let mut world = Trial::own(1).world;
-        // The three supplies in any order along the table, each pushed about a little; the kit's
-        // box and the trays stay.
-        let mut places = [-0.21, 0.0, 0.21];
-        for last in (1..3).rev() {
-            places.swap(last, (random() * (last + 1) as f64) as usize % (last + 1));
-        }
-        for (name, y) in ["SupplyA", "SupplyB", "SupplyC"].into_iter().zip(places) {
-            let supply = world.named(name).unwrap();
-            let mut pose = supply.location.pose;
-            pose.translation.x += 0.06 * (random() - 0.5);
-            pose.translation.y = y + 0.04 * (random() - 0.5);
-            let location = Location {
-                pose,
-                ..supply.location
-            };
-            let object = supply.id;
-            world.apply(&Change::Place { object, location }).unwrap();
-        }
-        let run = |choose: bool| {
-            let mut trial = Trial::own(1);
-            trial.world = world.clone();
-            trial.options.choose_order = choose;
-            let result = trial.run();
-            assert_eq!(result.report.outcome, "stopped", "{:#?}", result.report);
-            let line = |event: &Event| match event {
-                Event::Statement { line, .. } => Some(*line),
-                _ => None,
-            };
-            let order: Vec<usize> = result.events.iter().filter_map(line).collect();
-            (result.report.counters, order)
-        };
+        let world = scattered(&mut random);
+        let run = |choose| run_in(&world, choose);
         let ((written, as_written), (chosen, as_chosen)) = (run(false), run(true));
         changed += usize::from(as_written != as_chosen);
         assert!(
@@ -105,11 +114,7 @@ fn precondition_plan(poses: &[(f64, f64)], edges: &[(usize, usize)]) -> String {
 /// The lines of the executed moves, in the order of their execution.
 fn executed(events: &[Event], first_line: usize) -> Vec<usize> {
     let line = |event: &Event| match event {
-        Event::Statement {
-            name: "RobotMoveAbove",
-            line,
-            ..
-        } => Some(*line - first_line),
+        Event::Statement { name, line, .. } if name == "RobotMoveAbove" => Some(*line - first_line),
         _ => None,
     };
     events.iter().filter_map(line).collect()
@@ -137,7 +142,7 @@ fn orders_respect_preconditions() {
         let mut trial = Trial::new(&source, "examples/kitting/workstation.toml", 1);
         trial.motion = SimulatedMotion::default();
         let result = trial.run();
-        prop_assert_eq!(result.report.outcome, "stopped");
+        prop_assert_eq!(result.report.outcome, RunOutcome::Stopped);
         let order = executed(&result.events, 6);
         prop_assert_eq!(order.len(), poses.len());
         for (before, after) in edges {
@@ -220,7 +225,12 @@ fn orders_respect_properties() {
     let order = |first: &str| {
         let world = "examples/kitting/workstation.toml";
         let result = Trial::new(&source.replace("FIRST", first), world, 1).run();
-        assert_eq!(result.report.outcome, "stopped", "{:?}", result.report);
+        assert_eq!(
+            result.report.outcome,
+            RunOutcome::Stopped,
+            "{:?}",
+            result.report
+        );
         executed(&result.events, 7)
     };
     assert_eq!(order("1"), [1, 0], "the near one first");

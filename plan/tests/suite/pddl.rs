@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use plan::interp::{Code, CommandSink, PddlInterpreter, PlanInterpreter, Pull, PulledRun, pull};
 use plan::pddl::{ActionTable, Failure, read_domain, read_plan, read_problem, simulate};
-use plan::run::{PlanRunReport, RobotOptions, SimulatedMotion};
+use plan::run::{PlanRunReport, Policy, RobotOptions, RunOutcome, SimulatedMotion};
 use plan::world::{Class, Durability, Model, Writer, import_toml};
 
 use crate::fixtures::repository_text;
@@ -97,8 +97,8 @@ fn fresh_world(folder: &Path) -> PathBuf {
 
 /// Executes a run with an arm that fails at these commands.
 fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]) -> PlanRunReport {
-    let options = &RobotOptions::default();
-    let mut interpreter = PddlInterpreter::new(path, table.clone(), options.clone());
+    let robot = RobotOptions::default();
+    let mut interpreter = PddlInterpreter::new(path, table.clone(), robot.clone());
     interpreter.go_on(run.source(), run.done());
     let mut motion = SimulatedMotion {
         reach: Some(0.85),
@@ -106,9 +106,10 @@ fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]
         ..SimulatedMotion::default()
     };
     let place = Pull {
-        writer: &mut Writer::open(path, Durability::Process).unwrap(),
+        writer: Writer::open(path, Durability::Process).unwrap(),
         motion: &mut motion,
-        options,
+        robot,
+        policy: Policy::Stop,
     };
     pull(&mut interpreter, run, place, &mut |_| {}).unwrap()
 }
@@ -157,7 +158,7 @@ fn a_pddl_plan_makes_a_kit() {
     let (report, world) = execute(&plan, &table);
     assert_eq!(
         (report.outcome, report.code, report.counters.statements),
-        ("stopped", 0, 18),
+        (RunOutcome::Stopped, 0, 18),
         "{report:?}"
     );
     assert_one_kit(&world);
@@ -176,13 +177,13 @@ fn a_failed_pddl_run_is_resumed() {
     let whole = read_world(&path);
     let again = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap_err();
     assert!(again.to_string().contains("came to its end"), "{again}");
-    for at in (5..good.counters.commands - 1).step_by(3) {
+    for at in (5..good.counters.commands + 3).step_by(3) {
         let folder = tempfile::tempdir().unwrap();
         let path = fresh_world(folder.path());
         let failed = pull_run(&path, &table, PulledRun::new("plan", &source), &[at]);
         assert_eq!(
             (failed.outcome, failed.code),
-            ("failed", 100),
+            (RunOutcome::Failed, 100),
             "{failed:#?}"
         );
         let run = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap();
@@ -196,7 +197,7 @@ fn a_failed_pddl_run_is_resumed() {
                 counters.pick_ups,
                 counters.kits
             ),
-            ("stopped", 18, 6, 1),
+            (RunOutcome::Stopped, 18, 6, 1),
             "command {at}: {report:#?}"
         );
         crate::world::assert_same(&whole, &read_world(&path));
@@ -205,7 +206,11 @@ fn a_failed_pddl_run_is_resumed() {
     let path = fresh_world(folder.path());
     let ghost = PulledRun::new("plan", "(attach-eff robot_1 ghost ghost_holder)");
     let report = pull_run(&path, &table, ghost, &[]);
-    assert_eq!((report.outcome, report.code), ("failed", 9), "{report:#?}");
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Failed, 9),
+        "{report:#?}"
+    );
     let again = PulledRun::resume(last(&path).unwrap().unwrap()).unwrap_err();
     assert!(again.to_string().contains("gave up"), "{again}");
 }
@@ -231,7 +236,7 @@ fn a_table_adds_an_action() {
             report.counters.statements,
             report.counters.commands
         ),
-        ("stopped", 2, 8),
+        (RunOutcome::Stopped, 2, 4),
         "{report:?}"
     );
     assert!(report.counters.motion_s >= 1.0);
@@ -240,104 +245,127 @@ fn a_table_adds_an_action() {
     assert!(error.contains("no argument is called part"), "{error}");
 }
 
-/// The codes of the five functions.
-#[test]
-fn the_interface_keeps_its_life_cycle() {
-    struct Full;
-    impl CommandSink for Full {
-        fn command(&mut self, _: crcl::Command) -> bool {
-            false
+/// Takes no command.
+struct Full;
+
+impl CommandSink for Full {
+    fn command(&mut self, _: crcl::Command) -> bool {
+        false
+    }
+}
+
+/// Keeps the commands as text.
+#[derive(Default)]
+struct Lines(Vec<String>);
+
+impl CommandSink for Lines {
+    fn command(&mut self, command: crcl::Command) -> bool {
+        self.0.push(crcl::text::write_command(&command));
+        true
+    }
+}
+
+/// An interpreter with the example world, and a folder for its plans.
+struct Desk {
+    folder: tempfile::TempDir,
+    interpreter: PddlInterpreter,
+    sink: Lines,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = fresh_world(folder.path());
+        let table = ActionTable::own().unwrap();
+        let interpreter = PddlInterpreter::new(&path, table, RobotOptions::default());
+        let sink = Lines::default();
+        Self {
+            folder,
+            interpreter,
+            sink,
         }
     }
-    #[derive(Default)]
-    struct Lines(Vec<String>);
-    impl CommandSink for Lines {
-        fn command(&mut self, command: crcl::Command) -> bool {
-            self.0.push(crcl::text::write_command(&command));
-            true
-        }
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("world.db");
-    let mut writer = Writer::open(&path, Durability::Process).unwrap();
-    let world = repository_text("examples/kitting/workstation-pddl.toml");
-    writer.replace(&import_toml(&world).unwrap()).unwrap();
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
+
+    fn file(&self, text: &str) -> String {
+        let path = self.folder.path().join("plan");
         std::fs::write(&path, text).unwrap();
         path.to_str().unwrap().to_owned()
-    };
-    let table = ActionTable::own().unwrap();
-    let mut interpreter = PddlInterpreter::new(&path, table, RobotOptions::default());
-    let mut sink = Lines::default();
-    assert_eq!(interpreter.execute(&mut sink), Code::NotInitialised);
-    assert_eq!(interpreter.close_plan(), Code::NotInitialised);
-    assert_eq!(interpreter.exit(), Code::NotInitialised);
-    assert_eq!(interpreter.init(), Code::Ok);
-    assert_eq!(interpreter.execute(&mut sink), Code::NoPlanOpen);
-    assert_eq!(interpreter.close_plan(), Code::NoPlanOpen);
-    assert_eq!(
-        interpreter.open_plan("nowhere", "PDDL", &mut sink),
-        Code::CannotReadFile
-    );
-    let broken = file("broken", "(take-part robot_1\n");
-    assert_eq!(
-        interpreter.open_plan(&broken, "PDDL", &mut sink),
-        Code::ParseError
-    );
-    assert!(
-        interpreter.last_error().contains("line 1, column 19"),
-        "{}",
-        interpreter.last_error()
-    );
-    let unknown = file("unknown", "(dance robot_1)\n");
-    assert_eq!(
-        interpreter.open_plan(&unknown, "PDDL", &mut sink),
-        Code::UnknownAction
-    );
-    assert_eq!(
-        interpreter.open_plan(&unknown, "KITPLAN", &mut sink),
-        Code::UnsupportedPlanType
-    );
-    let ghost = file("ghost", "(attach-eff robot_1 ghost ghost_holder)\n");
-    assert_eq!(
-        interpreter.open_plan(&ghost, "PDDL", &mut Full),
-        Code::SinkFull
-    );
-    assert_eq!(interpreter.open_plan(&ghost, "PDDL", &mut sink), Code::Ok);
-    assert_eq!(
-        interpreter.open_plan(&ghost, "PDDL", &mut sink),
-        Code::PlanAlreadyOpen
-    );
-    assert_eq!(interpreter.execute(&mut sink), Code::NoSuchPose);
-    assert_eq!(interpreter.execute(&mut sink), Code::EndOfPlan);
-    assert_eq!(interpreter.close_plan(), Code::Ok);
-    let early = file(
-        "early",
-        "(take-part robot_1 part_a_1 part_a_tray part_gripper work_table_1 kit_1)\n",
-    );
-    assert_eq!(interpreter.open_plan(&early, "PDDL", &mut sink), Code::Ok);
-    assert_eq!(interpreter.execute(&mut sink), Code::PreconditionFalse);
-    assert!(
-        interpreter.last_error().contains("no end effector"),
-        "{}",
-        interpreter.last_error()
-    );
-    assert_eq!(interpreter.close_plan(), Code::Ok);
-    let empty = file("empty", "; nothing to do\n");
-    assert_eq!(interpreter.open_plan(&empty, "PDDL", &mut sink), Code::Ok);
-    assert_eq!(interpreter.execute(&mut sink), Code::EndOfPlan);
-    assert_eq!(interpreter.close_plan(), Code::Ok);
-    assert_eq!(interpreter.exit(), Code::Ok);
-    let ends: Vec<&String> = sink
-        .0
-        .iter()
-        .filter(|line| line.starts_with("EndCanon"))
-        .collect();
+    }
+
+    fn open(&mut self, text: &str) -> Code {
+        let file = self.file(text);
+        self.interpreter.open_plan(&file, "PDDL", &mut self.sink)
+    }
+
+    fn execute(&mut self) -> Code {
+        self.interpreter.execute(&mut self.sink)
+    }
+
+    fn assert_said(&self, text: &str) {
+        let said = self.interpreter.last_error();
+        assert!(said.contains(text), "{said}");
+    }
+}
+
+const GHOST: &str = "(attach-eff robot_1 ghost ghost_holder)\n";
+
+/// The codes of functions that are called out of turn.
+#[test]
+fn the_interface_keeps_its_life_cycle() {
+    let mut desk = Desk::new();
+    assert_eq!(desk.execute(), Code::NotInitialised);
+    assert_eq!(desk.interpreter.close_plan(), Code::NotInitialised);
+    assert_eq!(desk.interpreter.exit(), Code::NotInitialised);
+    assert_eq!(desk.interpreter.init(), Code::Ok);
+    assert_eq!(desk.execute(), Code::NoPlanOpen);
+    assert_eq!(desk.interpreter.close_plan(), Code::NoPlanOpen);
+    assert_eq!(desk.open(GHOST), Code::Ok);
+    assert_eq!(desk.open(GHOST), Code::PlanAlreadyOpen);
+    assert_eq!(desk.interpreter.close_plan(), Code::Ok);
+    assert_eq!(desk.interpreter.exit(), Code::Ok);
+}
+
+/// The codes of plans that cannot be opened.
+#[test]
+fn a_plan_that_cannot_be_opened_is_refused() {
+    let mut desk = Desk::new();
+    assert_eq!(desk.interpreter.init(), Code::Ok);
+    let nowhere = desk
+        .interpreter
+        .open_plan("nowhere", "PDDL", &mut desk.sink);
+    assert_eq!(nowhere, Code::CannotReadFile);
+    assert_eq!(desk.open("(take-part robot_1\n"), Code::ParseError);
+    desk.assert_said("line 1, column 19");
+    assert_eq!(desk.open("(dance robot_1)\n"), Code::UnknownAction);
+    let file = desk.file(GHOST);
+    let other = desk.interpreter.open_plan(&file, "KITPLAN", &mut desk.sink);
+    assert_eq!(other, Code::UnsupportedPlanType);
+    let full = desk.interpreter.open_plan(&file, "PDDL", &mut Full);
+    assert_eq!(full, Code::SinkFull);
+}
+
+/// The codes of steps, and EndCanon with each.
+#[test]
+fn a_step_that_fails_ends_the_plan() {
+    let mut desk = Desk::new();
+    assert_eq!(desk.interpreter.init(), Code::Ok);
+    assert_eq!(desk.open(GHOST), Code::Ok);
+    assert_eq!(desk.execute(), Code::NoSuchPose);
+    assert_eq!(desk.execute(), Code::EndOfPlan);
+    assert_eq!(desk.interpreter.close_plan(), Code::Ok);
+    let early = "(take-part robot_1 part_a_1 part_a_tray part_gripper work_table_1 kit_1)\n";
+    assert_eq!(desk.open(early), Code::Ok);
+    assert_eq!(desk.execute(), Code::PreconditionFalse);
+    desk.assert_said("no end effector");
+    assert_eq!(desk.interpreter.close_plan(), Code::Ok);
+    assert_eq!(desk.open("; nothing to do\n"), Code::Ok);
+    assert_eq!(desk.execute(), Code::EndOfPlan);
+    let lines = &desk.sink.0;
+    let ends = lines.iter().filter(|line| line.starts_with("EndCanon"));
+    let ends: Vec<&String> = ends.collect();
     assert_eq!(
         ends,
         ["EndCanon (9)", "EndCanon (10)", "EndCanon (0)"],
-        "{:?}",
-        sink.0
+        "{lines:?}"
     );
 }

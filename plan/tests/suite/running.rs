@@ -5,8 +5,8 @@ use std::path::Path;
 
 use plan::finding::Severity;
 use plan::run::{
-    Cell, Controller, Event, PlanRunReport, Policy, RunOptions, SimulatedFactotum, SimulatedMotion,
-    Stock, prepare,
+    Cell, Controller, Event, PlanRunReport, Policy, RunOptions, RunOutcome, SimulatedFactotum,
+    SimulatedMotion, Stock, prepare,
 };
 use plan::world::{Class, Durability, Model, Reader, Scalar, Writer, check, import_toml};
 
@@ -141,7 +141,11 @@ fn assert_three_kits(result: &Result) {
         world,
         events,
     } = result;
-    assert_eq!((report.outcome, report.code), ("stopped", 0), "{report:#?}");
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Stopped, 0),
+        "{report:#?}"
+    );
     let counters = &report.counters;
     assert_eq!(
         (
@@ -173,83 +177,86 @@ fn our_plan_makes_three_kits() {
 /// Twelve kits fill a box; supplies run empty meanwhile and are replaced in both ways.
 #[test]
 fn supplies_are_refilled_and_a_box_fills() {
-    for trial in [Trial::own(12)] {
-        let Result {
-            report,
-            world,
-            events,
-        } = trial.run();
-        assert_eq!(report.outcome, "stopped", "{report:#?}");
-        assert_eq!(report.counters.kits, 12);
-        let count = |wanted: &str| {
-            let is =
-                |event: &&Event| matches!(event, Event::Statement { name, .. } if *name == wanted);
-            events.iter().filter(is).count()
-        };
-        // 24 PartA out of trays of 8, 12 of each other out of trays of 6.
-        assert_eq!(count("DestroyInstance"), 2);
-        assert_eq!((count("FactotumRemove"), count("FactotumRefill")), (2, 2));
-        assert_eq!(count("FactotumReplace"), 2);
-        let full = world.named("BoxOfKits").unwrap().id;
-        assert_eq!(world.count(full, "kitABC", 1), 12);
-        assert_kits(&world, 12);
-        assert_consistent(&world);
-    }
+    let trial = Trial::own(12);
+    let Result {
+        report,
+        world,
+        events,
+    } = trial.run();
+    assert_eq!(report.outcome, RunOutcome::Stopped, "{report:#?}");
+    assert_eq!(report.counters.kits, 12);
+    let count = |wanted: &str| {
+        let is = |event: &&Event| matches!(event, Event::Statement { name, .. } if name == wanted);
+        events.iter().filter(is).count()
+    };
+    // 24 PartA out of trays of 8, 12 of each other out of trays of 6.
+    assert_eq!(count("DestroyInstance"), 2);
+    assert_eq!((count("FactotumRemove"), count("FactotumRefill")), (2, 2));
+    assert_eq!(count("FactotumReplace"), 2);
+    let full = world.named("BoxOfKits").unwrap().id;
+    assert_eq!(world.count(full, "kitABC", 1), 12);
+    assert_kits(&world, 12);
+    assert_consistent(&world);
 }
 
 /// The thirteenth kit needs another box for kits and another box of trays.
 #[test]
 fn full_and_empty_boxes_are_replaced() {
-    for trial in [Trial::own(13)] {
-        let Result { report, world, .. } = trial.run();
-        assert_eq!(
-            (report.outcome, report.counters.kits),
-            ("stopped", 13),
-            "{report:#?}"
-        );
-        assert_kits(&world, 1);
-        assert_consistent(&world);
-        let boxes = world
-            .objects()
-            .filter(|o| o.class == Class::LargeContainer)
-            .count();
-        assert_eq!(boxes, 2, "boxes are replaced, not added");
-        let trays = world.objects().filter(|o| {
-            o.class == Class::KitTray
-                && world.object(o.location.reference).unwrap().class == Class::LargeContainer
-        });
-        assert_eq!(trays.count(), 11);
-    }
+    let trial = Trial::own(13);
+    let Result { report, world, .. } = trial.run();
+    assert_eq!(
+        (report.outcome, report.counters.kits),
+        (RunOutcome::Stopped, 13),
+        "{report:#?}"
+    );
+    assert_kits(&world, 1);
+    assert_consistent(&world);
+    let boxes = world
+        .objects()
+        .filter(|o| o.class == Class::LargeContainer)
+        .count();
+    assert_eq!(boxes, 2, "boxes are replaced, not added");
+    let trays = world.objects().filter(|o| {
+        o.class == Class::KitTray
+            && world.object(o.location.reference).unwrap().class == Class::LargeContainer
+    });
+    assert_eq!(trays.count(), 11);
 }
 
 /// A factotum that brings an empty tray makes the plan give up; one that brings nothing ends it.
 #[test]
 fn failed_refills_end_the_plan_with_a_positive_reason() {
     let names = ["partASupplyRequirement", "supply of A"];
-    for mut trial in [Trial::own(6)] {
-        trial.adjust = |factotum| {
-            for name in ["partASupplyRequirement", "supply of A"] {
-                factotum.stock.empty(name);
-            }
-        };
-        let Result { report, world, .. } = trial.run();
-        assert_eq!((report.outcome, report.code), ("failed", 1), "{report:#?}");
-        assert!(report.reason.unwrap().contains("Quit"));
-        assert_eq!(report.counters.kits, 4);
-        assert_consistent(&world);
-    }
-    for mut trial in [Trial::own(6)] {
-        trial.adjust = |factotum| {
-            factotum.limits = ["partASupplyRequirement", "supply of A"]
-                .map(|n| (n.to_owned(), 0))
-                .into();
-        };
-        let Result { report, world, .. } = trial.run();
-        assert_eq!((report.outcome, report.code), ("failed", 4), "{report:#?}");
-        let reason = report.reason.unwrap();
-        assert!(names.iter().any(|name| reason.contains(name)), "{reason}");
-        assert_consistent(&world);
-    }
+    let mut trial = Trial::own(6);
+    trial.adjust = |factotum| {
+        for name in ["partASupplyRequirement", "supply of A"] {
+            factotum.stock.empty(name);
+        }
+    };
+    let Result { report, world, .. } = trial.run();
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Failed, 1),
+        "{report:#?}"
+    );
+    assert!(report.reason.unwrap().contains("Quit"));
+    assert_eq!(report.counters.kits, 4);
+    assert_consistent(&world);
+    let mut trial = Trial::own(6);
+    trial.adjust = |factotum| {
+        factotum.limits = ["partASupplyRequirement", "supply of A"]
+            .map(|n| (n.to_owned(), 0))
+            .into();
+    };
+    let Result { report, world, .. } = trial.run();
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Failed, 4),
+        "{report:#?}"
+    );
+    let reason = report.reason.unwrap();
+    assert!(names.iter().any(|name| reason.contains(name)), "{reason}");
+    assert_consistent(&world);
 }
 
 /// A motion that fails changes nothing in the world: every command of the first kit, one by one.
@@ -266,21 +273,13 @@ fn no_change_without_its_motion() {
         } = trial.run();
         assert_eq!(
             (report.outcome, report.code),
-            ("failed", 3),
+            (RunOutcome::Failed, 3),
             "command {at}: {report:#?}"
         );
         assert_consistent(&world);
         let put_downs = events
             .iter()
-            .filter(|e| {
-                matches!(
-                    e,
-                    Event::Statement {
-                        name: "RobotPutDown",
-                        ..
-                    }
-                )
-            })
+            .filter(|e| matches!(e, Event::Statement { name, .. } if name == "RobotPutDown"))
             .count();
         let in_kit = world
             .objects()
@@ -321,7 +320,11 @@ fn a_failed_run_is_resumed() {
         let options = RunOptions::default();
         let start = Controller::start(cell, &trial.source, &given, &stock, options.clone());
         let failed = start.unwrap().run(&mut |_| {}).unwrap();
-        assert_eq!((failed.outcome, failed.code), ("failed", 3), "{failed:#?}");
+        assert_eq!(
+            (failed.outcome, failed.code),
+            (RunOutcome::Failed, 3),
+            "{failed:#?}"
+        );
         let mut resume = || {
             let cell = Cell {
                 writer: Writer::open(&path, Durability::Process).unwrap(),
@@ -334,7 +337,7 @@ fn a_failed_run_is_resumed() {
         let report = resume().unwrap();
         assert_eq!(
             (report.outcome, report.counters.pick_ups),
-            ("stopped", 6),
+            (RunOutcome::Stopped, 6),
             "{report:#?}"
         );
         crate::world::assert_same(&good.world, &read_world(&path));
@@ -358,7 +361,7 @@ fn failures_are_repaired() {
         } = trial.run();
         assert_eq!(
             (report.outcome, report.counters.kits),
-            ("stopped", 1),
+            (RunOutcome::Stopped, 1),
             "{report:#?}"
         );
         assert_eq!(

@@ -1,7 +1,7 @@
 //! Single statements and expressions, each in a small plan.
 
 use plan::kitting::read;
-use plan::run::Event;
+use plan::run::{Event, RunOutcome};
 use plan::world::Scalar;
 
 use crate::running::{Result, Trial};
@@ -34,7 +34,7 @@ fn good(body: &str) -> Result {
     let report = &result.report;
     assert_eq!(
         (report.outcome, report.code),
-        ("stopped", 0),
+        (RunOutcome::Stopped, 0),
         "{body}: {report:#?}"
     );
     result
@@ -112,7 +112,11 @@ fn loops_pass_by_pass() {
             "{name} {{n < 3}} begin\nIf {{n == 7}} Quit()\nend"
         ))
         .report;
-        assert_eq!((idle.outcome, idle.code), ("failed", 2), "{idle:#?}");
+        assert_eq!(
+            (idle.outcome, idle.code),
+            (RunOutcome::Failed, 2),
+            "{idle:#?}"
+        );
     }
     let far_and_near = format!("{}\n{}", above(600, 300), above(350, 20));
     let body = format!("LoopInAnyOrderWhile {{n < 2}} begin\n{far_and_near}\nSet(n, n + 1)\nend");
@@ -130,7 +134,11 @@ fn plans_end_where_they_say() {
     let result = good("If {true}\nStop()\nSet(n, 1)");
     assert_eq!(lines(&result), Vec::<usize>::new());
     let report = run("If {true}\nQuit()\nSet(n, 1)").report;
-    assert_eq!((report.outcome, report.code), ("failed", 1), "{report:#?}");
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Failed, 1),
+        "{report:#?}"
+    );
 }
 
 /// Operators bind as they do in C.
@@ -161,7 +169,11 @@ fn expressions_have_values() {
         assert!(!holds(&format!("!({condition})")), "!({condition})");
     }
     let report = run("Set(n, 1 / (n - n))").report;
-    assert_eq!((report.outcome, report.code), ("failed", 2), "{report:#?}");
+    assert_eq!(
+        (report.outcome, report.code),
+        (RunOutcome::Failed, 2),
+        "{report:#?}"
+    );
 }
 
 /// A property that is set is in the world afterwards; a pose is given another reference.
