@@ -1,4 +1,4 @@
-//! The canonical robot command language: text, JSON, diagnostics.
+//! The canonical robot command language: text, JSON, XML, diagnostics.
 
 mod check;
 mod command;
@@ -16,6 +16,7 @@ mod suggest;
 pub mod text;
 mod units;
 mod value;
+pub mod xml;
 
 pub use check::{CheckOptions, check};
 pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, LONGEST_S, Standing};
@@ -24,5 +25,5 @@ pub use pose::{LARGEST_ANGLE, LARGEST_COORDINATE, ORTHOGONALITY, Pose, PosePart}
 pub use program::{Located, Program, ReadOptions, Reading};
 pub use report::{Look, NoteRecord, Record, Report, records, render};
 pub use source::Source;
-pub use units::{AngleUnit, CoordinateFrame, LengthUnit};
+pub use units::{AngleUnit, CoordinateFrame, ForceUnit, LengthUnit, TorqueUnit};
 pub use value::ValueError;
