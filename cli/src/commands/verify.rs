@@ -3,7 +3,9 @@ use std::io::{self, BufReader, Read, Write};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use planner::recorded::{CommandVerdict, ProgramVerdict, Row, RunColumns, verify_program};
+use planner::recorded::{
+    CommandVerdict, ProgramVerdict, RecordedSample, RunColumns, verify_program,
+};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -56,12 +58,12 @@ impl Verify {
 }
 
 /// Rows of a sample file, found by the names of its columns.
-fn read(path: &str, joints: usize) -> Result<Vec<Row>, Failure> {
+fn read(path: &str, joints: usize) -> Result<Vec<RecordedSample>, Failure> {
     let source = BufReader::new(input::lines(path)?);
     input::unreadable(path, parse(source, joints))
 }
 
-fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
+fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<RecordedSample>> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(source);
@@ -113,7 +115,7 @@ fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
 }
 
 /// A row from the numbers of its columns.
-fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
+fn row(numbers: &[f64], joints: usize) -> anyhow::Result<RecordedSample> {
     let mut numbers = numbers.iter().copied();
     let mut next = || numbers.next().ok_or_else(|| anyhow!("too few columns"));
     let (t_s, command) = (next()?, next()?);
@@ -135,7 +137,7 @@ fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
         }),
         Err(_) => None,
     };
-    Ok(Row {
+    Ok(RecordedSample {
         t_s,
         command: command as usize,
         joints: joints_now,
