@@ -50,7 +50,9 @@ impl Instance {
 /// # Errors
 /// Everything that is wrong with the document; at least one finding.
 pub fn read_instance(source: &str) -> Result<Instance, Vec<Finding>> {
-    read_one(source, "CRCLCommandInstance", Reader::instance)
+    read_one(source, "CRCLCommandInstance", |reader, root| {
+        reader.instance(root)
+    })
 }
 
 /// Reads a status document.
@@ -58,7 +60,7 @@ pub fn read_instance(source: &str) -> Result<Instance, Vec<Finding>> {
 /// # Errors
 /// Everything that is wrong with the document; at least one finding.
 pub fn read_status(source: &str) -> Result<Status, Vec<Finding>> {
-    read_one(source, "CRCLStatus", Reader::status)
+    read_one(source, "CRCLStatus", |reader, root| reader.status(root))
 }
 
 /// Reads the commands of a program as they are written. [`crate::xml::read`] gives the commands

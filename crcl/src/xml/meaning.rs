@@ -118,7 +118,10 @@ fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
             "AxialDistanceScrew",
             "MoveScrew: turning and advancing in step",
         )),
-        _ => Err(refusal("ActuateJoint", "ActuateJoints: moving single joints")),
+        _ => Err(refusal(
+            "ActuateJoint",
+            "ActuateJoints: moving single joints",
+        )),
     }
 }
 
@@ -208,7 +211,11 @@ pub(super) fn percent(share: f64) -> f64 {
     let percent = share * 100.0;
     // 0.07 is 7 percent, not 7.000000000000001.
     let short = format!("{percent:.13e}").parse().unwrap_or(percent);
-    if short / 100.0 == share { short } else { percent }
+    if short / 100.0 == share {
+        short
+    } else {
+        percent
+    }
 }
 
 fn one(command: Command) -> Result<Meaning, Refusal> {

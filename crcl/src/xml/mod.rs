@@ -44,7 +44,7 @@ use roxmltree::Node;
 use crate::command::Command;
 use crate::finding::{Finding, Findings, code};
 use crate::lexer::clip;
-use crate::meaning::value_finding;
+use crate::meaning::{refused_extension, value_finding};
 use crate::program::{Located, Program, ReadOptions, Reading};
 use crate::source::Walker;
 use crate::text;
@@ -73,12 +73,16 @@ pub fn read(source: &str, options: &ReadOptions) -> Reading {
     let roots = ["CRCLProgram", "CRCLCommandInstance"];
     let program = document::with_root(source, &roots, &mut findings, |reader, root| {
         let nodes = reader.program_nodes(root)?;
-        let mut blocks = Blocks::default();
+        let mut blocks = Blocks {
+            strict: options.strict,
+            ..Blocks::default()
+        };
         let mut walker = Walker::new(source);
         for (node, kind) in nodes {
             let place = place(node, &mut walker);
+            let before = reader.findings.total();
             if let Some(instruction) = reader.instruction(node, kind) {
-                blocks.take(reader, node, &instruction, &place);
+                blocks.take(reader, (node, before), &instruction, &place);
             }
         }
         Some(blocks.finish(reader, root))
@@ -123,6 +127,8 @@ fn place(node: Node, walker: &mut Walker) -> Place {
 #[derive(Default)]
 struct Blocks {
     program: Program,
+    /// Refuse what is not of the standard language.
+    strict: bool,
     /// Name of the block, where it begins in the program, where in the source.
     open: Vec<(String, usize, Range<usize>)>,
     /// Whether the limit was passed; said once.
@@ -130,18 +136,24 @@ struct Blocks {
 }
 
 impl Blocks {
+    /// Takes a command; `before` is how many findings there were before it was read.
     fn take(
         &mut self,
         reader: &mut Reader,
-        node: Node,
+        (node, before): (Node, usize),
         instruction: &Instruction,
         place: &Place,
     ) {
         match instruction.meaning() {
             Ok(Meaning::Commands(commands)) => {
-                let before = reader.findings.total();
                 doubt(reader, node, &instruction.command);
                 for command in commands {
+                    if let Some(info) = command.info().filter(|_| self.strict)
+                        && let Some(finding) = refused_extension(info, opening(node))
+                    {
+                        reader.findings.push(finding);
+                        continue;
+                    }
                     if let Err(error) = command.check()
                         && reader.findings.total() == before
                         && command.poses().is_empty()

@@ -65,7 +65,9 @@ impl Reader<'_> {
                 self.motion(kind, children)
             }
             "ConfigureJointReports" | "ConfigureStatusReport" => self.report(kind, children),
-            "SetEndEffectorParameters" | "SetRobotParameters" | "EnableSensor"
+            "SetEndEffectorParameters"
+            | "SetRobotParameters"
+            | "EnableSensor"
             | "EnableGripper" => self.with_parameters(kind, children),
             "LoopBlockEnd" => {
                 let name = children.wanted(self, "LoopName")?;
@@ -347,7 +349,9 @@ impl Reader<'_> {
                 child(self, "JointTolerances").and_then(|c| self.joint_tolerances(c))?,
             ),
             "RunProgram" => X::RunProgram(child(self, "ProgramText").and_then(|c| self.text(c))?),
-            "DisableSensor" => X::DisableSensor(child(self, "SensorID").and_then(|c| self.token(c))?),
+            "DisableSensor" => {
+                X::DisableSensor(child(self, "SensorID").and_then(|c| self.token(c))?)
+            }
             "DisableGripper" => {
                 X::DisableGripper(child(self, "GripperName").and_then(|c| self.token(c))?)
             }

@@ -273,7 +273,11 @@ fn straightened(pose: Pose) -> Pose {
     let product = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let (zz, xx) = (product(&z_axis, &z_axis), product(&x_axis, &x_axis));
     let off = product(&x_axis, &z_axis) / (zz * xx).sqrt();
-    if faults.len() != 1 || !faults.iter().all(only_axes) || off.is_nan() || off.abs() > ORTHOGONALITY {
+    if faults.len() != 1
+        || !faults.iter().all(only_axes)
+        || off.is_nan()
+        || off.abs() > ORTHOGONALITY
+    {
         return pose;
     }
     let along = product(&x_axis, &z_axis) / zz;

@@ -184,8 +184,7 @@ impl Reader<'_> {
     }
 
     fn fingers(&mut self, children: &mut Children) -> Option<GripperState> {
-        let mut three =
-            |names: [&str; 3]| names.map(|name| self.maybe_number(children, name));
+        let mut three = |names: [&str; 3]| names.map(|name| self.maybe_number(children, name));
         let [a, b, c] = three(["Finger1Position", "Finger2Position", "Finger3Position"]);
         let [d, e, f] = three(["Finger1Force", "Finger2Force", "Finger3Force"]);
         Some(GripperState::ThreeFinger {
@@ -199,8 +198,7 @@ impl Reader<'_> {
         let angle = children
             .maybe("AngleUnitName")
             .map(|node| self.choice(node, AngleUnit::XML_NAMES));
-        let end_effector_parameters =
-            self.parameters(children.many("EndEffectorParameterSetting"));
+        let end_effector_parameters = self.parameters(children.many("EndEffectorParameterSetting"));
         let end_effector = self.maybe_number(&mut children, "EndEffectorSetting");
         let force = children
             .maybe("ForceUnitName")
@@ -254,7 +252,7 @@ impl Reader<'_> {
         mut children: Children,
         start: SettingsStatus,
     ) -> Option<SettingsStatus> {
-        let mut inner = |reader: &mut Self, children: &mut Children, name: &str| {
+        let inner = |reader: &mut Self, children: &mut Children, name: &str| {
             let part = if name.ends_with("Absolute") {
                 "Setting"
             } else {

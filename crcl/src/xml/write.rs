@@ -46,7 +46,7 @@ pub fn write(program: &Program) -> Result<String, Vec<Finding>> {
             Err(why) => findings.push(formless(located, why)),
         }
     }
-    if count == 0 {
+    if count < 2 {
         let message = "a program in XML has InitCanon and EndCanon";
         findings.push(Finding::error(code::NO_FORM, 0..0, message));
     }

@@ -153,7 +153,7 @@ fn settings(out: &mut Out, status: &SettingsStatus) {
 
 /// The second half of the settings.
 fn speeds(out: &mut Out, status: &SettingsStatus) {
-    let mut one = |out: &mut Out, name: &str, part: &str, value: Option<f64>| {
+    let one = |out: &mut Out, name: &str, part: &str, value: Option<f64>| {
         if let Some(value) = value {
             out.element(name, |out| out.number(part, value));
         }
