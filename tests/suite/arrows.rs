@@ -6,7 +6,7 @@ use system_tests::repository::root;
 use toml::{Table, Value};
 
 /// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     (
         "cli",
         &[
@@ -16,6 +16,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "planner",
             "measure",
             "crcl",
+            "crcl-tcp",
             "kinematics",
             "trajectory",
             "ipc",
@@ -26,6 +27,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
+    ("crcl-tcp", &["crcl", "ipc"]),
     (
         "engine",
         &[
