@@ -47,8 +47,8 @@ impl Network {
     /// ```
     pub fn holds(&self, address: IpAddr) -> bool {
         let number = |address: IpAddr| match address.to_canonical() {
-            IpAddr::V4(address) => (32, u128::from(u32::from(address))),
-            IpAddr::V6(address) => (128, u128::from(address)),
+            IpAddr::V4(address) => (32_u32, u128::from(u32::from(address))),
+            IpAddr::V6(address) => (128_u32, u128::from(address)),
         };
         let ((most, ours), (other, theirs)) = (number(self.address), number(address));
         let rest = most.saturating_sub(self.bits);
