@@ -58,8 +58,6 @@ pub(crate) struct Picture {
     pub(crate) orientation: [f64; 4],
     /// Settings in force.
     pub(crate) settings: Settings,
-    /// Share of the planned speed (percent).
-    pub(crate) override_percent: Option<i32>,
     /// The gripper: whether it holds or is open is not known; how far it is open (m).
     pub(crate) gripper: Option<f64>,
 }

@@ -314,7 +314,7 @@ impl Connection {
             serial: 0,
             epoch: inner.epoch,
             kind,
-            target: commands.last().and_then(target),
+            target: commands.iter().rev().find_map(target),
             preempts: moves && !self.manners.queue,
             commands,
         }))

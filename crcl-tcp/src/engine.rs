@@ -82,7 +82,6 @@ impl Engine {
             let all = state.as_ref().map(all).unwrap_or_default();
             all.into_iter().take(joints.len()).collect::<Vec<_>>()
         };
-        let scaling = status["override"].as_f64();
         let picture = Picture {
             setpoint: numbers(&status["setpoint"]),
             velocities: part(&|state| state.velocity.to_vec()),
@@ -96,7 +95,6 @@ impl Engine {
                 intermediate_point: settings["intermediate_point"].as_f64().unwrap_or(0.0),
                 end_point: settings["end_point"].as_f64().unwrap_or(0.0),
             },
-            override_percent: scaling.map(|share| (share * 100.0).round() as i32),
             gripper: state.as_ref().and_then(opening),
             joints,
         };
@@ -161,7 +159,7 @@ fn happened(note: &Value) -> Option<Happened> {
 
 /// How far the gripper is open (m), if there is one.
 fn opening(state: &State) -> Option<f64> {
-    let gripper = state.tools.get(ipc::GRIPPER as usize)?;
+    let gripper = state.tools.get(ipc::GRIPPER)?;
     match ToolStatus::from_number(gripper.status)? {
         ToolStatus::Unknown => None,
         _ => Some(gripper.position),

@@ -71,7 +71,7 @@ impl Choice {
     /// The text of a status.
     pub(crate) fn write(&self, last: &Last, number: i64, picture: &Picture) -> String {
         let mut status = Status {
-            command: command(last, number, picture),
+            command: command(last, number),
             joints: self.joints(picture),
             pose: self.parts.pose.then(|| self.pose(picture)),
             gripper: self.gripper(picture),
@@ -179,7 +179,7 @@ fn position(joint: i32) -> JointReport {
     }
 }
 
-fn command(last: &Last, number: i64, picture: &Picture) -> CommandStatus {
+fn command(last: &Last, number: i64) -> CommandStatus {
     let mut place = last.place.clone();
     place.file = place.file.map(|file| cut(&file, 200));
     CommandStatus {
@@ -192,7 +192,7 @@ fn command(last: &Last, number: i64, picture: &Picture) -> CommandStatus {
             .as_deref()
             .map(|text| cut(text, LONGEST_TEXT)),
         place,
-        override_percent: picture.override_percent,
+        override_percent: None,
     }
 }
 

@@ -235,6 +235,8 @@ pub mod code {
         COUNT_MISMATCH = "crcl::count-mismatch";
         /// A list without poses.
         NO_POSES = "crcl::no-poses";
+        /// A list of joints that is empty, or has a joint twice or none of that number.
+        JOINTS = "crcl::joints";
         /// A pose, point or axis with too many or too few parts.
         POSE_SHAPE = "crcl::pose-shape";
         /// An axis of length zero.

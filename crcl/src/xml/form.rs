@@ -1,8 +1,9 @@
 //! What commands of the language are in CRCL's XML.
 
-use super::command::{StopCondition, XmlCommand};
+use super::command::{ActuateJoint, JointDetails, StopCondition, XmlCommand};
 use super::data::{PoseTolerance, Quantity, Waypoint};
 use crate::command::Command;
+use crate::joint::JointTarget;
 use crate::pose::Pose;
 use crate::units::AngleUnit;
 
@@ -54,6 +55,10 @@ pub(super) fn form(
                 }),
             }
         }
+        Command::ActuateJoints { joints } => plain(XmlCommand::ActuateJoints {
+            joints: joints.iter().map(actuate_joint).collect(),
+            tolerances: Vec::new(),
+        }),
         Command::OpenGripper => plain(XmlCommand::SetEndEffector(1.0)),
         Command::CloseGripper => plain(XmlCommand::SetEndEffector(0.0)),
         Command::OpenToolChanger => plain(XmlCommand::OpenToolChanger),
@@ -75,6 +80,11 @@ fn form_of_setting(command: &Command) -> Result<XmlCommand, String> {
         z: Some(tolerance),
         ..PoseTolerance::default()
     };
+    let angle = |tolerance: f64| PoseTolerance {
+        x_axis: Some(tolerance),
+        z_axis: Some(tolerance),
+        ..PoseTolerance::default()
+    };
     Ok(match command {
         Command::SetAbsoluteSpeed { value } => X::SetTransSpeed(Quantity::Absolute(*value)),
         Command::SetAbsoluteAcceleration { value } => X::SetTransAccel(Quantity::Absolute(*value)),
@@ -84,19 +94,38 @@ fn form_of_setting(command: &Command) -> Result<XmlCommand, String> {
         Command::SetRelativeAcceleration { percent } => {
             X::SetTransAccel(Quantity::Relative(percent / 100.0))
         }
+        Command::SetAbsoluteRotSpeed { value } => X::SetRotSpeed(Quantity::Absolute(*value)),
+        Command::SetAbsoluteRotAccel { value } => X::SetRotAccel(Quantity::Absolute(*value)),
+        Command::SetRelativeRotSpeed { percent } => {
+            X::SetRotSpeed(Quantity::Relative(percent / 100.0))
+        }
+        Command::SetRelativeRotAccel { percent } => {
+            X::SetRotAccel(Quantity::Relative(percent / 100.0))
+        }
+        Command::SetIntermediateAngleTolerance { tolerance } => {
+            X::SetIntermediatePoseTolerance(angle(*tolerance))
+        }
         Command::SetLengthUnits { unit } => X::SetLengthUnits(*unit),
         Command::SetAngleUnits { unit } => X::SetAngleUnits(*unit),
         Command::SetEndPointTolerance { tolerance } => X::SetEndPoseTolerance(ball(*tolerance)),
         Command::SetIntermediatePointTolerance { tolerance } => {
             X::SetIntermediatePoseTolerance(ball(*tolerance))
         }
-        Command::SetEndAngleTolerance { tolerance } => X::SetEndPoseTolerance(PoseTolerance {
-            x_axis: Some(*tolerance),
-            z_axis: Some(*tolerance),
-            ..PoseTolerance::default()
-        }),
+        Command::SetEndAngleTolerance { tolerance } => X::SetEndPoseTolerance(angle(*tolerance)),
         other => return Err(format!("XML has no command for {}", other.name())),
     })
+}
+
+fn actuate_joint(target: &JointTarget) -> ActuateJoint {
+    let told = |value: f64| (value != 0.0).then_some(value);
+    ActuateJoint {
+        joint: i32::try_from(target.joint).unwrap_or(i32::MAX),
+        position: target.position,
+        details: JointDetails::SpeedAccel {
+            speed: told(target.speed),
+            accel: told(target.acceleration),
+        },
+    }
 }
 
 /// The pose with axes, which is the only form in XML.

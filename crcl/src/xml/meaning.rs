@@ -1,22 +1,11 @@
 //! What commands of CRCL's XML are in the language, and what has no place there.
 
-use super::command::{Instruction, StopCondition, XmlCommand};
-use super::data::{PoseTolerance, Quantity, Waypoint};
+use super::command::{ActuateJoint, Instruction, JointDetails, StopCondition, XmlCommand};
+use super::data::Quantity;
+use super::own_settings::{end_tolerance, own_settings, percent};
+use super::refusal::{Refusal, refusal};
 use crate::command::Command;
-use crate::pose::Pose;
-
-/// Why a command of XML cannot be executed, and which element says it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// Name of the element.
-    pub element: &'static str,
-    /// Which of the elements of that name in the command, from 0.
-    pub occurrence: usize,
-    /// What cannot be done.
-    pub message: String,
-    /// What to do instead.
-    pub help: Option<&'static str>,
-}
+use crate::joint::JointTarget;
 
 /// What a command of XML is in the language.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,41 +87,46 @@ impl Instruction {
 fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
     match command {
         XmlCommand::MoveTo { straight, end } => {
-            let pose = plain(end, "EndPosition", 0)?;
-            one(if *straight {
+            let pose = end.pose;
+            let command = if *straight {
                 Command::MoveStraightTo { pose }
             } else {
                 Command::MoveTo { pose }
-            })
+            };
+            own_settings(std::slice::from_ref(end), command).map(Meaning::Commands)
         }
         // The way is made of straight lines in either case.
         XmlCommand::MoveThroughTo { waypoints, .. } => {
-            let poses = waypoints
-                .iter()
-                .enumerate()
-                .map(|(index, waypoint)| plain(waypoint, "Waypoint", index))
-                .collect::<Result<_, _>>()?;
-            one(Command::MoveSmoothlyTo { poses })
+            let poses = waypoints.iter().map(|waypoint| waypoint.pose).collect();
+            own_settings(waypoints, Command::MoveSmoothlyTo { poses }).map(Meaning::Commands)
         }
         XmlCommand::MoveScrew(_) => Err(refusal(
             "AxialDistanceScrew",
             "MoveScrew: turning and advancing in step",
         )),
-        _ => Err(refusal(
-            "ActuateJoint",
-            "ActuateJoints: moving single joints",
-        )),
+        XmlCommand::ActuateJoints { joints, .. } => {
+            let targets = joints
+                .iter()
+                .enumerate()
+                .map(|(at, joint)| target(joint, at));
+            let joints = targets.collect::<Result<_, _>>()?;
+            one(Command::ActuateJoints { joints })
+        }
+        other => Err(refusal("CommandID", other.name())),
     }
 }
 
-/// The pose of a waypoint that has no settings of its own.
-fn plain(waypoint: &Waypoint, element: &'static str, occurrence: usize) -> Result<Pose, Refusal> {
-    match waypoint.settings {
-        None => Ok(waypoint.pose),
-        Some(_) => Err(Refusal {
+fn target(joint: &ActuateJoint, occurrence: usize) -> Result<JointTarget, Refusal> {
+    match joint.details {
+        JointDetails::SpeedAccel { speed, accel } => Ok(JointTarget {
+            joint: i64::from(joint.joint),
+            position: joint.position,
+            speed: speed.unwrap_or(0.0),
+            acceleration: accel.unwrap_or(0.0),
+        }),
+        JointDetails::ForceTorque { .. } => Err(Refusal {
             occurrence,
-            help: Some("write the settings as commands before the move"),
-            ..refusal(element, "a pose with settings of its own (PoseAndSetType)")
+            ..refusal("JointDetails", "moving a joint with a force or torque")
         }),
     }
 }
@@ -155,9 +149,11 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         }),
         X::SetEndPoseTolerance(tolerance) => Ok(Meaning::Commands(end_tolerance(tolerance))),
         X::SetIntermediatePoseTolerance(tolerance) => {
-            let ball = tolerance.ball();
-            let set = |tolerance| Command::SetIntermediatePointTolerance { tolerance };
-            Ok(Meaning::Commands(ball.map(set).into_iter().collect()))
+            let point = |tolerance| Command::SetIntermediatePointTolerance { tolerance };
+            let angle = |tolerance| Command::SetIntermediateAngleTolerance { tolerance };
+            let point = tolerance.ball().map(point);
+            let angle = tolerance.angle().map(angle);
+            Ok(Meaning::Commands(point.into_iter().chain(angle).collect()))
         }
         X::SetMotionCoordination(_) => Ok(Meaning::NoEffect(
             "translation and rotation always end together here",
@@ -175,11 +171,18 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         | X::DisableGripper(_)
         | X::EnableRobotParameterStatus(_)
         | X::DisableRobotParameterStatus(_) => Ok(Meaning::NoEffect(report)),
-        X::SetRotSpeed(_) => Err(refusal("RotSpeed", "SetRotSpeed: a speed of rotation")),
-        X::SetRotAccel(_) => Err(refusal(
-            "RotAccel",
-            "SetRotAccel: an acceleration of rotation",
-        )),
+        X::SetRotSpeed(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteRotSpeed { value: *value })
+        }
+        X::SetRotSpeed(Quantity::Relative(share)) => one(Command::SetRelativeRotSpeed {
+            percent: percent(*share),
+        }),
+        X::SetRotAccel(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteRotAccel { value: *value })
+        }
+        X::SetRotAccel(Quantity::Relative(share)) => one(Command::SetRelativeRotAccel {
+            percent: percent(*share),
+        }),
         X::SetEndEffectorParameters(parameters) | X::SetRobotParameters(parameters) => {
             let name = parameters.first().map_or("", |first| first.name.as_str());
             let message = format!("the parameter `{name}`: this robot has no parameters");
@@ -197,36 +200,6 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
     }
 }
 
-/// A box becomes the ball inside it; what is free stays as it was set before, which is nearer.
-fn end_tolerance(tolerance: &PoseTolerance) -> Vec<Command> {
-    let point = tolerance.ball();
-    let angle = tolerance.angle();
-    let point = point.map(|tolerance| Command::SetEndPointTolerance { tolerance });
-    let angle = angle.map(|tolerance| Command::SetEndAngleTolerance { tolerance });
-    point.into_iter().chain(angle).collect()
-}
-
-/// The percentage whose hundredth is the share.
-pub(super) fn percent(share: f64) -> f64 {
-    let percent = share * 100.0;
-    // 0.07 is 7 percent, not 7.000000000000001.
-    let short = format!("{percent:.13e}").parse().unwrap_or(percent);
-    if short / 100.0 == share {
-        short
-    } else {
-        percent
-    }
-}
-
 fn one(command: Command) -> Result<Meaning, Refusal> {
     Ok(Meaning::Commands(vec![command]))
-}
-
-fn refusal(element: &'static str, message: impl Into<String>) -> Refusal {
-    Refusal {
-        element,
-        occurrence: 0,
-        message: message.into(),
-        help: None,
-    }
 }

@@ -14,9 +14,11 @@ mod elements;
 mod form;
 mod meaning;
 mod out;
+mod own_settings;
 mod read_command;
 mod read_data;
 mod read_status;
+mod refusal;
 mod status;
 mod write;
 mod write_status;
@@ -29,7 +31,8 @@ pub use data::{
     Guard, GuardLimit, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint,
 };
 pub use document::{Instance, read_instance, read_instructions, read_status};
-pub use meaning::{Meaning, Refusal};
+pub use meaning::Meaning;
+pub use refusal::Refusal;
 pub use status::{
     CommandState, CommandStatus, GripperState, GripperStatus, GuardsStatus, JointLimits,
     JointStatus, PoseStatus, ProgramPlace, SensorStatus, SensorValue, SettingsStatus, Status,

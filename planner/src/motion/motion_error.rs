@@ -64,6 +64,14 @@ pub enum MotionError {
         /// Joint, cause and amount in words.
         cause: String,
     },
+    /// A joint is to go beyond its limit.
+    #[error("{joint} is to go {beyond} beyond its limit")]
+    JointBeyondLimit {
+        /// The joint, as people call it.
+        joint: String,
+        /// How far beyond, with its unit.
+        beyond: String,
+    },
     /// There is no way in the direction of a jog.
     #[error("{0}")]
     Jog(String),
@@ -112,6 +120,7 @@ impl MotionError {
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"
             }
+            Self::JointBeyondLimit { .. } => "stay within the range that `canter robots show` tells",
             Self::Jog(_) => "go the other way",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
             Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
