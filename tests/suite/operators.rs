@@ -97,7 +97,10 @@ impl Watch {
     fn start(arm: &str) -> Self {
         let robot = planner::robot::load("ur5e").unwrap();
         let limits = robot.joint_limits::<6>();
-        let (ends, worst) = (Arc::<AtomicBool>::default(), Arc::new(Mutex::new([0.0; 3])));
+        let (ends, worst) = (
+            Arc::<AtomicBool>::default(),
+            Arc::new(Mutex::new([0.0_f64; 3])),
+        );
         let (stop, seen, arm) = (ends.clone(), worst.clone(), system_tests::domain::arm(arm));
         let thread = std::thread::spawn(move || {
             let observer = ipc::Observer::open(&arm).unwrap();

@@ -120,7 +120,9 @@ impl MotionError {
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"
             }
-            Self::JointBeyondLimit { .. } => "stay within the range that `canter robots show` tells",
+            Self::JointBeyondLimit { .. } => {
+                "stay within the range that `canter robots show` tells"
+            }
             Self::Jog(_) => "go the other way",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
             Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
