@@ -13,13 +13,13 @@ use crate::{input, output};
 /// Which program, and how it is read.
 #[derive(Args, Debug)]
 pub(crate) struct ProgramArgument {
-    /// File of canonical commands, text or JSON; `-` is standard input
+    /// File of canonical commands, text, JSON or XML; `-` is standard input
     #[arg(value_name = "PROGRAM")]
     path: String,
     /// Refuse the extensions of the language
     #[arg(long)]
     strict: bool,
-    /// Form of the program; without this option JSON is recognised by its first character
+    /// Form of the program; without this option JSON and XML are recognised by their first character
     #[arg(long, value_enum, default_value_t = Form::Auto)]
     form: Form,
     /// Unit of length until the program sets one
@@ -29,13 +29,28 @@ pub(crate) struct ProgramArgument {
 
 /// Form of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Form {
-    /// JSON if it begins with a brace or bracket, else text.
+pub(crate) enum Form {
+    /// JSON if it begins with a brace or bracket, XML if with `<`, else text.
     Auto,
     /// The call syntax of the specification.
     Text,
     /// JSON.
     Json,
+    /// CRCL's XML.
+    Xml,
+}
+
+impl Form {
+    /// The form of a file, by its first character where it is not told.
+    fn of(self, bytes: &[u8]) -> Self {
+        let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+        match self {
+            Self::Auto if crcl::xml::looks_like_xml(bytes) => Self::Xml,
+            Self::Auto if first.is_some_and(|byte| matches!(byte, b'{' | b'[')) => Self::Json,
+            Self::Auto => Self::Text,
+            told => told,
+        }
+    }
 }
 
 /// Unit of length.
@@ -64,7 +79,7 @@ pub(crate) struct ProgramFile {
     source: Source,
     reading: Reading,
     default_length: LengthUnit,
-    json: bool,
+    form: Form,
 }
 
 impl ProgramArgument {
@@ -83,18 +98,11 @@ impl ProgramArgument {
             strict: self.strict,
             ..ReadOptions::default()
         };
-        let json = match self.form {
-            Form::Text => false,
-            Form::Json => true,
-            Form::Auto => {
-                let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
-                first.is_some_and(|byte| matches!(byte, b'{' | b'['))
-            }
-        };
-        let read = if json {
-            crcl::json::read_bytes
-        } else {
-            crcl::text::read_bytes
+        let form = self.form.of(&bytes);
+        let read = match form {
+            Form::Json => crcl::json::read_bytes,
+            Form::Xml => crcl::xml::read_bytes,
+            Form::Auto | Form::Text => crcl::text::read_bytes,
         };
         let mut reading = read(&bytes, &options);
         let default_length = self.default_length.into();
@@ -113,7 +121,7 @@ impl ProgramArgument {
             source: Source::from_bytes(name, &bytes),
             reading,
             default_length,
-            json,
+            form,
         })
     }
 }
@@ -144,9 +152,26 @@ impl ProgramFile {
         self.source.text()
     }
 
-    /// `json` or `text`.
-    pub(crate) fn form(&self) -> &'static str {
-        if self.json { "json" } else { "text" }
+    /// The form that the program was read in.
+    pub(crate) fn form(&self) -> Form {
+        self.form
+    }
+
+    /// `json`, `xml` or `text`.
+    pub(crate) fn form_name(&self) -> &'static str {
+        match self.form {
+            Form::Json => "json",
+            Form::Xml => "xml",
+            Form::Auto | Form::Text => "text",
+        }
+    }
+
+    /// Writes findings about the program to standard error.
+    pub(crate) fn report_findings(&self, findings: &[Finding]) {
+        let look = look(io::stderr().is_terminal());
+        let omitted = crcl::Omitted::default();
+        let text = crcl::render(findings, omitted, &self.source, (look, 100));
+        output::note(text.trim_end());
     }
 
     /// What is to be said about it.
@@ -234,10 +259,7 @@ impl ProgramFile {
 
     /// Writes a refusal of the planner to standard error.
     pub(crate) fn report_refusal(&self, refusal: &Refusal) {
-        let look = look(io::stderr().is_terminal());
-        let omitted = crcl::Omitted::default();
-        let text = crcl::render(&[finding(refusal)], omitted, &self.source, (look, 100));
-        output::note(text.trim_end());
+        self.report_findings(&[finding(refusal)]);
     }
 }
 
@@ -271,7 +293,7 @@ fn finding(refusal: &Refusal) -> Finding {
 
 /// Whether a finding is a syntax error.
 fn is_unreadable(finding: &Finding) -> bool {
-    const FORM: [&str; 23] = [
+    const FORM: [&str; 32] = [
         code::BINARY,
         code::NOT_UTF8,
         code::CHARACTER,
@@ -295,6 +317,15 @@ fn is_unreadable(finding: &Finding) -> bool {
         code::MISSING_FIELD,
         code::UNKNOWN_FIELD,
         code::SCHEMA_VERSION,
+        code::XML_SYNTAX,
+        code::XML_ROOT,
+        code::XML_ELEMENT,
+        code::XML_MISSING,
+        code::XML_TEXT,
+        code::XML_KIND,
+        code::XML_VALUE,
+        code::LOOP,
+        code::NO_FORM,
     ];
     finding.is_error() && FORM.contains(&finding.code)
 }

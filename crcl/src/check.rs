@@ -287,7 +287,9 @@ fn default_moves(commands: &[Located]) -> Vec<&Located> {
             Command::SetCoordinateFrame { frame } => {
                 workstation = frame == CoordinateFrame::Workstation;
             }
-            _ if default_unit && workstation && located.command.is_move() => moves.push(located),
+            _ if default_unit && workstation && !located.command.poses().is_empty() => {
+                moves.push(located);
+            }
             _ => {}
         }
     }

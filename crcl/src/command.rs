@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::joint::{JointTarget, check_targets};
 use crate::pose::Pose;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{self, ValueError};
@@ -55,6 +56,12 @@ pub enum Command {
         #[schemars(length(min = 1))]
         poses: Vec<Pose>,
     },
+    /// Extension: move single joints; the others rest.
+    ActuateJoints {
+        /// One target for each joint that moves.
+        #[schemars(length(min = 1))]
+        joints: Vec<JointTarget>,
+    },
     /// Open the gripper.
     OpenGripper,
     /// Close the gripper.
@@ -87,6 +94,41 @@ pub enum Command {
         #[schemars(range(min = 0.0, max = 100.0))]
         percent: f64,
     },
+    /// Extension: set the speed of rotation, which else has the same share as the speed.
+    SetAbsoluteRotSpeed {
+        /// The speed (angle units per second).
+        #[schemars(range(min = 0.0))]
+        value: f64,
+    },
+    /// Extension: set the acceleration of rotation, which else has the same share as the
+    /// acceleration.
+    SetAbsoluteRotAccel {
+        /// The acceleration (angle units per second squared).
+        #[schemars(range(min = 0.0))]
+        value: f64,
+    },
+    /// Extension: set the speed of rotation as a share of the robot's maximum.
+    SetRelativeRotSpeed {
+        /// The share (percent).
+        #[schemars(range(min = 0.0, max = 100.0))]
+        percent: f64,
+    },
+    /// Extension: set the acceleration of rotation as a share of the robot's maximum.
+    SetRelativeRotAccel {
+        /// The share (percent).
+        #[schemars(range(min = 0.0, max = 100.0))]
+        percent: f64,
+    },
+    /// Extension: set how near a smooth motion must come to its intermediate orientations.
+    SetIntermediateAngleTolerance {
+        /// The angle (angle units).
+        #[schemars(range(min = 0.0))]
+        tolerance: f64,
+    },
+    /// Extension: keep speeds, accelerations and tolerances for RestoreSettings.
+    SaveSettings,
+    /// Extension: go back to what SaveSettings has kept.
+    RestoreSettings,
     /// Set the unit that later lengths, speeds, accelerations and tolerances are in.
     SetLengthUnits {
         /// The unit.
@@ -145,6 +187,10 @@ pub enum ArgumentKind {
     Speed,
     /// Length units per second squared, not negative.
     Acceleration,
+    /// Angle units per second, not negative.
+    AngularSpeed,
+    /// Angle units per second squared, not negative.
+    AngularAcceleration,
     /// A percentage from 0 to 100.
     Percent,
     /// Length units, not negative.
@@ -161,6 +207,8 @@ pub enum ArgumentKind {
     Pose,
     /// A list of poses; in text followed by their number.
     Poses,
+    /// A list of joints with their targets.
+    Joints,
 }
 
 impl ArgumentKind {
@@ -173,6 +221,8 @@ impl ArgumentKind {
             Self::Seconds => "a time",
             Self::Speed => "a speed",
             Self::Acceleration => "an acceleration",
+            Self::AngularSpeed => "a speed of rotation",
+            Self::AngularAcceleration => "an acceleration of rotation",
             Self::Percent => "a percentage",
             Self::LengthTolerance | Self::AngleTolerance => "a tolerance",
             Self::LengthUnit => "a length unit",
@@ -180,6 +230,7 @@ impl ArgumentKind {
             Self::Frame => "a coordinate frame",
             Self::Pose => "a pose",
             Self::Poses => "a list of poses",
+            Self::Joints => "a list of joints",
         }
     }
 
@@ -190,13 +241,14 @@ impl ArgumentKind {
             Self::Text => "\"text\"",
             Self::Seconds => "0.5",
             Self::Speed | Self::Acceleration => "250",
-            Self::Percent => "50",
+            Self::Percent | Self::AngularSpeed | Self::AngularAcceleration => "50",
             Self::LengthTolerance | Self::AngleTolerance => "2",
             Self::LengthUnit => "\"mm\"",
             Self::AngleUnit => "\"degree\"",
             Self::Frame => "\"Workstation\"",
             Self::Pose => "{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}",
             Self::Poses => "{{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}}, 1",
+            Self::Joints => "{{1, 90}, {3, -45, 30}}",
         }
     }
 
@@ -285,6 +337,7 @@ pub(crate) enum Value {
     Frame(CoordinateFrame),
     Pose(Pose),
     Poses(Vec<Pose>),
+    Joints(Vec<JointTarget>),
 }
 
 impl Value {
@@ -336,6 +389,13 @@ impl Value {
     fn pose(self) -> Option<Pose> {
         if let Self::Pose(pose) = self {
             Some(pose)
+        } else {
+            None
+        }
+    }
+    fn joints(self) -> Option<Vec<JointTarget>> {
+        if let Self::Joints(joints) = self {
+            Some(joints)
         } else {
             None
         }
@@ -465,6 +525,59 @@ pub static COMMANDS: &[CommandInfo] = {
             Some("MoveSmoothlyTo"),
         ),
         extension(
+            with("ActuateJoints", "joints", Kind::Joints, |v| {
+                v.joints().map(|joints| C::ActuateJoints { joints })
+            }),
+            None,
+        ),
+        extension(
+            with("SetAbsoluteRotSpeed", "value", Kind::AngularSpeed, |v| {
+                v.number().map(|value| C::SetAbsoluteRotSpeed { value })
+            }),
+            None,
+        ),
+        extension(
+            with(
+                "SetAbsoluteRotAccel",
+                "value",
+                Kind::AngularAcceleration,
+                |v| v.number().map(|value| C::SetAbsoluteRotAccel { value }),
+            ),
+            None,
+        ),
+        extension(
+            with("SetRelativeRotSpeed", "percent", Kind::Percent, |v| {
+                v.number().map(|percent| C::SetRelativeRotSpeed { percent })
+            }),
+            None,
+        ),
+        extension(
+            with("SetRelativeRotAccel", "percent", Kind::Percent, |v| {
+                v.number().map(|percent| C::SetRelativeRotAccel { percent })
+            }),
+            None,
+        ),
+        extension(
+            with(
+                "SetIntermediateAngleTolerance",
+                "tolerance",
+                Kind::AngleTolerance,
+                |v| {
+                    v.number()
+                        .map(|tolerance| C::SetIntermediateAngleTolerance { tolerance })
+                },
+            ),
+            None,
+        ),
+        extension(
+            plain("SaveSettings", |v| v.none().map(|()| C::SaveSettings)),
+            None,
+        ),
+        extension(
+            plain("RestoreSettings", |v| v.none().map(|()| C::RestoreSettings)),
+            None,
+        ),
+        extension(
             plain("OpenToolChanger", |v| v.none().map(|()| C::OpenToolChanger)),
             None,
         ),
@@ -511,7 +624,11 @@ impl Command {
 
     /// Whether the command moves the controlled point.
     pub fn is_move(&self) -> bool {
-        let moves = [ArgumentKind::Pose, ArgumentKind::Poses];
+        let moves = [
+            ArgumentKind::Pose,
+            ArgumentKind::Poses,
+            ArgumentKind::Joints,
+        ];
         self.info()
             .and_then(|info| info.argument)
             .is_some_and(|a| moves.contains(&a.kind))
@@ -538,6 +655,7 @@ impl Command {
             (Some(ArgumentKind::Reason), Value::Integer(reason)) => {
                 value::not_negative(ArgumentKind::Reason.noun(), reason as f64).map(drop)
             }
+            (Some(ArgumentKind::Joints), Value::Joints(joints)) => check_targets(&joints),
             (Some(ArgumentKind::Poses), Value::Poses(poses)) if poses.is_empty() => {
                 Err(ValueError::NoPoses)
             }
@@ -563,6 +681,20 @@ impl Command {
             Self::MoveStraightTo { pose } => ("MoveStraightTo", Value::Pose(*pose)),
             Self::MoveSmoothlyTo { poses } => ("MoveSmoothlyTo", Value::Poses(poses.clone())),
             Self::MoveThroughTo { poses } => ("MoveThroughTo", Value::Poses(poses.clone())),
+            Self::ActuateJoints { joints } => ("ActuateJoints", Value::Joints(joints.clone())),
+            Self::SetAbsoluteRotSpeed { value } => ("SetAbsoluteRotSpeed", Value::Number(*value)),
+            Self::SetAbsoluteRotAccel { value } => ("SetAbsoluteRotAccel", Value::Number(*value)),
+            Self::SetRelativeRotSpeed { percent } => {
+                ("SetRelativeRotSpeed", Value::Number(*percent))
+            }
+            Self::SetRelativeRotAccel { percent } => {
+                ("SetRelativeRotAccel", Value::Number(*percent))
+            }
+            Self::SetIntermediateAngleTolerance { tolerance } => {
+                ("SetIntermediateAngleTolerance", Value::Number(*tolerance))
+            }
+            Self::SaveSettings => ("SaveSettings", Value::None),
+            Self::RestoreSettings => ("RestoreSettings", Value::None),
             Self::OpenGripper => ("OpenGripper", Value::None),
             Self::CloseGripper => ("CloseGripper", Value::None),
             Self::OpenToolChanger => ("OpenToolChanger", Value::None),

@@ -235,6 +235,8 @@ pub mod code {
         COUNT_MISMATCH = "crcl::count-mismatch";
         /// A list without poses.
         NO_POSES = "crcl::no-poses";
+        /// A list of joints that is empty, or has a joint twice or none of that number.
+        JOINTS = "crcl::joints";
         /// A pose, point or axis with too many or too few parts.
         POSE_SHAPE = "crcl::pose-shape";
         /// An axis of length zero.
@@ -271,6 +273,30 @@ pub mod code {
         GRIPPER_CLOSED = "crcl::tool-change-gripper-closed";
         /// A program in default millimetres that looks like metres.
         LOOKS_LIKE_METRES = "crcl::looks-like-metres";
+        /// XML that is not well formed.
+        XML_SYNTAX = "crcl::xml-syntax";
+        /// XML whose root element is not one of CRCL's.
+        XML_ROOT = "crcl::xml-root";
+        /// XML with an element that does not belong there.
+        XML_ELEMENT = "crcl::xml-element";
+        /// XML that lacks an element.
+        XML_MISSING = "crcl::xml-missing-element";
+        /// XML with text where only elements stand.
+        XML_TEXT = "crcl::xml-text";
+        /// XML with an element of no known kind.
+        XML_KIND = "crcl::xml-type";
+        /// XML with a value of the wrong type.
+        XML_VALUE = "crcl::xml-value";
+        /// A share outside 0 to 1.
+        FRACTION_RANGE = "crcl::fraction-out-of-range";
+        /// XML with something that Canter cannot do yet.
+        UNSUPPORTED = "crcl::not-supported";
+        /// A command of XML that does nothing in a program from a file.
+        NO_EFFECT = "crcl::no-effect";
+        /// A block that is repeated without its beginning or its end.
+        LOOP = "crcl::loop-block";
+        /// A command that the other form of programs cannot say.
+        NO_FORM = "crcl::no-such-form";
         /// JSON that is not JSON.
         JSON_SYNTAX = "crcl::json-syntax";
         /// JSON that lacks a field.

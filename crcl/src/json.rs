@@ -10,6 +10,7 @@ use serde_json::value::RawValue;
 use crate::command::{Argument, ArgumentKind, Command, CommandInfo, Value};
 use crate::fields::{Field, fields, items};
 use crate::finding::{Finding, Findings, code};
+use crate::joint::{JointTarget, check_targets};
 use crate::lexer::clip;
 use crate::meaning::{doubt, refused_extension, unknown_command, unknown_name, value_finding};
 use crate::pose::{Pose, PosePart};
@@ -226,6 +227,7 @@ impl<'a> Reader<'a, '_> {
             }
             ArgumentKind::Pose => self.pose(raw).map(Value::Pose),
             ArgumentKind::Poses => self.poses(raw).map(Value::Poses),
+            ArgumentKind::Joints => self.joints(raw).map(Value::Joints),
             _ => self.quantity(kind, raw),
         }
     }
@@ -264,6 +266,44 @@ impl<'a> Reader<'a, '_> {
                 .push(unknown_name(kind, &name, self.span(raw)));
         }
         value
+    }
+
+    fn joints(&mut self, raw: &'a RawValue) -> Option<Vec<JointTarget>> {
+        let items = self.items("the joints", raw)?;
+        let read: Vec<_> = items.into_iter().map(|item| self.joint(item)).collect();
+        let joints = read.into_iter().collect::<Option<Vec<_>>>()?;
+        if let Err(error) = check_targets(&joints) {
+            self.findings.push(value_finding(&error, self.span(raw)));
+        }
+        Some(joints)
+    }
+
+    fn joint(&mut self, raw: &'a RawValue) -> Option<JointTarget> {
+        const NAMES: [&str; 4] = ["joint", "position", "speed", "acceleration"];
+        let noun = "the target of a joint";
+        let fields = self.fields(noun, raw)?;
+        let known = self.known(noun, &fields, &NAMES);
+        let joint = self.wanted(noun, raw, &fields, "joint")?;
+        let position = self.wanted(noun, raw, &fields, "position")?;
+        let numbers = [
+            Some(joint),
+            Some(position),
+            find(&fields, "speed"),
+            find(&fields, "acceleration"),
+        ]
+        .map(|field| {
+            field.map_or(Some(0.0), |field| {
+                self.number("a part of a joint's target", field)
+            })
+        });
+        let numbers = numbers.into_iter().collect::<Option<Vec<_>>>()?;
+        let target = JointTarget::from_numbers(&numbers);
+        if target.is_none() {
+            let message = "a joint is a whole number from 1 to 16";
+            let finding = Finding::error(code::JOINTS, self.span(joint), message);
+            self.findings.push(finding.found(describe(joint)));
+        }
+        target.filter(|_| known)
     }
 
     fn poses(&mut self, raw: &'a RawValue) -> Option<Vec<Pose>> {

@@ -1,9 +1,10 @@
-//! The canonical robot command language: text, JSON, diagnostics.
+//! The canonical robot command language: text, JSON, XML, diagnostics.
 
 mod check;
 mod command;
 mod fields;
 mod finding;
+mod joint;
 pub mod json;
 mod lexer;
 mod meaning;
@@ -16,13 +17,15 @@ mod suggest;
 pub mod text;
 mod units;
 mod value;
+pub mod xml;
 
 pub use check::{CheckOptions, check};
 pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, LONGEST_S, Standing};
 pub use finding::{Finding, Note, Omitted, Severity, code};
+pub use joint::JointTarget;
 pub use pose::{LARGEST_ANGLE, LARGEST_COORDINATE, ORTHOGONALITY, Pose, PosePart};
 pub use program::{Located, Program, ReadOptions, Reading};
 pub use report::{FindingsReport, Look, NoteRecord, Record, records, render};
 pub use source::Source;
-pub use units::{AngleUnit, CoordinateFrame, LengthUnit};
+pub use units::{AngleUnit, CoordinateFrame, ForceUnit, LengthUnit, TorqueUnit};
 pub use value::ValueError;

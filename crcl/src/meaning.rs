@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, Standing, Value};
 use crate::finding::{Finding, Findings, code};
+use crate::joint::{JointTarget, check_targets};
 use crate::lexer::clip;
 use crate::parser::{Call, Node, State, Tree};
 use crate::pose::{Pose, PosePart};
@@ -128,6 +129,7 @@ impl Meaning<'_, '_> {
             ArgumentKind::Frame => self.frame(node),
             ArgumentKind::Pose => self.pose(node).map(Value::Pose),
             ArgumentKind::Poses => self.poses(node).map(Value::Poses),
+            ArgumentKind::Joints => self.joints(node).map(Value::Joints),
             _ => self.quantity(kind, node),
         }
     }
@@ -253,6 +255,41 @@ impl Meaning<'_, '_> {
             return self.fail(finding);
         }
         poses.map(Value::Poses)
+    }
+
+    fn joints(&mut self, node: &Node) -> Option<Vec<JointTarget>> {
+        let Tree::Braces(items) = &node.value else {
+            let message = "the joints stand in braces";
+            return self.wrong_type(message, ArgumentKind::Joints.noun(), node);
+        };
+        let read: Vec<_> = items.iter().map(|item| self.joint(item)).collect();
+        let joints = read.into_iter().collect::<Option<Vec<_>>>()?;
+        if let Err(error) = check_targets(&joints) {
+            self.findings.push(value_finding(&error, node.span.clone()));
+        }
+        Some(joints)
+    }
+
+    fn joint(&mut self, node: &Node) -> Option<JointTarget> {
+        let expected = "`{joint, position, speed, acceleration}`";
+        let message =
+            "a joint is its number and its position, and perhaps a speed and an acceleration";
+        let Tree::Braces(parts) = &node.value else {
+            return self.wrong_type(message, expected, node);
+        };
+        let read: Vec<_> = parts
+            .iter()
+            .map(|part| self.number("a part of a joint's target", part))
+            .collect();
+        let numbers = read.into_iter().collect::<Option<Vec<_>>>()?;
+        let target = JointTarget::from_numbers(&numbers);
+        if target.is_none() {
+            let finding = Finding::error(code::JOINTS, node.span.clone(), message)
+                .expected(expected)
+                .found(describe(node, self.source));
+            return self.fail(finding.help("joints are counted from 1 to 16"));
+        }
+        target
     }
 
     fn poses(&mut self, node: &Node) -> Option<Vec<Pose>> {

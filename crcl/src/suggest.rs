@@ -30,15 +30,14 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "StopObjectScan",
         "scanning for objects is not part of the language here",
     ),
-    ("ActuateJoints", "the language does not move single joints"),
     ("MoveScrew", "screw moves are not part of the language"),
     (
         "SetRotSpeed",
-        "rotation follows the speed of the controlled point",
+        "here it is SetAbsoluteRotSpeed or SetRelativeRotSpeed",
     ),
     (
         "SetRotAccel",
-        "rotation follows the acceleration of the controlled point",
+        "here it is SetAbsoluteRotAccel or SetRelativeRotAccel",
     ),
 ];
 

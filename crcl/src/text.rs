@@ -2,6 +2,7 @@
 
 use crate::command::{Command, Value};
 use crate::finding::{Finding, Findings, code};
+use crate::joint::JointTarget;
 use crate::meaning::Meaning;
 use crate::parser::Parser;
 use crate::pose::Pose;
@@ -118,6 +119,7 @@ pub fn write_command(command: &Command) -> String {
         Value::Frame(frame) => quote(frame.name()),
         Value::Pose(value) => pose(&value),
         Value::Poses(poses) => list(&poses),
+        Value::Joints(joints) => joint_list(&joints),
     };
     format!("{name} ({argument})")
 }
@@ -125,6 +127,15 @@ pub fn write_command(command: &Command) -> String {
 fn list(poses: &[Pose]) -> String {
     let lines: Vec<_> = poses.iter().map(pose).collect();
     format!("{{{}}}, {}", lines.join(",\n    "), poses.len())
+}
+
+fn joint_list(joints: &[JointTarget]) -> String {
+    let one = |joint: &JointTarget| {
+        let numbers: Vec<_> = joint.numbers().into_iter().map(number).collect();
+        format!("{{{}}}", numbers.join(", "))
+    };
+    let all: Vec<_> = joints.iter().map(one).collect();
+    format!("{{{}}}", all.join(", "))
 }
 
 fn pose(pose: &Pose) -> String {

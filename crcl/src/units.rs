@@ -24,6 +24,13 @@ impl LengthUnit {
     /// Other spellings that are read as well.
     pub const OTHER_NAMES: &[&str] = &["millimeter", "millimetre", "metre"];
 
+    /// The names in CRCL's XML.
+    pub(crate) const XML_NAMES: &[(&'static str, Self)] = &[
+        ("meter", Self::Meter),
+        ("millimeter", Self::Millimeter),
+        ("inch", Self::Inch),
+    ];
+
     /// The unit of that name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
@@ -72,6 +79,10 @@ impl AngleUnit {
     /// The names to choose from in a program.
     pub const NAMES: &[&str] = &["degree", "radian"];
 
+    /// The names in CRCL's XML.
+    pub(crate) const XML_NAMES: &[(&'static str, Self)] =
+        &[("degree", Self::Degree), ("radian", Self::Radian)];
+
     /// The unit of that name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
@@ -100,6 +111,45 @@ impl AngleUnit {
             Self::Radian => 1.0,
         }
     }
+}
+
+/// Unit of forces, in CRCL's XML only. Default: newton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ForceUnit {
+    /// The SI unit.
+    #[default]
+    Newton,
+    /// Pound-force, 4.4482216152605 N exactly.
+    Pound,
+    /// A sixteenth of it.
+    Ounce,
+}
+
+impl ForceUnit {
+    /// The names in CRCL's XML.
+    pub(crate) const XML_NAMES: &[(&'static str, Self)] = &[
+        ("newton", Self::Newton),
+        ("pound", Self::Pound),
+        ("ounce", Self::Ounce),
+    ];
+}
+
+/// Unit of torques, in CRCL's XML only. Default: newton metre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum TorqueUnit {
+    /// The SI unit.
+    #[default]
+    NewtonMeter,
+    /// 1.3558179483314004 N m.
+    FootPound,
+}
+
+impl TorqueUnit {
+    /// The names in CRCL's XML.
+    pub(crate) const XML_NAMES: &[(&'static str, Self)] = &[
+        ("newtonMeter", Self::NewtonMeter),
+        ("footPound", Self::FootPound),
+    ];
 }
 
 /// The frame that poses are given in; set by the extension SetCoordinateFrame.

@@ -58,6 +58,15 @@ pub enum ValueError {
     /// A move through no pose at all.
     #[error("a list needs at least one pose")]
     NoPoses,
+    /// A move of no joint at all.
+    #[error("a list needs at least one joint")]
+    NoJoints,
+    /// Two targets for one joint.
+    #[error("joint {joint} has two targets")]
+    SameJoint {
+        /// Number of the joint, from 1.
+        joint: i64,
+    },
 }
 
 /// A number in a message: with an exponent where the digits would fill the line.
@@ -91,6 +100,7 @@ impl ValueError {
             Self::ZeroAxis { .. } => code::ZERO_AXIS,
             Self::NotOrthogonal { .. } => code::NOT_ORTHOGONAL,
             Self::NoPoses => code::NO_POSES,
+            Self::NoJoints | Self::SameJoint { .. } => code::JOINTS,
         }
     }
 
@@ -110,6 +120,7 @@ impl ValueError {
                                            90 degrees to the Z axis"
             }
             Self::NoPoses => "give the pose to stop at",
+            Self::NoJoints | Self::SameJoint { .. } => "give one target for each joint that moves",
         }
     }
 }

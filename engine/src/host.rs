@@ -212,7 +212,8 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
     let read = match format {
         "text" => crcl::text::read,
         "json" => crcl::json::read,
-        other => return Answer::refuse(format!("a program is text or json, not {other:?}")),
+        "xml" => crcl::xml::read,
+        other => return Answer::refuse(format!("a program is text, json or xml, not {other:?}")),
     };
     let reading = read(program, &ReadOptions::default());
     if reading.has_errors() {

@@ -16,7 +16,7 @@ pub const LONGEST_ANSWER: usize = 16 << 10;
 pub enum Verb {
     /// Execute a program.
     Submit {
-        /// `text` or `json`.
+        /// `text`, `json` or `xml`.
         format: String,
         /// The program's name, for messages.
         name: String,

@@ -99,6 +99,7 @@ impl<const N: usize> Controller<N> {
             robot.workstation_from_base,
             tooling,
             length,
+            robot.sliding(),
         );
         let joints = vector(&robot.home);
         let joint_names = robot.joint_names();
@@ -177,6 +178,20 @@ impl<const N: usize> Controller<N> {
                 let ticks = self.ticks(planned.trajectory.duration());
                 Step {
                     task: Task::Move(motion),
+                    planned: Some(planned),
+                    ticks,
+                }
+            }
+            Task::Joints(motion) => {
+                self.plans += 1;
+                let planned = self.planner.actuate(&motion, &self.joints);
+                let planned = planned.map_err(|error| {
+                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
+                })?;
+                self.joints = planned.end;
+                let ticks = self.ticks(planned.trajectory.duration());
+                Step {
+                    task: Task::Move(motion.of_point(self.pose())),
                     planned: Some(planned),
                     ticks,
                 }

@@ -240,6 +240,15 @@ impl Robot {
         }
     }
 
+    /// Whether each joint slides.
+    #[must_use]
+    pub fn sliding(&self) -> Vec<bool> {
+        let slides = |joint: &kinematics::urdf::JointInfo| {
+            joint.kind == kinematics::urdf::JointKind::Prismatic
+        };
+        self.model.joints.iter().map(slides).collect()
+    }
+
     /// The largest speeds, accelerations and jerks of the controlled point.
     #[must_use]
     pub fn motion_limits(&self) -> trajectory::ToolLimits {

@@ -27,6 +27,8 @@ pub enum Task {
     },
     /// Move the controlled point.
     Move(Move),
+    /// Move single joints.
+    Joints(JointMove),
     /// Open or close the gripper, or the tool changer.
     Tool(ToolAction),
     /// Stop on the path, as soon as the limits allow.
@@ -58,6 +60,52 @@ pub struct Move {
     pub tolerance: f64,
     /// Limits of the controlled point.
     pub limits: ToolLimits,
+}
+
+/// Where one joint is to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointGoal {
+    /// Index of the joint, from 0.
+    pub joint: usize,
+    /// Where it stops (rad, m).
+    pub position: f64,
+    /// Its largest speed (rad/s, m/s), if told.
+    pub speed: Option<f64>,
+    /// Its largest acceleration (rad/s2, m/s2), if told.
+    pub acceleration: Option<f64>,
+}
+
+/// One motion of single joints from rest to rest; joints without a goal rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointMove {
+    /// The goals; each joint is one of the robot's and has at most one.
+    pub goals: Vec<JointGoal>,
+    /// Share of the joints' largest speed and acceleration where no other is told, above 0.
+    pub shares: (f64, f64),
+    /// Limits of the controlled point.
+    pub limits: ToolLimits,
+}
+
+impl JointMove {
+    /// Puts the joints that have a goal there.
+    pub fn apply(&self, joints: &mut [f64]) {
+        for goal in &self.goals {
+            if let Some(joint) = joints.get_mut(goal.joint) {
+                *joint = goal.position;
+            }
+        }
+    }
+
+    /// The motion as one of the controlled point: any way to where the joints put it.
+    #[must_use]
+    pub fn of_point(&self, workstation_from_tool: Isometry3<f64>) -> Move {
+        Move {
+            shape: Shape::Joint,
+            poses: vec![workstation_from_tool],
+            tolerance: 0.0,
+            limits: self.limits,
+        }
+    }
 }
 
 /// An action of a tool.

@@ -10,6 +10,9 @@
 
 #[path = "../suite/canter.rs"]
 mod canter;
+#[path = "../suite/crcl_client.rs"]
+mod crcl_client;
+mod crcl_files;
 mod pddl;
 mod plans;
 mod programs;
@@ -43,6 +46,12 @@ macro_rules! trials {
 
 fn main() {
     let tests: Vec<(&str, fn())> = trials! {
+        crcl_files::programs_are_read_or_refused_for_a_reason
+        crcl_files::commands_are_read
+        crcl_files::statuses_are_read
+        crcl_files::what_is_written_is_valid
+        crcl_files::recorded_conversations_get_the_same_kind_of_answer
+        crcl_files::recorded_bytes_are_answered
         programs::sound_programs_have_no_findings
         programs::commands_with_errors
         workstations::nist_workstations_come_in
@@ -59,12 +68,14 @@ fn main() {
     };
     let arguments = Arguments::from_args();
     let missing = !folder().is_dir();
+    // Python with lxml validates what is written; where it is missing nobody else can.
+    let alone = !crcl_files::has_validator();
     let trial = |(name, test): (&str, fn())| {
         Trial::test(name, move || {
             test();
             Ok(())
         })
-        .with_ignored_flag(missing)
+        .with_ignored_flag(missing || (alone && name == "crcl_files::what_is_written_is_valid"))
     };
     let trials = tests.into_iter().map(trial).collect();
     libtest_mimic::run(&arguments, trials).exit();

@@ -18,6 +18,7 @@ const ARROWS: [(&str, &[&str]); 16] = [
             "planner",
             "measure",
             "crcl",
+            "crcl-tcp",
             "kinematics",
             "trajectory",
             "ipc",
@@ -28,6 +29,7 @@ const ARROWS: [(&str, &[&str]); 16] = [
     ),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
+    ("crcl-tcp", &["crcl", "ipc"]),
     (
         "engine",
         &[

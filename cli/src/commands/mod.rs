@@ -7,6 +7,7 @@ mod bench;
 mod check;
 mod completions;
 mod convert;
+mod crcl;
 mod doctor;
 mod driver;
 mod engine;
@@ -25,6 +26,7 @@ mod robots;
 mod run;
 mod schema;
 mod send;
+mod serve;
 mod shutdown;
 mod status;
 mod stop;
@@ -45,6 +47,7 @@ pub(crate) enum Command {
     Check(check::Check),
     Completions(completions::Completions),
     Convert(convert::Convert),
+    Crcl(crcl::Crcl),
     Doctor(doctor::Doctor),
     Driver(driver::Driver),
     Engine(engine::Engine),
@@ -64,6 +67,7 @@ pub(crate) enum Command {
     Run(run::Run),
     Schema(schema::Schema),
     Send(send::Send),
+    Serve(serve::Serve),
     Shutdown(shutdown::Shutdown),
     Status(status::Status),
     Stop(stop::Stop),
@@ -79,6 +83,7 @@ impl Command {
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Convert(command) => command.run(),
+            Self::Crcl(command) => command.run(),
             Self::Doctor(command) => command.run(),
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(printer),
@@ -98,6 +103,7 @@ impl Command {
             Self::Run(command) => command.run(printer),
             Self::Schema(command) => command.run(),
             Self::Send(command) => command.run(),
+            Self::Serve(command) => command.run(),
             Self::Shutdown(command) => command.run(),
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),

@@ -40,7 +40,7 @@ impl Send {
         let before = self.arm.ask(Verb::Status)?.body;
         let seen = before["last_note"].as_u64().unwrap_or(0);
         let answer = self.arm.ask(Verb::Submit {
-            format: program.form().to_owned(),
+            format: program.form_name().to_owned(),
             name: program.name().to_owned(),
             program: program.text().to_owned(),
         })?;

@@ -33,6 +33,8 @@ pub struct Status {
     pub joints: Vec<f64>,
     /// Joint positions of the last setpoint, rad or m.
     pub setpoint: Vec<f64>,
+    /// Whether each joint slides.
+    pub sliding: Vec<bool>,
     /// Measured position of the controlled point in the workstation, m.
     pub position_m: [f64; 3],
     /// Its orientation: w, x, y, z.

@@ -351,6 +351,9 @@ impl<const N: usize> Worker<'_, N> {
             .unwrap_or_else(PoisonError::into_inner);
         self.config.arm.to_string().clone_into(&mut status.arm);
         robot.name.clone_into(&mut status.robot);
+        if status.sliding.is_empty() {
+            status.sliding = robot.sliding();
+        }
         driver.clone_into(&mut status.driver);
         status.state = state_name(self.controller.modal().state());
         let jog = self.jogging.as_ref().map(|_| "jog");

@@ -10,7 +10,7 @@ pub use pose::isometry;
 pub use settings::Settings;
 
 use crate::command_error::CommandError;
-use crate::task::{Move, Shape, Task, ToolAction};
+use crate::task::{JointGoal, JointMove, Move, Shape, Task, ToolAction};
 use crate::tooling::Tooling;
 use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit, Pose};
 use trajectory::ToolLimits;
@@ -38,20 +38,27 @@ pub struct Modal {
     maxima: ToolLimits,
     workstation_from_base: Isometry3<f64>,
     tooling: Tooling,
+    /// Whether each joint slides.
+    sliding: Vec<bool>,
+    /// What SaveSettings has kept, the newest last.
+    saved: Vec<Settings>,
 }
 
 impl Modal {
     /// Modes before any command: unready, millimetres and degrees (or the
     /// dialect's default length), 10 % of the robot's speed and acceleration,
-    /// tolerances 0.
+    /// tolerances 0. `sliding` says of each joint whether it slides.
     #[must_use]
     pub fn new(
         maxima: ToolLimits,
         workstation_from_base: Isometry3<f64>,
         tooling: Tooling,
         default_length: LengthUnit,
+        sliding: Vec<bool>,
     ) -> Self {
         Self {
+            sliding,
+            saved: Vec::new(),
             state: CanonState::Unready,
             length: default_length,
             angle: AngleUnit::default(),
@@ -91,6 +98,10 @@ impl Modal {
     /// Refuses everything except InitCanon from now on, as after an aborted program.
     pub fn abort(&mut self) {
         self.state = CanonState::Ended;
+        // What was kept was for the time after a move that has not ended.
+        if let Some(settings) = self.saved.drain(..).next() {
+            self.settings = settings;
+        }
     }
 
     /// Turns one command into a task; the arm's end is at `workstation_from_flange` when the
@@ -143,8 +154,64 @@ impl Modal {
             Command::MoveSmoothlyTo { poses } | Command::MoveThroughTo { poses } => {
                 self.motion(Shape::Smooth, poses, workstation_from_flange)
             }
+            Command::ActuateJoints { joints } => self.joints(joints),
+            Command::SaveSettings => self.save_settings(),
+            Command::RestoreSettings => match self.saved.pop() {
+                Some(settings) => {
+                    self.settings = settings;
+                    Ok(Task::Setting)
+                }
+                None => Err(CommandError::sequence(
+                    "RestoreSettings without SaveSettings before it",
+                )),
+            },
             setting => self.set(setting),
         }
+    }
+
+    fn save_settings(&mut self) -> Result<Task, CommandError> {
+        /// How often settings can be kept one above the other.
+        const MOST: usize = 16;
+        if self.saved.len() >= MOST {
+            let message = format!("SaveSettings for the {}th time", MOST + 1);
+            return Err(CommandError::sequence(message)
+                .with_help("RestoreSettings goes back to what was kept last"));
+        }
+        self.saved.push(self.settings.clone());
+        Ok(Task::Setting)
+    }
+
+    fn joints(&self, targets: &[crcl::JointTarget]) -> Result<Task, CommandError> {
+        self.settings.tool_limits(&self.maxima)?;
+        let goal = |target: &crcl::JointTarget| {
+            let index = usize::try_from(target.joint - 1).unwrap_or(usize::MAX);
+            let Some(slides) = self.sliding.get(index) else {
+                let count = self.sliding.len();
+                let message = format!("the robot has joints 1 to {count}, not {}", target.joint);
+                return Err(CommandError::range(message));
+            };
+            let unit = if *slides {
+                self.length.metres()
+            } else {
+                self.angle.radians()
+            };
+            let told = |value: f64| (value > 0.0).then_some(value * unit);
+            Ok(JointGoal {
+                joint: index,
+                position: target.position * unit,
+                speed: told(target.speed),
+                acceleration: told(target.acceleration),
+            })
+        };
+        let share = |value: f64, most: f64| (value / most).min(1.0);
+        Ok(Task::Joints(JointMove {
+            goals: targets.iter().map(goal).collect::<Result<_, _>>()?,
+            shares: (
+                share(self.settings.speed, self.maxima.speed),
+                share(self.settings.acceleration, self.maxima.acceleration),
+            ),
+            limits: self.maxima,
+        }))
     }
 
     fn check_sequence(&self, command: &Command) -> Result<(), CommandError> {
@@ -197,7 +264,7 @@ impl Modal {
                     .map_err(|error| numbered(error, index, poses.len()))
             })
             .collect::<Result<_, _>>()?;
-        let tolerance = self.settings.intermediate_point;
+        let tolerance = self.settings.intermediate_ball();
         Ok(Task::Move(Move {
             shape,
             poses,
@@ -276,6 +343,7 @@ mod tests {
             Isometry3::identity(),
             Tooling::default(),
             LengthUnit::default(),
+            vec![false; 6],
         )
     }
 

@@ -20,6 +20,12 @@ pub struct Settings {
     pub acceleration: f64,
     /// Tolerance for intermediate poses, m.
     pub intermediate_point: f64,
+    /// Tolerance for intermediate orientations, rad; none where the language's own rule holds.
+    pub intermediate_angle: Option<f64>,
+    /// Speed of rotation, rad/s; none where it has the same share as the speed.
+    pub rot_speed: Option<f64>,
+    /// Acceleration of rotation, rad/s2; none where it has the same share as the acceleration.
+    pub rot_accel: Option<f64>,
     /// Tolerance for the position at the end of a move, m.
     pub end_point: f64,
     /// Tolerance for the orientation at the end of a move, rad.
@@ -32,6 +38,9 @@ impl Settings {
             speed: START * maxima.speed,
             acceleration: START * maxima.acceleration,
             intermediate_point: 0.0,
+            intermediate_angle: None,
+            rot_speed: None,
+            rot_accel: None,
             end_point: 0.0,
             end_angle: 0.0,
         }
@@ -46,15 +55,35 @@ impl Settings {
         positive("speed", self.speed, "SetAbsoluteSpeed or SetRelativeSpeed")?;
         let help = "SetAbsoluteAcceleration or SetRelativeAcceleration";
         positive("acceleration", self.acceleration, help)?;
+        let help = "SetAbsoluteRotSpeed or SetRelativeRotSpeed";
+        positive("speed of rotation", self.rot_speed.unwrap_or(1.0), help)?;
+        let help = "SetAbsoluteRotAccel or SetRelativeRotAccel";
+        let rot_accel = self.rot_accel.unwrap_or(1.0);
+        positive("acceleration of rotation", rot_accel, help)?;
+        let speed_share = self.speed / maxima.speed;
+        let acceleration_share = self.acceleration / maxima.acceleration;
         Ok(ToolLimits {
             speed: self.speed,
             acceleration: self.acceleration,
             jerk: maxima.jerk,
-            angular_speed: maxima.angular_speed * (self.speed / maxima.speed),
-            angular_acceleration: maxima.angular_acceleration
-                * (self.acceleration / maxima.acceleration),
+            angular_speed: self.rot_speed.unwrap_or(maxima.angular_speed * speed_share),
+            angular_acceleration: self
+                .rot_accel
+                .unwrap_or(maxima.angular_acceleration * acceleration_share),
             angular_jerk: maxima.angular_jerk,
         })
+    }
+
+    /// Radius of the ball in which an intermediate pose is passed within both of its tolerances,
+    /// m: a smooth motion turns away from it by an angle that grows with the ball.
+    pub(super) fn intermediate_ball(&self) -> f64 {
+        /// A small ball, m.
+        const SMALL: f64 = 1e-3;
+        let a_radian = SMALL / trajectory::smooth::angular_tolerance(SMALL);
+        let widest = trajectory::smooth::angular_tolerance(f64::INFINITY);
+        let angle = self.intermediate_angle.filter(|angle| *angle < widest);
+        let ball = angle.map_or(f64::INFINITY, |angle| angle * a_radian);
+        self.intermediate_point.min(ball)
     }
 
     pub(super) fn set(
@@ -77,6 +106,24 @@ impl Settings {
             }
             Command::SetRelativeAcceleration { percent } => {
                 self.acceleration = (percent / 100.0) * maxima.acceleration;
+            }
+            Command::SetAbsoluteRotSpeed { value } => {
+                let (asked, most) = (value * angle, maxima.angular_speed);
+                self.rot_speed = Some(absolute("speed of rotation", asked, most, "rad/s")?);
+            }
+            Command::SetAbsoluteRotAccel { value } => {
+                let (asked, most) = (value * angle, maxima.angular_acceleration);
+                let noun = "acceleration of rotation";
+                self.rot_accel = Some(absolute(noun, asked, most, "rad/s2")?);
+            }
+            Command::SetRelativeRotSpeed { percent } => {
+                self.rot_speed = Some((percent / 100.0) * maxima.angular_speed);
+            }
+            Command::SetRelativeRotAccel { percent } => {
+                self.rot_accel = Some((percent / 100.0) * maxima.angular_acceleration);
+            }
+            Command::SetIntermediateAngleTolerance { tolerance } => {
+                self.intermediate_angle = Some(tolerance * angle);
             }
             Command::SetIntermediatePointTolerance { tolerance } => {
                 self.intermediate_point = tolerance * length;

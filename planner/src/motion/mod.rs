@@ -4,6 +4,7 @@
 //! the real run and the benchmarks all call it.
 
 mod active;
+mod actuate;
 mod blocked_cause;
 mod cartesian;
 mod certificate;
@@ -34,7 +35,7 @@ use certificate::Arm;
 use draft::Draft;
 use kernel::Kernel;
 
-use crate::task::{Move, Shape};
+use crate::task::{JointMove, Move, Shape};
 
 /// Joint ratios may exceed 1 by rounding only.
 const ROUNDING: f64 = 1e-9;
@@ -140,6 +141,18 @@ impl<const N: usize> Planner<N> {
         most: &ToolLimits,
     ) -> Result<PlannedMove<N>, MotionError> {
         (self.kernel.jog)(self, direction, start, most)
+    }
+
+    /// Plans a move of single joints from `start`, at rest; the others rest.
+    ///
+    /// # Errors
+    /// [`MotionError`] when any part of the move cannot be made.
+    pub fn actuate(
+        &self,
+        motion: &JointMove,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.actuate)(self, motion, start)
     }
 
     /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the

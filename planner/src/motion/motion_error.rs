@@ -65,6 +65,14 @@ pub enum MotionError {
         /// What blocks the path.
         cause: BlockedCause,
     },
+    /// A joint is to go beyond its limit.
+    #[error("{joint} is to go {beyond} beyond its limit")]
+    JointBeyondLimit {
+        /// The joint, as people call it.
+        joint: String,
+        /// How far beyond, with its unit.
+        beyond: String,
+    },
     /// The arm cannot move in the direction of a jog.
     #[error("{0}")]
     Jog(#[from] JogRefusal),
@@ -97,6 +105,9 @@ impl MotionError {
             Self::Unsolved { .. } => "check the pose with `canter ik`",
             Self::Blocked { .. } => {
                 "reach the start in another configuration with MoveTo, or go round the place"
+            }
+            Self::JointBeyondLimit { .. } => {
+                "stay within the range that `canter robots show` tells"
             }
             Self::Jog(_) => "go the other way",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",

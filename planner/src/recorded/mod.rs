@@ -72,6 +72,7 @@ pub fn verify_program(
             robot.workstation_from_base,
             robot.tooling(),
             default_length,
+            robot.sliding(),
         );
         for (span, report) in span::spans(&recording, modal, &program.commands, &mut whole) {
             verdict.commands.push(command(&recording, &span, report));

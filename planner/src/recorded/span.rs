@@ -93,7 +93,10 @@ pub(super) fn spans<'a>(
         if let Err(error) = &task {
             report.refuse(error.to_string(), rows[own.start.saturating_sub(1)].t_s);
         }
-        let task = task.ok();
+        let stands = own.start.saturating_sub(1);
+        let task = task
+            .ok()
+            .map(|task| of_point(recording, task, (stands, &before)));
         let tool_time = match &task {
             Some(Task::Tool(action)) => modal.tooling().nominal_time(*action),
             _ => 0.0,
@@ -124,6 +127,22 @@ pub(super) fn spans<'a>(
         whole.hold(Rule::CommandColumn, subject, row.t_s, measure);
     }
     spans
+}
+
+/// A move of single joints as one of the controlled point, from where the arm stands in a row.
+fn of_point(
+    recording: &Recording<'_>,
+    task: Task,
+    (row, flange_from_tool): (usize, &Isometry3<f64>),
+) -> Task {
+    match task {
+        Task::Joints(motion) => {
+            let mut joints = recording.rows[row].joints.clone();
+            motion.apply(&mut joints);
+            Task::Move(motion.of_point(recording.arm.flange(&joints) * flange_from_tool))
+        }
+        task => task,
+    }
 }
 
 /// Finds where the arm is at rest after a command.

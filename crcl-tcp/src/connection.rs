@@ -1,0 +1,405 @@
+//! One connection: reads documents, obeys them, answers.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+
+use crcl::xml::{
+    CommandState, Instance, Instruction, Meaning, Refusal, StopCondition, XmlCommand, read_instance,
+};
+use crcl::{Command, Pose};
+
+use crate::arm::{Kind, Order};
+use crate::cell::{Cell, ConnectionId, Inner, Last};
+use crate::framing::{Frame, Frames, LONGEST_DOCUMENT};
+use crate::report::Choice;
+use crate::server::Units;
+use crate::stopper::Stop;
+
+/// How long a client may take to read a status before it is cut off.
+const SLOW: Duration = Duration::from_secs(2);
+
+/// How often a silent connection looks whether the server ends.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// How connections behave.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Manners {
+    /// The units of a connection that has not set its own.
+    pub(crate) units: Units,
+    /// Commands are executed one after the other instead of taking the place of each other.
+    pub(crate) queue: bool,
+    /// A status is sent this often, and GetStatus is not answered.
+    pub(crate) push: Option<Duration>,
+}
+
+/// The ends that a connection gives its commands to.
+#[derive(Clone, Debug)]
+pub(crate) struct Ways {
+    pub(crate) cell: Arc<Cell>,
+    pub(crate) orders: Sender<Order>,
+    pub(crate) stops: Sender<Stop>,
+}
+
+/// A connection on its way.
+pub(crate) struct Connection {
+    id: ConnectionId,
+    ways: Ways,
+    manners: Manners,
+    choice: Choice,
+    /// What is told on this connection only, and until which command.
+    private: Option<(u64, Last)>,
+    stream: TcpStream,
+}
+
+/// Why a connection ends.
+pub(crate) type Ending = String;
+
+impl Connection {
+    /// A connection that has just been accepted.
+    ///
+    /// # Errors
+    /// What the operating system refuses.
+    pub(crate) fn new(
+        id: ConnectionId,
+        stream: TcpStream,
+        ways: Ways,
+        manners: Manners,
+    ) -> std::io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_write_timeout(Some(SLOW))?;
+        stream.set_read_timeout(Some(manners.push.map_or(LOOK, |push| push.min(LOOK))))?;
+        Ok(Self {
+            id,
+            ways,
+            manners,
+            choice: Choice::new(manners.units.of_connection()),
+            private: None,
+            stream,
+        })
+    }
+
+    /// Serves until the client goes away, or is sent away; says why.
+    pub(crate) fn run(&mut self, ends: &dyn Fn() -> bool) -> Ending {
+        let mut frames = Frames::new(&["CRCLCommandInstance", "CRCLProgram"]);
+        let mut buffer = vec![0; 64 << 10];
+        let mut pushed = Instant::now();
+        loop {
+            if ends() {
+                return "the server ends".to_owned();
+            }
+            if let Some(period) = self.manners.push
+                && pushed.elapsed() >= period
+            {
+                pushed = Instant::now();
+                if let Err(ending) = self.answer() {
+                    return ending;
+                }
+            }
+            let count = match self.stream.read(&mut buffer) {
+                Ok(0) => return "the client closed it".to_owned(),
+                Ok(count) => count,
+                Err(error) if is_timeout(&error) => continue,
+                Err(error) => return error.to_string(),
+            };
+            frames.push(buffer.get(..count).unwrap_or_default());
+            for frame in frames.by_ref() {
+                if let Err(ending) = self.take(frame) {
+                    return ending;
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, frame: Frame) -> Result<(), Ending> {
+        match frame {
+            Frame::Document(bytes) => match read(&bytes) {
+                Ok(instance) => return self.obey(instance),
+                Err(why) => self.complain(&why),
+            },
+            Frame::Garbage(count) => {
+                self.complain(&format!("{count} bytes belong to no document"));
+            }
+            Frame::TooLong => {
+                let why = format!("a document has at most {LONGEST_DOCUMENT} bytes");
+                self.complain(&why);
+                // The last words; who does not read them is sent away all the same.
+                self.answer()?;
+                return Err(why);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells this connection about something that is no command.
+    fn complain(&mut self, why: &str) {
+        let inner = self.ways.cell.lock();
+        let last = Last {
+            state: CommandState::Error,
+            description: Some(why.to_owned()),
+            ..inner.last.clone()
+        };
+        self.private = Some((inner.serial, last));
+    }
+
+    /// Sends a status in one piece.
+    fn answer(&mut self) -> Result<(), Ending> {
+        let text = {
+            let mut inner = self.ways.cell.lock();
+            let number = inner.next_status();
+            if self
+                .private
+                .as_ref()
+                .is_some_and(|(until, _)| *until != inner.serial)
+            {
+                self.private = None;
+            }
+            let last = self.private.as_ref().map_or(&inner.last, |(_, last)| last);
+            self.choice.write(last, number, &inner.picture)
+        };
+        match self.stream.write_all(text.as_bytes()) {
+            Ok(()) => Ok(()),
+            Err(error) if is_timeout(&error) => {
+                let limit = SLOW.as_secs();
+                Err(format!("the client read nothing for {limit} s"))
+            }
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn obey(&mut self, instance: Instance) -> Result<(), Ending> {
+        match &instance.instruction.command {
+            XmlCommand::GetStatus => {
+                return match self.manners.push {
+                    None => self.answer(),
+                    Some(_) => Ok(()),
+                };
+            }
+            XmlCommand::StopMotion(condition) => {
+                let fast = *condition != StopCondition::Normal;
+                self.stop(&instance, fast);
+            }
+            _ => {
+                self.private = None;
+                let cell = Arc::clone(&self.ways.cell);
+                let mut inner = cell.lock();
+                self.command(&mut inner, &instance);
+            }
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self, instance: &Instance, fast: bool) {
+        self.private = None;
+        let serial = {
+            let mut inner = self.ways.cell.lock();
+            inner.epoch += 1;
+            inner.begin(self.id, Last::new(instance, CommandState::Working))
+        };
+        // The thread that stops ends with the server.
+        let _ = self.ways.stops.send(Stop {
+            serial: Some(serial),
+            fast,
+        });
+    }
+
+    /// A command that is no stop: settings of the connection, or something for the engine.
+    fn command(&mut self, inner: &mut Inner, instance: &Instance) {
+        let command = &instance.instruction.command;
+        let repeated = match command {
+            XmlCommand::ConfigureStatusReport(_) => {
+                let id = instance.instruction.id;
+                let before = inner.configured.replace((id, self.id));
+                before.is_some_and(|(last, other)| last == id && other != self.id)
+            }
+            _ => false,
+        };
+        if let Err(why) = allowed(inner, command) {
+            // NIST's pendant repeats the choice of its reports on a connection that only looks.
+            if !repeated {
+                self.end(inner, instance, CommandState::Error, Some(why));
+            }
+            return;
+        }
+        if let Some(result) = self.own_setting(inner, command) {
+            match result {
+                Ok(()) if repeated => {}
+                Ok(()) => self.end(inner, instance, CommandState::Done, None),
+                Err(why) => self.end(inner, instance, CommandState::Error, Some(why)),
+            }
+            return;
+        }
+        if inner.is_working() && inner.owner != self.id {
+            let why = format!("connection {} commands the arm", inner.owner);
+            return self.end(inner, instance, CommandState::Error, Some(why));
+        }
+        match self.order(inner, &instance.instruction) {
+            Ok(None) => self.end(inner, instance, CommandState::Done, None),
+            Ok(Some(order)) => self.give(inner, instance, order),
+            Err(why) => {
+                let serial = inner.begin(self.id, Last::new(instance, CommandState::Working));
+                inner.fail(serial, &why);
+            }
+        }
+    }
+
+    /// Says what became of a command that is over at once: to everybody, or to this connection
+    /// only while a command of another is under way.
+    fn end(
+        &mut self,
+        inner: &mut Inner,
+        instance: &Instance,
+        state: CommandState,
+        description: Option<String>,
+    ) {
+        let last = Last {
+            description,
+            ..Last::new(instance, state)
+        };
+        if inner.is_working() && inner.owner != self.id {
+            self.private = Some((inner.serial, last));
+        } else {
+            inner.begin(self.id, last);
+        }
+    }
+
+    /// What concerns this connection only; nothing for a command of another kind.
+    fn own_setting(&mut self, inner: &Inner, command: &XmlCommand) -> Option<Result<(), String>> {
+        let joints = inner.picture.joints.len();
+        match command {
+            XmlCommand::SetLengthUnits(unit) => self.choice.units.length = *unit,
+            XmlCommand::SetAngleUnits(unit) => self.choice.units.angle = *unit,
+            XmlCommand::SetForceUnits(unit) => self.choice.units.force = *unit,
+            XmlCommand::SetTorqueUnits(unit) => self.choice.units.torque = *unit,
+            XmlCommand::ConfigureStatusReport(parts) => self.choice.parts = *parts,
+            XmlCommand::ConfigureJointReports { reset_all, reports } => {
+                return Some(self.choice.choose_joints(*reset_all, reports, joints));
+            }
+            _ => return None,
+        }
+        Some(Ok(()))
+    }
+
+    /// What the engine is to do; nothing where the command changes nothing here.
+    fn order(&self, inner: &Inner, instruction: &Instruction) -> Result<Option<Order>, String> {
+        let sliding = &inner.picture.sliding;
+        let command = self.choice.units.to_si(&instruction.command, sliding);
+        let instruction = Instruction {
+            command,
+            ..instruction.clone()
+        };
+        let commands = match instruction.meaning() {
+            Ok(Meaning::Commands(commands)) => commands,
+            Ok(Meaning::NoEffect(_)) => return Ok(None),
+            Ok(Meaning::LoopStart(_) | Meaning::LoopEnd { .. }) => {
+                let name = instruction.command.name();
+                return Err(format!(
+                    "{name} belongs into files; a client repeats the commands"
+                ));
+            }
+            Err(refusal) => return Err(sentence(&refusal)),
+        };
+        if commands.is_empty() {
+            return Ok(None);
+        }
+        if let Some(error) = commands.iter().find_map(|command| command.check().err()) {
+            return Err(error.to_string());
+        }
+        let kind = kind(&instruction.command);
+        let moves =
+            kind == Kind::Motion && !matches!(commands.first(), Some(Command::Dwell { .. }));
+        Ok(Some(Order {
+            serial: 0,
+            epoch: inner.epoch,
+            kind,
+            target: commands.iter().rev().find_map(target),
+            preempts: moves && !self.manners.queue,
+            commands,
+        }))
+    }
+
+    fn give(&self, inner: &mut Inner, instance: &Instance, order: Order) {
+        match order.kind {
+            Kind::Begin => {
+                inner.failed = None;
+                inner.initialised = true;
+            }
+            Kind::End => inner.initialised = false,
+            _ => {}
+        }
+        let serial = inner.begin(self.id, Last::new(instance, CommandState::Working));
+        let order = Order { serial, ..order };
+        if self.ways.orders.send(order).is_err() {
+            inner.fail(serial, "the server ends");
+        }
+    }
+}
+
+/// The document as a command.
+fn read(bytes: &[u8]) -> Result<Instance, String> {
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let at = error.valid_up_to();
+        format!("a document is text in UTF-8, but byte {at} is none")
+    })?;
+    if text.starts_with("<CRCLProgram") {
+        return Err(
+            "this server takes single commands; `canter crcl send` sends a program command by \
+             command"
+                .to_owned(),
+        );
+    }
+    read_instance(text).map_err(|findings| {
+        let first = findings.first().map(|finding| finding.message.as_str());
+        first.unwrap_or("the document cannot be read").to_owned()
+    })
+}
+
+/// Whether a command may be executed now.
+fn allowed(inner: &Inner, command: &XmlCommand) -> Result<(), String> {
+    match command {
+        XmlCommand::InitCanon => Ok(()),
+        _ if inner.failed.is_some() => Err(inner.failed.clone().unwrap_or_default()),
+        XmlCommand::EndCanon => Ok(()),
+        _ if !inner.initialised => {
+            let name = command.name();
+            Err(format!("not initialised: {name} before InitCanon"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn kind(command: &XmlCommand) -> Kind {
+    match command {
+        XmlCommand::InitCanon => Kind::Begin,
+        XmlCommand::EndCanon => Kind::End,
+        XmlCommand::MoveTo { .. }
+        | XmlCommand::MoveThroughTo { .. }
+        | XmlCommand::MoveScrew(_)
+        | XmlCommand::ActuateJoints { .. }
+        | XmlCommand::Dwell(_) => Kind::Motion,
+        XmlCommand::SetEndEffector(_)
+        | XmlCommand::OpenToolChanger
+        | XmlCommand::CloseToolChanger => Kind::Tool,
+        _ => Kind::Setting,
+    }
+}
+
+/// Where a move stops (m).
+fn target(command: &Command) -> Option<[f64; 3]> {
+    command.poses().last().map(Pose::point)
+}
+
+fn sentence(refusal: &Refusal) -> String {
+    format!("Canter cannot do this yet: {}", refusal.message)
+}
+
+fn is_timeout(error: &std::io::Error) -> bool {
+    let kinds = [
+        ErrorKind::WouldBlock,
+        ErrorKind::TimedOut,
+        ErrorKind::Interrupted,
+    ];
+    kinds.contains(&error.kind())
+}

@@ -1,0 +1,205 @@
+//! What commands of CRCL's XML are in the language, and what has no place there.
+
+use super::command::{ActuateJoint, Instruction, JointDetails, StopCondition, XmlCommand};
+use super::data::Quantity;
+use super::own_settings::{end_tolerance, own_settings, percent};
+use super::refusal::{Refusal, refusal};
+use crate::command::Command;
+use crate::joint::JointTarget;
+
+/// What a command of XML is in the language.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Meaning {
+    /// These commands, in this order.
+    Commands(Vec<Command>),
+    /// It concerns the connection only; this is why it changes no motion.
+    NoEffect(&'static str),
+    /// A block begins.
+    LoopStart(String),
+    /// A block ends.
+    LoopEnd {
+        /// Name of the block.
+        name: String,
+        /// How many times it is executed.
+        count: i32,
+    },
+}
+
+impl Instruction {
+    /// What the command is in the language.
+    ///
+    /// ```
+    /// use crcl::Command;
+    /// use crcl::xml::{Instruction, Meaning, XmlCommand};
+    /// let close = Instruction::new(4, XmlCommand::SetEndEffector(0.0));
+    /// assert_eq!(close.meaning(), Ok(Meaning::Commands(vec![Command::CloseGripper])));
+    /// ```
+    ///
+    /// # Errors
+    /// A [`Refusal`] that names the element that cannot be executed.
+    pub fn meaning(&self) -> Result<Meaning, Refusal> {
+        if let Some(guard) = self.guards.first() {
+            let message = format!(
+                "a guard on the sensor `{}`: no sensor is connected",
+                guard.sensor
+            );
+            return Err(refusal("Guard", message));
+        }
+        let reason = self.reason();
+        match &self.command {
+            XmlCommand::InitCanon => one(Command::InitCanon),
+            XmlCommand::EndCanon => one(Command::EndCanon { reason }),
+            XmlCommand::Message(text) => one(Command::Message { text: text.clone() }),
+            XmlCommand::Dwell(seconds) => one(Command::Dwell { seconds: *seconds }),
+            XmlCommand::OpenToolChanger => one(Command::OpenToolChanger),
+            XmlCommand::CloseToolChanger => one(Command::CloseToolChanger),
+            XmlCommand::SetEndEffector(setting) => one(if *setting > 0.0 {
+                Command::OpenGripper
+            } else {
+                Command::CloseGripper
+            }),
+            XmlCommand::StopMotion(condition) => one(Command::StopMotion {
+                emergency: i64::from(*condition != StopCondition::Normal),
+            }),
+            XmlCommand::SetLengthUnits(unit) => one(Command::SetLengthUnits { unit: *unit }),
+            XmlCommand::SetAngleUnits(unit) => one(Command::SetAngleUnits { unit: *unit }),
+            XmlCommand::LoopBlockStart(name) => Ok(Meaning::LoopStart(name.clone())),
+            XmlCommand::LoopBlockEnd { name, count } => Ok(Meaning::LoopEnd {
+                name: name.clone(),
+                count: *count,
+            }),
+            XmlCommand::MoveTo { .. }
+            | XmlCommand::MoveThroughTo { .. }
+            | XmlCommand::MoveScrew(_)
+            | XmlCommand::ActuateJoints { .. } => motion(&self.command),
+            other => setting(other),
+        }
+    }
+
+    /// The reason of EndCanon, which XML has no element for: a `Name` such as `reason-2`.
+    fn reason(&self) -> i64 {
+        let digits = self.name.as_deref().and_then(|n| n.strip_prefix("reason-"));
+        let reason = digits.and_then(|digits| digits.parse().ok());
+        reason.filter(|reason| *reason >= 0).unwrap_or(0)
+    }
+}
+
+fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
+    match command {
+        XmlCommand::MoveTo { straight, end } => {
+            let pose = end.pose;
+            let command = if *straight {
+                Command::MoveStraightTo { pose }
+            } else {
+                Command::MoveTo { pose }
+            };
+            own_settings(std::slice::from_ref(end), command).map(Meaning::Commands)
+        }
+        // The way is made of straight lines in either case.
+        XmlCommand::MoveThroughTo { waypoints, .. } => {
+            let poses = waypoints.iter().map(|waypoint| waypoint.pose).collect();
+            own_settings(waypoints, Command::MoveSmoothlyTo { poses }).map(Meaning::Commands)
+        }
+        XmlCommand::MoveScrew(_) => Err(refusal(
+            "AxialDistanceScrew",
+            "MoveScrew: turning and advancing in step",
+        )),
+        XmlCommand::ActuateJoints { joints, .. } => {
+            let targets = joints
+                .iter()
+                .enumerate()
+                .map(|(at, joint)| target(joint, at));
+            let joints = targets.collect::<Result<_, _>>()?;
+            one(Command::ActuateJoints { joints })
+        }
+        other => Err(refusal("CommandID", other.name())),
+    }
+}
+
+fn target(joint: &ActuateJoint, occurrence: usize) -> Result<JointTarget, Refusal> {
+    match joint.details {
+        JointDetails::SpeedAccel { speed, accel } => Ok(JointTarget {
+            joint: i64::from(joint.joint),
+            position: joint.position,
+            speed: speed.unwrap_or(0.0),
+            acceleration: accel.unwrap_or(0.0),
+        }),
+        JointDetails::ForceTorque { .. } => Err(Refusal {
+            occurrence,
+            ..refusal("JointDetails", "moving a joint with a force or torque")
+        }),
+    }
+}
+
+fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
+    use XmlCommand as X;
+    let report = "it chooses what a status says, and a program in a file has no status";
+    match command {
+        X::SetTransSpeed(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteSpeed { value: *value })
+        }
+        X::SetTransSpeed(Quantity::Relative(share)) => one(Command::SetRelativeSpeed {
+            percent: percent(*share),
+        }),
+        X::SetTransAccel(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteAcceleration { value: *value })
+        }
+        X::SetTransAccel(Quantity::Relative(share)) => one(Command::SetRelativeAcceleration {
+            percent: percent(*share),
+        }),
+        X::SetEndPoseTolerance(tolerance) => Ok(Meaning::Commands(end_tolerance(tolerance))),
+        X::SetIntermediatePoseTolerance(tolerance) => {
+            let point = |tolerance| Command::SetIntermediatePointTolerance { tolerance };
+            let angle = |tolerance| Command::SetIntermediateAngleTolerance { tolerance };
+            let point = tolerance.ball().map(point);
+            let angle = tolerance.angle().map(angle);
+            Ok(Meaning::Commands(point.into_iter().chain(angle).collect()))
+        }
+        X::SetMotionCoordination(_) => Ok(Meaning::NoEffect(
+            "translation and rotation always end together here",
+        )),
+        X::SetForceUnits(_) | X::SetTorqueUnits(_) => Ok(Meaning::NoEffect(
+            "no command of the language has a force or a torque",
+        )),
+        X::SetDefaultJointPositonsTolerances(_) => Ok(Meaning::NoEffect(
+            "joints stop exactly where they are told to",
+        )),
+        X::ConfigureJointReports { .. }
+        | X::ConfigureStatusReport(_)
+        | X::GetStatus
+        | X::EnableGripper { .. }
+        | X::DisableGripper(_)
+        | X::EnableRobotParameterStatus(_)
+        | X::DisableRobotParameterStatus(_) => Ok(Meaning::NoEffect(report)),
+        X::SetRotSpeed(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteRotSpeed { value: *value })
+        }
+        X::SetRotSpeed(Quantity::Relative(share)) => one(Command::SetRelativeRotSpeed {
+            percent: percent(*share),
+        }),
+        X::SetRotAccel(Quantity::Absolute(value)) => {
+            one(Command::SetAbsoluteRotAccel { value: *value })
+        }
+        X::SetRotAccel(Quantity::Relative(share)) => one(Command::SetRelativeRotAccel {
+            percent: percent(*share),
+        }),
+        X::SetEndEffectorParameters(parameters) | X::SetRobotParameters(parameters) => {
+            let name = parameters.first().map_or("", |first| first.name.as_str());
+            let message = format!("the parameter `{name}`: this robot has no parameters");
+            Err(refusal("ParameterSetting", message))
+        }
+        X::EnableSensor { sensor, .. } | X::DisableSensor(sensor) => {
+            let message = format!("the sensor `{sensor}`: no sensor is connected");
+            Err(refusal("SensorID", message))
+        }
+        X::RunProgram(_) => Err(refusal(
+            "ProgramText",
+            "RunProgram: a program in the robot's own language",
+        )),
+        other => Err(refusal("CommandID", other.name())),
+    }
+}
+
+fn one(command: Command) -> Result<Meaning, Refusal> {
+    Ok(Meaning::Commands(vec![command]))
+}
