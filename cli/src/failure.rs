@@ -1,6 +1,7 @@
 use std::io;
 
 use ipc::IpcError;
+use recorder::RecorderError;
 
 use crate::exit::Exit;
 use crate::output_file::Unwritable;
@@ -77,6 +78,17 @@ impl From<IpcError> for Failure {
         let exit = match error {
             IpcError::BadArmName { .. } => Exit::Usage,
             _ => Exit::NoPeer,
+        };
+        Self::new(exit, error)
+    }
+}
+
+/// Recordings.
+impl From<recorder::RecorderError> for Failure {
+    fn from(error: recorder::RecorderError) -> Self {
+        let exit = match error {
+            RecorderError::Thread { .. } => Exit::Internal,
+            _ => Exit::Unreadable,
         };
         Self::new(exit, error)
     }

@@ -9,6 +9,7 @@ use servo::ExecutorError;
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::recorder_options::RecorderOptions;
 use crate::simulation::{Kind, Simulation};
 
 /// An engine that ends its simulated driver, if it has one.
@@ -28,6 +29,8 @@ pub(crate) struct HostOptions {
     /// Python that runs the MuJoCo driver
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: String,
+    #[command(flatten)]
+    pub(crate) recorder: RecorderOptions,
     /// Go in step with the driver instead of by the clock: faster, and the same every time
     #[arg(long)]
     lock_step: bool,
@@ -116,7 +119,8 @@ impl HostOptions {
         config.record = true;
         config.on_refusal = on_refusal;
         config.default_length = default_length;
-        let host = Host::start(channels, robot, &config, simulation).map_err(failure)?;
+        let mut host = Host::start(channels, robot, &config, simulation).map_err(failure)?;
+        self.recorder.start(&mut host, robot)?;
         if let Some(warning) = &host.session.warning {
             tracing::warn!("{warning}");
         }

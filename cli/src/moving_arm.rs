@@ -15,6 +15,7 @@ use crate::host_options::Host;
 use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::progress::Progress;
+use crate::recorder_options;
 use crate::recording::Recording;
 use crate::signals::SignalThread;
 
@@ -134,7 +135,7 @@ impl MovingArm {
         let lost = |error: String| MotionFailure::new(0, error);
         let note = self.host.turn().map_err(|error| lost(error.to_string()))?;
         self.recording
-            .take(&self.host.session.samples())
+            .take(&self.host.samples())
             .map_err(|error| lost(format!("the samples cannot be written: {error}")))?;
         self.progress.show(&self.host.session.status());
         if self.host.is_shut_down() || self.signals.has_stopped(&self.host.session) {
@@ -150,12 +151,15 @@ impl MovingArm {
     /// The file cannot be written.
     pub(crate) fn finish(mut self) -> io::Result<f64> {
         // The sample of a period is complete when the next state came: the last ones are still out.
-        self.host.session.close();
-        self.recording.take(&self.host.session.samples())?;
+        let recorded = self.host.close();
+        self.recording.take(&self.host.samples())?;
         let worst = self.recording.worst();
         drop(self.host);
         self.signals.release();
         self.recording.finish()?;
+        if let Some(summary) = recorded.map_err(io::Error::other)? {
+            recorder_options::report(&self.printer, &summary);
+        }
         Ok(worst)
     }
 }

@@ -2,6 +2,7 @@ use std::io::{self, IsTerminal, Write};
 
 use clap::{Args, ValueEnum};
 use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
+use engine::host::GivenProgram;
 use planner::command_error::ErrorClass;
 use planner::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
 use planner::robot::Robot;
@@ -118,6 +119,29 @@ impl ProgramArgument {
     }
 }
 
+impl ProgramFile {
+    /// A program that came with a recording.
+    pub(crate) fn given(given: &GivenProgram) -> Self {
+        let bytes = given.text.as_bytes();
+        let json = given.form == "json";
+        let read = if json {
+            crcl::json::read_bytes
+        } else {
+            crcl::text::read_bytes
+        };
+        Self {
+            source: Source::from_bytes(&given.name, bytes),
+            reading: read(bytes, &ReadOptions::default()),
+            default_length: match given.default_length.as_str() {
+                "m" => LengthUnit::Meter,
+                "inch" => LengthUnit::Inch,
+                _ => LengthUnit::Millimeter,
+            },
+            json,
+        }
+    }
+}
+
 /// The time of a clock that never jumps (s).
 fn seconds() -> f64 {
     scheduling::now_ns() as f64 * 1e-9
@@ -132,6 +156,15 @@ impl ProgramFile {
     /// Unit of length until the program sets one.
     pub(crate) fn default_length(&self) -> LengthUnit {
         self.default_length
+    }
+
+    /// The same in one word.
+    pub(crate) fn length_word(&self) -> &'static str {
+        match self.default_length {
+            LengthUnit::Millimeter => "mm",
+            LengthUnit::Meter => "m",
+            LengthUnit::Inch => "inch",
+        }
     }
 
     /// The name it is reported under.

@@ -12,7 +12,9 @@
 pub mod arm_motion;
 pub mod control;
 pub mod doctor;
+pub mod flight;
 pub mod host;
 pub mod queue;
 mod recent;
 pub mod session;
+mod texts;

@@ -57,6 +57,13 @@ pub enum Verb {
         /// Number of the last note that is known; only later ones are asked for.
         since: u64,
     },
+    /// A text of the engine, in parts: the robot's files, or the last program.
+    Text {
+        /// `urdf`, `robot` (robot.toml) or `program`.
+        of: String,
+        /// Where the part begins (bytes): 0, then the `next` of the answer before.
+        from: usize,
+    },
     /// Stop on the path and end the engine.
     Shutdown,
 }

@@ -6,7 +6,7 @@ use system_tests::repository::root;
 use toml::{Table, Value};
 
 /// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     (
         "cli",
         &[
@@ -19,6 +19,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "kinematics",
             "trajectory",
             "ipc",
+            "recorder",
             "scheduling",
             "driver-sim",
             "driver-conformance",
@@ -37,6 +38,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "trajectory",
             "realtime",
             "ipc",
+            "recorder",
             "scheduling",
         ],
     ),
@@ -50,18 +52,20 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ("kinematics", &[]),
     ("realtime", &[]),
     ("ipc", &[]),
+    ("recorder", &[]),
     ("scheduling", &[]),
 ];
 
 /// Crates of others that may be named by these crates of ours only. That the planner starts no
 /// thread and reads no clock is more than a manifest shows: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 8] = [
+const FENCES: [(&str, &[&str]); 9] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
     ("clap", &["cli"]),
+    ("mcap", &["recorder"]),
     ("rtrb", &["servo"]),
     ("libc", &["ipc", "scheduling"]),
 ];

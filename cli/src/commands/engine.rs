@@ -5,6 +5,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{HostOptions, RefusalOption};
 use crate::printer::Printer;
+use crate::recorder_options;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;
 
@@ -55,15 +56,19 @@ impl Engine {
             }
             let note = host.turn()?;
             // Nobody reads the recording here; it must not grow.
-            drop(host.session.samples());
+            drop(host.samples());
             let Some(note) = note else { continue };
             self.tell(printer, &note);
             if matches!(note, Note::Closed) {
                 break Exit::Internal;
             }
         };
+        let recorded = host.close();
         drop(host);
         signals.release();
+        if let Some(summary) = recorded? {
+            recorder_options::report(printer, &summary);
+        }
         Ok(exit)
     }
 

@@ -19,7 +19,9 @@ mod pause;
 mod plan;
 mod plan_check;
 mod plan_run;
+mod record;
 mod recover;
+mod replay;
 mod resume;
 mod robots;
 mod run;
@@ -55,7 +57,9 @@ pub(crate) enum Command {
     Override(override_speed::Override),
     Pause(pause::Pause),
     Plan(plan::Plan),
+    Record(record::Record),
     Recover(recover::Recover),
+    Replay(replay::Replay),
     Resume(resume::Resume),
     Robots(robots::Robots),
     World(world::World),
@@ -89,7 +93,9 @@ impl Command {
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),
             Self::Plan(command) => command.run(),
+            Self::Record(command) => command.run(printer),
             Self::Recover(command) => command.run(),
+            Self::Replay(command) => command.run(printer),
             Self::Resume(command) => command.run(),
             Self::Robots(command) => command.run(),
             Self::World(command) => command.run(),

@@ -2,6 +2,7 @@ use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use clap::Args;
+use engine::host::GivenProgram;
 use engine::session::{Blame, Note};
 use planner::dry_run::{FailurePolicy, Plan};
 use planner::robot::Robot;
@@ -14,6 +15,7 @@ use crate::output_file::OutputFile;
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::progress::Progress;
+use crate::recorder_options;
 use crate::recording::Recording;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;
@@ -140,19 +142,32 @@ struct Running {
 impl Running {
     fn finish_program(mut self, program: &ProgramFile, plan: Plan) -> Result<Exit, Failure> {
         let count = program.program().commands.len();
+        let start = Some(plan.start.clone());
+        // A plan has no key that is not a text: it can be written.
+        let certificate = serde_json::to_string(&plan).ok();
         let ids = self
             .host
             .session
             .execute(program.program(), plan)
             .map_err(|full| Failure::new(Exit::Refused, full))?;
         let last = ids.last().copied().unwrap_or(0);
+        let given = GivenProgram {
+            form: program.form().to_owned(),
+            name: program.name().to_owned(),
+            text: program.text().to_owned(),
+            first: ids.first().copied().unwrap_or(0),
+            last,
+            start,
+            default_length: program.length_word().to_owned(),
+        };
+        self.host.tell_program(given, certificate);
         let mut done = 0;
         let exit = loop {
             if self.signals.has_stopped(&self.host.session) {
                 break Exit::Stopped;
             }
             let note = self.host.turn()?;
-            self.recording.take(&self.host.session.samples())?;
+            self.recording.take(&self.host.samples())?;
             self.progress.show(&self.host.session.status());
             if self.host.is_shut_down() {
                 break Exit::Stopped;
@@ -222,8 +237,8 @@ impl Running {
         let duration = self.recording.duration();
         let status = self.host.session.status();
         // The sample of a period is complete when the next state came: the last ones are still out.
-        self.host.session.close();
-        self.recording.take(&self.host.session.samples())?;
+        let recorded = self.host.close();
+        self.recording.take(&self.host.samples())?;
         let driver = self.host.session.driver.clone();
         let tracking = self.recording.worst();
         let exit = match exit {
@@ -234,6 +249,9 @@ impl Running {
         drop(self.host);
         self.signals.release();
         self.recording.finish()?;
+        if let Some(summary) = recorded? {
+            recorder_options::report(&self.printer, &summary);
+        }
         if self.json {
             let summary = json!({
                 "event": "summary",

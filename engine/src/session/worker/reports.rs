@@ -162,6 +162,7 @@ impl<const N: usize> Worker<'_, N> {
             tick: sample.tick,
             command: sample.command,
             path_time: sample.path_time,
+            path_rate: sample.path_rate,
             q: list(&sample.setpoint.position),
             dq: list(&sample.setpoint.velocity),
             ddq: list(&sample.setpoint.acceleration),
