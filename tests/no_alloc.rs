@@ -81,7 +81,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     let driver = DriverLink::open(&arm).unwrap();
     let mut config = executor_config(arm, Clock::LockStep);
     config.record = false;
-    let (mut runner, mut feeder, remote, mut monitor) = Runner::<JOINTS>::new(config);
+    let (mut runner, mut sender, remote, mut monitor) = Runner::<JOINTS>::new(config);
     let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
     ack.session = 1;
     ack.position[..JOINTS].copy_from_slice(home().as_slice());
@@ -115,7 +115,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     let (mut next, mut finished) = (0, 0);
     let (mut heap, mut waited) = (0, 0);
     for block in 0..100 {
-        while feeder.room() > 4000 && feed(&mut feeder, next) {
+        while sender.room() > 4000 && feed(&mut sender, next) {
             next += 1;
         }
         remote.control(match block % 10 {

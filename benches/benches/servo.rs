@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 use ipc::{Arm, Clock, Domain, DriverLink, EngineLink, Probe, Setpoint, State};
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Limits, Manner, Piece, Sample, Segment};
-use servo::{Control, Event, Executor, ExecutorConfig, Feeder, Histogram, Remote};
+use realtime::{Cycle, Demand, Limits, Piece, Sample, Segment, StopCategory};
+use servo::{Control, Event, Executor, ExecutorConfig, Histogram, Remote, SegmentSender};
 
 const N: usize = 6;
 type Joints = SVector<f64, N>;
@@ -170,7 +170,7 @@ fn governor() {
             }
             let demand = match tick / 200 % 4 {
                 1 if changing => Demand::Run(0.2),
-                2 if changing => Demand::Stop(Manner::Fast),
+                2 if changing => Demand::Stop(StopCategory::Fast),
                 _ => Demand::Run(1.0),
             };
             let start = Instant::now();
@@ -225,13 +225,13 @@ fn round(rate: f64, number: usize) -> Round {
         rate_hz: rate,
         ..ExecutorConfig::new(arm, limits())
     };
-    let (executor, mut feeder, mut monitor) = Executor::<N>::start(config).unwrap();
+    let (executor, mut sender, mut monitor) = Executor::<N>::start(config).unwrap();
     if let Some(warning) = executor.warning.as_ref().filter(|_| number == 0) {
         println!("{warning}");
     }
     let remote = executor.remote();
     let before = (processor_seconds(), Instant::now());
-    move_for(&remote, &mut feeder, ROUND_S);
+    move_for(&remote, &mut sender, ROUND_S);
     let share = (processor_seconds() - before.0) / before.1.elapsed().as_secs_f64();
     while let Some(event) = monitor.event() {
         if let Event::Faulted { fault, .. } = event {
@@ -293,11 +293,11 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-fn move_for(remote: &Remote<N>, feeder: &mut Feeder<N>, seconds: f64) {
+fn move_for(remote: &Remote<N>, sender: &mut SegmentSender<N>, seconds: f64) {
     let end = Instant::now() + Duration::from_secs_f64(seconds);
     let mut next = 0;
     while Instant::now() < end {
-        while feeder.room() > 4090 && feeder.push(command(next)).is_ok() {
+        while sender.room() > 4090 && sender.push(command(next)).is_ok() {
             next += 1;
         }
         sleep(Duration::from_millis(20));
@@ -491,9 +491,9 @@ fn lock_step(arm: &Arm, commands: u32) -> Option<f64> {
         clock: Clock::LockStep,
         ..ExecutorConfig::new(arm.clone(), limits())
     };
-    let (executor, mut feeder, mut monitor) = Executor::<N>::start(config).ok()?;
+    let (executor, mut sender, mut monitor) = Executor::<N>::start(config).ok()?;
     let start = Instant::now();
-    (0..commands).for_each(|index| feeder.push(command(index)).unwrap());
+    (0..commands).for_each(|index| sender.push(command(index)).unwrap());
     while start.elapsed() < Duration::from_secs(60) {
         while let Some(event) = monitor.event() {
             match event {

@@ -128,9 +128,9 @@ fn reached(answer: &ControlAnswer, first: u64, took: Duration) -> String {
     let at = if answer.resting == 1 {
         "at rest".to_owned()
     } else if answer.held == 1 {
-        format!("slowing, at {:.0} % speed", answer.path_rate * 100.0)
+        format!("slowing, at {:.0} % speed", answer.time_scaling * 100.0)
     } else {
-        format!("moving at {:.0} % speed", answer.path_rate * 100.0)
+        format!("moving at {:.0} % speed", answer.time_scaling * 100.0)
     };
     format!(
         "{at}{held}{fault}; acts from period {first} on, after {} ms",

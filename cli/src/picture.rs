@@ -1,7 +1,7 @@
 use planner::dry_run::{Plan, PlanSample, PlannedCommand};
 use planner::robot::Robot;
 
-use crate::plot::{Drawing, Row, Span, Target};
+use crate::plot::{Drawing, PlotRow, Span, Target};
 
 /// How many states the curves are drawn through: two a pixel.
 const STATES: f64 = 1500.0;
@@ -72,7 +72,7 @@ fn span(command: &PlannedCommand) -> Span {
     }
 }
 
-fn row(robot: &Robot, sample: &PlanSample) -> Row {
+fn row(robot: &Robot, sample: &PlanSample) -> PlotRow {
     let limits = &robot.joints;
     let part = |values: &[f64], of: &[f64]| -> Vec<f64> {
         values
@@ -86,7 +86,7 @@ fn row(robot: &Robot, sample: &PlanSample) -> Row {
         .map(|(q, (lower, upper))| within(*q, *lower, *upper))
         .collect();
     let place = sample.workstation_from_tool.translation;
-    Row {
+    PlotRow {
         time: sample.t_s,
         ratios: [
             position,

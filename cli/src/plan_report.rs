@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use plan::run::Report;
+use plan::run::PlanRunReport;
 use serde::Serialize;
 
 use crate::output;
@@ -31,8 +31,8 @@ pub(crate) struct PlanReport {
     warnings: Vec<String>,
 }
 
-impl From<Report> for PlanReport {
-    fn from(report: Report) -> Self {
+impl From<PlanRunReport> for PlanReport {
+    fn from(report: PlanRunReport) -> Self {
         let counters = report.counters;
         Self {
             outcome: report.outcome,

@@ -47,7 +47,7 @@ impl Progress {
         };
         printer.show(&format!(
             "{BEGIN}{doing}  at ({x:.1}, {y:.1}, {z:.1}) mm  {:.0} % speed  {} commands wait{END}",
-            status.path_rate * 100.0,
+            status.time_scaling * 100.0,
             status.queued
         ));
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use engine::host::GivenProgram;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use planner::recorded::{Row, RunColumns};
+use planner::recorded::{RecordedSample, RunColumns};
 use planner::robot::Robot;
 use recorder::{Recorded, Sample};
 
@@ -75,7 +75,7 @@ impl RecordedFile {
     }
 
     /// The periods of a program, as rows of a run.
-    pub(crate) fn rows(&self, given: &GivenProgram, joints: usize) -> Vec<Row> {
+    pub(crate) fn rows(&self, given: &GivenProgram, joints: usize) -> Vec<RecordedSample> {
         let samples = self.samples(given);
         let first = samples.first().map_or(0, |sample| sample.tick);
         let period = self.content.head.period_ns as f64 * 1e-9;
@@ -86,7 +86,7 @@ impl RecordedFile {
             if sample.path_time > 0.0 && sample.command >= given.first {
                 command = sample.command;
             }
-            rows.push(Row {
+            rows.push(RecordedSample {
                 t_s: (sample.tick - first) as f64 * period,
                 command: command.saturating_sub(given.first) as usize,
                 ..row(sample, joints)
@@ -109,10 +109,10 @@ impl RecordedFile {
     }
 }
 
-fn row(sample: &Sample, joints: usize) -> Row {
+fn row(sample: &Sample, joints: usize) -> RecordedSample {
     let list = |values: &[f64]| values.iter().take(joints).copied().collect::<Vec<_>>();
     let [x, y, z, qw, qx, qy, qz] = sample.tool;
-    Row {
+    RecordedSample {
         t_s: 0.0,
         command: 0,
         joints: list(&sample.position),

@@ -7,7 +7,7 @@ use crate::input;
 
 /// A row of numbers and the line of the file that it is from.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Row {
+pub(crate) struct CsvRow {
     pub(crate) line: u64,
     pub(crate) numbers: Vec<f64>,
 }
@@ -17,12 +17,12 @@ pub(crate) struct Row {
 ///
 /// # Errors
 /// [`Exit::Unreadable`](crate::exit::Exit::Unreadable), with the line, the column, what was expected and what came.
-pub(crate) fn read(path: &str, columns: &[&str]) -> Result<Vec<Row>, Failure> {
+pub(crate) fn read(path: &str, columns: &[&str]) -> Result<Vec<CsvRow>, Failure> {
     let source = input::lines(path)?;
     input::unreadable(path, parse(source, columns))
 }
 
-fn parse(source: impl Read, columns: &[&str]) -> anyhow::Result<Vec<Row>> {
+fn parse(source: impl Read, columns: &[&str]) -> anyhow::Result<Vec<CsvRow>> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -55,7 +55,7 @@ fn parse(source: impl Read, columns: &[&str]) -> anyhow::Result<Vec<Row>> {
             )),
         });
         let numbers = numbers.collect::<anyhow::Result<Vec<_>>>()?;
-        rows.push(Row { line, numbers });
+        rows.push(CsvRow { line, numbers });
     }
     Ok(rows)
 }
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_header_is_left_out_and_faults_have_a_place() {
         let rows = parse(&b"q1,q2\n1, 2\n3,4\n"[..], &["q1", "q2"]).unwrap();
-        let row = |line, numbers: [f64; 2]| Row {
+        let row = |line, numbers: [f64; 2]| CsvRow {
             line,
             numbers: numbers.to_vec(),
         };

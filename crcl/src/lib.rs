@@ -22,7 +22,7 @@ pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, LONGES
 pub use finding::{Finding, Note, Omitted, Severity, code};
 pub use pose::{LARGEST_ANGLE, LARGEST_COORDINATE, ORTHOGONALITY, Pose, PosePart};
 pub use program::{Located, Program, ReadOptions, Reading};
-pub use report::{Look, NoteRecord, Record, Report, records, render};
+pub use report::{FindingsReport, Look, NoteRecord, Record, records, render};
 pub use source::Source;
 pub use units::{AngleUnit, CoordinateFrame, LengthUnit};
 pub use value::ValueError;

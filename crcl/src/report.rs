@@ -22,12 +22,12 @@ pub enum Look {
 
 /// One finding with its source, as a [`miette::Diagnostic`].
 #[derive(Clone, Copy)]
-pub struct Report<'a> {
+pub struct FindingsReport<'a> {
     finding: &'a Finding,
     source: &'a Source,
 }
 
-impl<'a> Report<'a> {
+impl<'a> FindingsReport<'a> {
     /// The finding in its source.
     pub fn new(finding: &'a Finding, source: &'a Source) -> Self {
         Self { finding, source }
@@ -53,15 +53,15 @@ impl<'a> Report<'a> {
     }
 }
 
-impl fmt::Debug for Report<'_> {
+impl fmt::Debug for FindingsReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Report")
+        f.debug_struct("FindingsReport")
             .field("finding", self.finding)
             .finish_non_exhaustive()
     }
 }
 
-impl fmt::Display for Report<'_> {
+impl fmt::Display for FindingsReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_about_file() {
             write!(f, "{}: ", self.source.name())?;
@@ -70,9 +70,9 @@ impl fmt::Display for Report<'_> {
     }
 }
 
-impl std::error::Error for Report<'_> {}
+impl std::error::Error for FindingsReport<'_> {}
 
-impl Diagnostic for Report<'_> {
+impl Diagnostic for FindingsReport<'_> {
     fn code<'b>(&'b self) -> Option<Box<dyn fmt::Display + 'b>> {
         Some(Box::new(self.finding.code))
     }
@@ -127,7 +127,7 @@ pub fn render(
 ) -> String {
     let mut shown = String::new();
     for finding in findings {
-        let report = Report::new(finding, source);
+        let report = FindingsReport::new(finding, source);
         match look {
             Look::Plain => shown += &plain(&report),
             Look::Monochrome => draw(
@@ -143,7 +143,7 @@ pub fn render(
     shown + &tally(findings, omitted)
 }
 
-fn draw(report: &Report, theme: GraphicalTheme, width: usize, shown: &mut String) {
+fn draw(report: &FindingsReport, theme: GraphicalTheme, width: usize, shown: &mut String) {
     let handler = GraphicalReportHandler::new_themed(theme)
         .with_links(false)
         .with_width(width);
@@ -173,7 +173,7 @@ fn tally(findings: &[Finding], omitted: Omitted) -> String {
 }
 
 /// A finding in ASCII lines, with the place first.
-fn plain(report: &Report) -> String {
+fn plain(report: &FindingsReport) -> String {
     let (finding, source) = (report.finding, report.source);
     let severity = match finding.severity {
         Severity::Warning => "warning",

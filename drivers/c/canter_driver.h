@@ -80,7 +80,7 @@ typedef struct {
     uint32_t valid;
     uint32_t reserved_word;
     double path_time;
-    double path_rate;
+    double time_scaling;
     double position[16];
     double velocity[16];
     double acceleration[16];

@@ -10,7 +10,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use ipc::{Arm, ControlAnswer, ControlAsk, ControlServer, Controlled, IpcError};
-use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
+use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 use servo::{Control, Progress, Steering};
 
 /// Time from one look for requests to the next (ns).
@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 const RECOVERY: Duration = Duration::from_secs(3);
 
 /// More than the ordinary, less than the real-time thread.
-const URGENCY: Urgency = Urgency {
+const REAL_TIME: RealTimeRequest = RealTimeRequest {
     priority: 40,
     processor: None,
     lock_memory: false,
@@ -106,7 +106,7 @@ fn run(arm: &Arm, steering: &Steering, ends: &AtomicBool, tell: &SyncSender<Resu
         }
     };
     // What is refused is refused to the real-time thread as well, which has told about it.
-    let _ = urge(URGENCY);
+    let _ = request_real_time(REAL_TIME);
     let _ = tell.send(Ok(()));
     let mut waiting: Vec<Waiting> = Vec::with_capacity(2 * A_LOOK);
     let mut next = now_ns();
@@ -204,7 +204,7 @@ fn report(progress: &Progress) -> ControlAnswer {
         idle: u32::from(progress.idle),
         fault: progress.fault,
         tick: progress.tick,
-        path_rate: progress.path_rate,
+        time_scaling: progress.time_scaling,
         ..ControlAnswer::refuse("")
     }
 }

@@ -304,7 +304,7 @@ fn sample(from: &RunSample) -> Sample {
         tick: from.tick,
         command: from.command,
         path_time: from.path_time,
-        path_rate: from.path_rate,
+        time_scaling: from.time_scaling,
         position: list(&from.q),
         velocity: list(&from.dq),
         acceleration: list(&from.ddq),

@@ -28,7 +28,7 @@ pub struct Queued {
     /// Number of the command, counted from 1 over the life of the queue.
     pub id: u32,
     /// How many aborts there were when it was given: a later one drops it.
-    pub age: u32,
+    pub epoch: u32,
     /// The command.
     pub given: Given,
 }
@@ -69,11 +69,11 @@ impl Queue {
         }
     }
 
-    /// Appends a command that is given after `age` aborts, and returns its number.
+    /// Appends a command that is given after `epoch` aborts, and returns its number.
     ///
     /// # Errors
     /// [`Full`], and the queue is as before.
-    pub fn push(&mut self, given: Given, age: u32) -> Result<u32, Full> {
+    pub fn push(&mut self, given: Given, epoch: u32) -> Result<u32, Full> {
         if self.commands.len() >= self.capacity {
             return Err(Full {
                 capacity: self.capacity,
@@ -81,7 +81,7 @@ impl Queue {
         }
         let id = self.next_id;
         self.next_id += 1;
-        self.commands.push_back(Queued { id, age, given });
+        self.commands.push_back(Queued { id, epoch, given });
         Ok(id)
     }
 
@@ -96,18 +96,18 @@ impl Queue {
         self.commands.front()
     }
 
-    /// All commands count as given at `age`.
-    pub fn renew(&mut self, age: u32) {
+    /// All commands count as given at `epoch`.
+    pub fn renew(&mut self, epoch: u32) {
         for queued in &mut self.commands {
-            queued.age = age;
+            queued.epoch = epoch;
         }
     }
 
-    /// Drops the commands that were given at another age than `age`, and returns how many there
+    /// Drops the commands that were given at another age than `epoch`, and returns how many there
     /// were.
-    pub fn keep(&mut self, age: u32) -> usize {
+    pub fn keep(&mut self, epoch: u32) -> usize {
         let before = self.commands.len();
-        self.commands.retain(|queued| queued.age == age);
+        self.commands.retain(|queued| queued.epoch == epoch);
         before - self.commands.len()
     }
 

@@ -136,7 +136,7 @@ pub struct ControlAnswer {
     /// Servo period of this report: the first in which the order acted, or a later one.
     pub tick: u64,
     /// Share of the planned speed in that period; 0 at rest.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Process number of the client that asked.
     pub process: u32,
     /// For later; 0.
@@ -158,7 +158,7 @@ impl ControlAnswer {
             idle: 0,
             fault: 0,
             tick: 0,
-            path_rate: 0.0,
+            time_scaling: 0.0,
             process: 0,
             reserved: 0,
             asked_ns: 0,

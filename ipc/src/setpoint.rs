@@ -58,7 +58,7 @@ pub struct Setpoint {
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Speed along the path as a share of the planned one, 0..=1.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Joint positions (rad, m).
     pub position: [f64; MAX_JOINTS],
     /// Joint velocities (rad/s, m/s).
@@ -93,7 +93,7 @@ impl Default for Setpoint {
             valid: 0,
             reserved_word: 0,
             path_time: 0.0,
-            path_rate: 0.0,
+            time_scaling: 0.0,
             position: [0.0; MAX_JOINTS],
             velocity: [0.0; MAX_JOINTS],
             acceleration: [0.0; MAX_JOINTS],

@@ -162,7 +162,9 @@ fn setpoint() -> Message {
                 &m.reserved_word
             }),
             field("path_time", offset_of!(M, path_time), |m: &M| &m.path_time),
-            field("path_rate", offset_of!(M, path_rate), |m: &M| &m.path_rate),
+            field("time_scaling", offset_of!(M, time_scaling), |m: &M| {
+                &m.time_scaling
+            }),
             field("position", offset_of!(M, position), |m: &M| &m.position),
             field("velocity", offset_of!(M, velocity), |m: &M| &m.velocity),
             field("acceleration", offset_of!(M, acceleration), |m: &M| {

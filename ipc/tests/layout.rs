@@ -22,7 +22,7 @@ fn setpoint() {
         (offset_of!(Setpoint, flags), 76),
         (offset_of!(Setpoint, valid), 80),
         (offset_of!(Setpoint, path_time), 88),
-        (offset_of!(Setpoint, path_rate), 96),
+        (offset_of!(Setpoint, time_scaling), 96),
         (offset_of!(Setpoint, position), 104),
         (offset_of!(Setpoint, velocity), 232),
         (offset_of!(Setpoint, acceleration), 360),

@@ -1,7 +1,7 @@
 //! A serial arm as flat data: forward kinematics, Jacobian, limits.
 
 use crate::arith::{Arith, Build, Op, Plain};
-use crate::links::{Line, Links, Reached};
+use crate::links::{Links, Reached, ScrewAxis};
 use crate::urdf::{JointKind, Model};
 use crate::wide::{F4, transposed};
 use nalgebra::{ArrayStorage, Isometry3, Point3, SMatrix, SVector, Vector3};
@@ -209,14 +209,14 @@ impl<const N: usize> Chain<N> {
     }
 
     /// Axes of the joints and pose of the tool with all joints at zero; `None` where a joint slides.
-    pub(crate) fn lines(&self) -> Option<(Vec<Line>, Isometry3<f64>)> {
+    pub(crate) fn lines(&self) -> Option<(Vec<ScrewAxis>, Isometry3<f64>)> {
         if !self.links.all_turn() {
             return None;
         }
         let reached = self.links.reach(Plain, &SVector::zeros());
         let first = |v: F4<Plain>| [v.array()[0], v.array()[1], v.array()[2]];
         let lines = reached.points.into_iter().zip(reached.axes);
-        let lines = lines.map(|(p, h)| Line {
+        let lines = lines.map(|(p, h)| ScrewAxis {
             h: first(h),
             p: first(p),
         });

@@ -7,10 +7,10 @@
 //! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
 //! as near a singular pose, where joints turn fast over a short way.
 
-mod course;
 mod differential;
 mod error;
 mod linear;
+mod null_space_path;
 mod redundancy;
 mod trace;
 
@@ -49,7 +49,7 @@ pub struct FollowOptions {
     pub accuracy: f64,
     /// Most points, those that are added included.
     pub most_points: usize,
-    /// Whether the spare motion of an arm with more than six joints rests at both ends: so
+    /// Whether the null-space motion of an arm with more than six joints rests at both ends: so
     /// where the parameter is a time and the tool itself rests there.
     pub still_ends: bool,
 }
@@ -71,8 +71,8 @@ impl Default for FollowOptions {
 /// where the arm stands: `tool(grid[0])` must be its pose there. Returned are the
 /// grid's points and those added between.
 ///
-/// Arms with more than six joints choose their spare motion over the whole path:
-/// still if that keeps them well inside their limits, else along the smooth course
+/// Arms with more than six joints choose their null-space motion over the whole path:
+/// still if that keeps them well inside their limits, else along the smooth polynomial
 /// that stays farthest from limits and singular poses.
 ///
 /// # Errors
@@ -106,6 +106,6 @@ pub fn follow<const N: usize>(
     if N > 6 {
         redundancy::resolve(&task, start)
     } else {
-        task.trace(start, &redundancy::Spare::none())
+        task.trace(start, &redundancy::NullSpace::none())
     }
 }

@@ -4,21 +4,21 @@ mod classify;
 mod closed;
 mod frames;
 mod goal;
-mod lanes;
 mod numeric;
 mod orient;
 mod polish;
 mod product;
 mod report;
+mod simd;
 mod six;
 mod solving;
 mod swivel;
 mod turns;
 
 pub use goal::Goal;
-pub(crate) use goal::{LENGTH, Miss};
+pub(crate) use goal::{LENGTH, PoseError};
 pub(crate) use numeric::restart;
-pub use report::{Branches, MOST_BRANCHES, Obstacle, Report, Solution};
+pub use report::{Branches, IkFailure, IkReport, MOST_BRANCHES, Solution};
 
 use crate::chain::Chain;
 use crate::frame::Frame;
@@ -26,7 +26,7 @@ use crate::measure;
 use closed::{Branching, Closed, Raw};
 use goal::Target;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector};
-use numeric::{Descent, Landing, Stop};
+use numeric::{Descent, SolverResult, Stop};
 use std::f64::consts::PI;
 
 /// Restarts before a goal counts as not reached.
@@ -129,8 +129,8 @@ impl<const N: usize> Solver<N> {
     /// the joint ranges.
     ///
     /// # Errors
-    /// [`Report`]: what is in the way, and the nearest pose that was found.
-    pub fn solve(&self, pose: &Isometry3<f64>) -> Result<Solution<N>, Report<N>> {
+    /// [`IkReport`]: what is in the way, and the nearest pose that was found.
+    pub fn solve(&self, pose: &Isometry3<f64>) -> Result<Solution<N>, IkReport<N>> {
         self.nearest(pose, &numeric::restart(&self.chain, 0))
     }
 
@@ -139,12 +139,12 @@ impl<const N: usize> Solver<N> {
     /// [`Solver::parameter`]) where they can, and else the nearest that works.
     ///
     /// # Errors
-    /// [`Report`]: what is in the way, and the nearest pose that was found.
+    /// [`IkReport`]: what is in the way, and the nearest pose that was found.
     pub fn nearest(
         &self,
         pose: &Isometry3<f64>,
         seed: &SVector<f64, N>,
-    ) -> Result<Solution<N>, Report<N>> {
+    ) -> Result<Solution<N>, IkReport<N>> {
         let Some(closed) = &self.closed else {
             return self.reach(&Goal::Pose(*pose), seed);
         };
@@ -152,7 +152,7 @@ impl<const N: usize> Solver<N> {
         if let Some(solution) = self.nearest_at(closed, pose, seed, parameter) {
             return Ok(solution);
         }
-        if closed.spare() {
+        if closed.is_redundant() {
             for step in [0.1, 0.25, 0.5, 0.9, 1.4, 2.0, 3.0] {
                 for side in [step, -step] {
                     let moved = self.nearest_at(closed, pose, seed, parameter + side);
@@ -214,7 +214,7 @@ impl<const N: usize> Solver<N> {
     #[must_use]
     pub fn parameters(&self, count: usize) -> Vec<f64> {
         match &self.closed {
-            Some(closed) if closed.spare() => (0..count)
+            Some(closed) if closed.is_redundant() => (0..count)
                 .map(|i| self.parameter_at(closed, (i as f64 + 0.5) / count as f64))
                 .collect(),
             _ => vec![0.0],
@@ -254,15 +254,15 @@ impl<const N: usize> Solver<N> {
     /// Distance (m) and angle (rad) of the tool at `q` from a pose.
     #[must_use]
     pub fn error(&self, pose: &Isometry3<f64>, q: &SVector<f64, N>) -> (f64, f64) {
-        let (miss, _) = self.miss_at(&Goal::Pose(*pose), q);
-        (miss.position, miss.rotation)
+        let (pose_error, _) = self.pose_error_at(&Goal::Pose(*pose), q);
+        (pose_error.position, pose_error.rotation)
     }
 
     /// Reaches any kind of goal, from `seed` and then from a fixed sequence of restarts.
     ///
     /// # Errors
-    /// [`Report`]: what is in the way, and the nearest pose that was found.
-    pub fn reach(&self, goal: &Goal, seed: &SVector<f64, N>) -> Result<Solution<N>, Report<N>> {
+    /// [`IkReport`]: what is in the way, and the nearest pose that was found.
+    pub fn reach(&self, goal: &Goal, seed: &SVector<f64, N>) -> Result<Solution<N>, IkReport<N>> {
         let target = goal.target();
         let mut best = self.descend(&target, seed, self.stop);
         for index in 0..RESTARTS {
@@ -287,15 +287,15 @@ impl<const N: usize> Solver<N> {
     /// Follows a goal that moved a little since `seed`: no restarts, a bounded number of steps.
     ///
     /// # Errors
-    /// [`Report`] as for [`Solver::reach`], with [`Obstacle::Singular`] where the
+    /// [`IkReport`] as for [`Solver::reach`], with [`IkFailure::Singular`] where the
     /// arm cannot move on.
-    pub fn track(&self, goal: &Goal, seed: &SVector<f64, N>) -> Result<Solution<N>, Report<N>> {
-        let landing = self.descend(&goal.target(), seed, self.stop);
-        if landing.reached {
-            return Ok(self.solution(&landing, seed));
+    pub fn track(&self, goal: &Goal, seed: &SVector<f64, N>) -> Result<Solution<N>, IkReport<N>> {
+        let result = self.descend(&goal.target(), seed, self.stop);
+        if result.reached {
+            return Ok(self.solution(&result, seed));
         }
-        let smallest = measure::dexterity(&self.chain, &landing.q).smallest;
-        Err(self.report_with(&landing, Obstacle::Singular { smallest }))
+        let smallest = measure::dexterity(&self.chain, &result.q).smallest;
+        Err(self.report_with(&result, IkFailure::Singular { smallest }))
     }
 
     /// Solutions found from the whole sequence of restarts, each once.
@@ -303,24 +303,31 @@ impl<const N: usize> Solver<N> {
         let target = Goal::Pose(*pose).target();
         let mut found = Branches::new();
         for index in 0..SEARCH {
-            let landing = self.restarted(&target, index);
+            let result = self.restarted(&target, index);
             let known =
-                |other: &Solution<N>| turns::distance(&self.chain, &other.q, &landing.q) < 1e-5;
-            if landing.reached && !found.iter().any(known) {
-                found.push(self.solution(&landing, &SVector::zeros()));
+                |other: &Solution<N>| turns::distance(&self.chain, &other.q, &result.q) < 1e-5;
+            if result.reached && !found.iter().any(known) {
+                found.push(self.solution(&result, &SVector::zeros()));
             }
         }
         found
     }
 
     /// Distance of the tool from a goal at `q`, and the Jacobian there.
-    pub(crate) fn miss_at(&self, goal: &Goal, q: &SVector<f64, N>) -> (Miss, SMatrix<f64, 6, N>) {
+    pub(crate) fn pose_error_at(
+        &self,
+        goal: &Goal,
+        q: &SVector<f64, N>,
+    ) -> (PoseError, SMatrix<f64, 6, N>) {
         let (tool, jacobian) = self.chain.jacobian(q);
         let tool = Frame::from_isometry(&tool);
-        (goal.target().miss(crate::arith::Plain, &tool), jacobian)
+        (
+            goal.target().pose_error(crate::arith::Plain, &tool),
+            jacobian,
+        )
     }
 
-    fn descend(&self, target: &Target, seed: &SVector<f64, N>, stop: Stop) -> Landing<N> {
+    fn descend(&self, target: &Target, seed: &SVector<f64, N>, stop: Stop) -> SolverResult<N> {
         self.chain.build().run(Descent {
             chain: &self.chain,
             target,
@@ -331,10 +338,10 @@ impl<const N: usize> Solver<N> {
 
     /// One restart. Every first of two walks through the limits, which gets it past
     /// corners that they form; where it ends outside it goes on from the nearest corner.
-    fn restarted(&self, target: &Target, index: u32) -> Landing<N> {
+    fn restarted(&self, target: &Target, index: u32) -> SolverResult<N> {
         let seed = numeric::restart(&self.chain, index);
         let limits = index % 2 == 1;
-        let mut landing = self.descend(
+        let mut result = self.descend(
             target,
             &seed,
             Stop {
@@ -343,13 +350,13 @@ impl<const N: usize> Solver<N> {
             },
         );
         if !limits {
-            landing.q = turns::nearest(&self.chain, &landing.q, &seed);
-            if !self.chain.within_limits(&landing.q, 0.0) {
+            result.q = turns::nearest(&self.chain, &result.q, &seed);
+            if !self.chain.within_limits(&result.q, 0.0) {
                 // Near the goal, but outside: from the nearest corner it may be reached.
-                landing = self.descend(target, &self.clamped(&landing.q), self.stop);
+                result = self.descend(target, &self.clamped(&result.q), self.stop);
             }
         }
-        landing
+        result
     }
 
     /// The nearest joint position inside the limits.
@@ -357,9 +364,9 @@ impl<const N: usize> Solver<N> {
         SVector::from_fn(|i, _| q[i].max(self.chain.lower()[i]).min(self.chain.upper()[i]))
     }
 
-    fn solution(&self, landing: &Landing<N>, seed: &SVector<f64, N>) -> Solution<N> {
+    fn solution(&self, result: &SolverResult<N>, seed: &SVector<f64, N>) -> Solution<N> {
         Solution {
-            q: turns::nearest(&self.chain, &landing.q, seed),
+            q: turns::nearest(&self.chain, &result.q, seed),
             branch: None,
         }
     }
@@ -452,7 +459,7 @@ impl<const N: usize> Solver<N> {
 
     /// Finds out why a goal was not reached.
     #[cold]
-    fn report(&self, goal: &Goal, best: &Landing<N>) -> Report<N> {
+    fn report(&self, goal: &Goal, best: &SolverResult<N>) -> IkReport<N> {
         let (point, pose) = match goal {
             Goal::Pose(pose) => (pose.translation.vector.into(), Some(pose)),
             Goal::Position(point) | Goal::Axis(point, _) => (*point, None),
@@ -460,14 +467,14 @@ impl<const N: usize> Solver<N> {
         let finite = point.coords.iter().all(|x| x.is_finite())
             && pose.is_none_or(|pose| pose.rotation.coords.iter().all(|x| x.is_finite()));
         if !finite {
-            return self.report_with(best, Obstacle::NotFinite);
+            return self.report_with(best, IkFailure::NotFinite);
         }
         // A failed search for the position alone settles that it is the distance.
         let place = self.best_place(point, &best.q);
         if !place.reached {
             return self.report_with(
                 best,
-                Obstacle::OutOfReach {
+                IkFailure::OutOfReach {
                     distance: place.position,
                 },
             );
@@ -485,16 +492,16 @@ impl<const N: usize> Solver<N> {
             let q = turns::nearest(&self.chain, &free.q, &best.q);
             let (joint, beyond) = self.worst_joint(&q);
             if beyond > 1e-9 {
-                return self.report_with(best, Obstacle::AtLimit { joint, beyond });
+                return self.report_with(best, IkFailure::AtLimit { joint, beyond });
             }
         }
         if best.position < 1e-4 && best.rotation < 1e-4 {
             let smallest = measure::dexterity(&self.chain, &best.q).smallest;
-            return self.report_with(best, Obstacle::Singular { smallest });
+            return self.report_with(best, IkFailure::Singular { smallest });
         }
         self.report_with(
             best,
-            Obstacle::Orientation {
+            IkFailure::Orientation {
                 angle: best.rotation,
             },
         )
@@ -510,7 +517,7 @@ impl<const N: usize> Solver<N> {
     }
 
     /// The nearest that the tool comes to a position, turned as it likes.
-    fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> Landing<N> {
+    fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
         let target = Goal::Position(point).target();
         let mut best = self.descend(&target, seed, self.stop);
         for index in 0..PLACES {
@@ -525,7 +532,13 @@ impl<const N: usize> Solver<N> {
         best
     }
 
-    fn best_of(&self, goal: &Goal, tries: u32, stop: Stop, seed: &SVector<f64, N>) -> Landing<N> {
+    fn best_of(
+        &self,
+        goal: &Goal,
+        tries: u32,
+        stop: Stop,
+        seed: &SVector<f64, N>,
+    ) -> SolverResult<N> {
         let target = goal.target();
         let mut best = self.descend(&target, seed, stop);
         for index in 0..tries {
@@ -549,9 +562,9 @@ impl<const N: usize> Solver<N> {
             .unwrap_or((0, 0.0))
     }
 
-    fn report_with(&self, best: &Landing<N>, obstacle: Obstacle) -> Report<N> {
-        Report {
-            obstacle,
+    fn report_with(&self, best: &SolverResult<N>, failure: IkFailure) -> IkReport<N> {
+        IkReport {
+            failure,
             nearest: best.q,
             nearest_pose: self.chain.forward(&best.q),
             position_error: best.position,
@@ -561,6 +574,6 @@ impl<const N: usize> Solver<N> {
 }
 
 /// Distance of a landing from its goal, lengths in units of [`LENGTH`].
-fn score<const N: usize>(landing: &Landing<N>) -> f64 {
-    (landing.position / LENGTH).hypot(landing.rotation)
+fn score<const N: usize>(result: &SolverResult<N>) -> f64 {
+    (result.position / LENGTH).hypot(result.rotation)
 }

@@ -29,6 +29,6 @@ mod wide;
 
 pub use chain::Chain;
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
-pub use ik::{Branches, Goal, Obstacle, Report, Solution, Solver};
+pub use ik::{Branches, Goal, IkFailure, IkReport, Solution, Solver};
 pub use motion::{ToolGrowth, ToolMotion};
 pub use urdf::{Model, UrdfError};

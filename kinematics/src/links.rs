@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, SVector, Vector3};
 
 /// An axis with all joints at zero: its direction and a point on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct ScrewAxis {
     pub(crate) h: [f64; 3],
     pub(crate) p: [f64; 3],
 }
@@ -59,9 +59,9 @@ impl<const N: usize> Links<N> {
     /// The links of a model with `N` joints, from its base to its flange.
     pub(crate) fn of(model: &Model) -> Self {
         let mut place = Isometry3::identity();
-        let lines: [Line; N] = std::array::from_fn(|i| {
+        let lines: [ScrewAxis; N] = std::array::from_fn(|i| {
             place *= model.frames[i];
-            Line {
+            ScrewAxis {
                 h: (place.rotation * model.axes[i]).into_inner().into(),
                 p: place.translation.vector.into(),
             }
@@ -77,7 +77,7 @@ impl<const N: usize> Links<N> {
 
     /// The links between turning joints on axes, and the frame of the last joint as that of
     /// the end.
-    fn along(lines: &[Line; N]) -> Self {
+    fn along(lines: &[ScrewAxis; N]) -> Self {
         let z = lines.map(|line| Vector3::from(line.h));
         let mut x = [Vector3::from(across(lines[0].h)); N];
         let mut origins = [Vector3::from(lines[0].p); N];
@@ -203,7 +203,7 @@ pub(crate) fn normal(from: &Vector3<f64>, to: &Vector3<f64>, way: &Vector3<f64>)
 const PARALLEL: f64 = 1e-14;
 
 /// The point of an axis that is nearest to `point`.
-pub(crate) fn foot(line: &Line, point: &Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn foot(line: &ScrewAxis, point: &Vector3<f64>) -> Vector3<f64> {
     let (h, p) = (Vector3::from(line.h), Vector3::from(line.p));
     p + h * h.dot(&(point - p))
 }

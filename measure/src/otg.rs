@@ -9,7 +9,7 @@ use crate::{Ends, Problems};
 
 /// One line of the benchmark: planning times of random problems, and whether the moves are sound.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct OtgRow {
     /// Number of joints.
     pub joints: usize,
     /// Which ends of the moves are in motion.
@@ -45,7 +45,7 @@ const PASSES: usize = 5;
 /// assert_eq!(table.len(), 5);
 /// assert!(table.iter().all(|row| row.failed == 0 && row.worst < 1e-12));
 /// ```
-pub fn bench(seed: u64, count: usize) -> Vec<Row> {
+pub fn bench(seed: u64, count: usize) -> Vec<OtgRow> {
     vec![
         row::<3>(seed, Ends::Moving, count),
         row::<6>(seed, Ends::Moving, count),
@@ -55,7 +55,7 @@ pub fn bench(seed: u64, count: usize) -> Vec<Row> {
     ]
 }
 
-fn row<const N: usize>(seed: u64, ends: Ends, count: usize) -> Row {
+fn row<const N: usize>(seed: u64, ends: Ends, count: usize) -> OtgRow {
     let mut source = Problems::new(seed, ends);
     let problems: Vec<Problem<N>> = (0..count).map(|_| source.draw()).collect();
     let mut times = vec![f64::INFINITY; count];
@@ -84,7 +84,7 @@ fn row<const N: usize>(seed: u64, ends: Ends, count: usize) -> Row {
             .unwrap_or(0.0)
     };
     let (failed, move_s, worst) = outcome(&problems);
-    Row {
+    OtgRow {
         joints: N,
         ends,
         count,

@@ -99,7 +99,7 @@ pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
         }
     };
     let deviations = plan
-        .passes()
+        .crossings()
         .iter()
         .map(|pass| ratio(pass.deviation, pass.tolerance));
     Measure {

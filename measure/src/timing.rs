@@ -9,7 +9,7 @@ use crate::RandomPaths;
 /// One line of the benchmark: random spline paths of so many joints and waypoints, each timed
 /// with pieces and certificate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct TimingRow {
     /// Number of joints.
     pub joints: usize,
     /// Waypoints of a path.
@@ -44,7 +44,7 @@ const PASSES: usize = 3;
 /// assert_eq!(table.len(), 5);
 /// assert!(table.iter().all(|row| row.failed == 0 && row.uncertified == 0));
 /// ```
-pub fn bench(seed: u64, count: usize) -> Vec<Row> {
+pub fn bench(seed: u64, count: usize) -> Vec<TimingRow> {
     vec![
         row::<3>(seed, 11, count),
         row::<6>(seed, 11, count),
@@ -54,10 +54,10 @@ pub fn bench(seed: u64, count: usize) -> Vec<Row> {
     ]
 }
 
-fn row<const N: usize>(seed: u64, waypoints: usize, count: usize) -> Row {
+fn row<const N: usize>(seed: u64, waypoints: usize, count: usize) -> TimingRow {
     let limits = RandomPaths::<N>::limits();
     let options = TimingOptions::default();
-    let mut row = Row {
+    let mut row = TimingRow {
         joints: N,
         waypoints,
         count,

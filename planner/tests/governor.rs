@@ -14,7 +14,7 @@ use planner::robot::{load, vector};
 use planner::task::{Move, Shape, Task};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use realtime::{Cycle, Demand, Limits, Manner, Segment};
+use realtime::{Cycle, Demand, Limits, Segment, StopCategory};
 
 const PERIOD: f64 = 0.001;
 /// Distance of the tool from the path (m) that rounding may cause.
@@ -262,8 +262,8 @@ fn demand() -> impl Strategy<Value = Demand> {
         4 => (0.0..1.0_f64).prop_map(Demand::Run),
         2 => Just(Demand::Run(1.0)),
         1 => Just(Demand::Run(0.0)),
-        2 => Just(Demand::Stop(Manner::Gentle)),
-        2 => Just(Demand::Stop(Manner::Fast)),
+        2 => Just(Demand::Stop(StopCategory::Gentle)),
+        2 => Just(Demand::Stop(StopCategory::Fast)),
     ]
 }
 

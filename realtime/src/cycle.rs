@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use crate::brake::{at_rest, brake};
 use crate::buffer::{Buffer, Cursor, Pushed};
-use crate::governor::{Aim, Governor, Manner, Outlook, scale};
+use crate::governor::{Aim, Governor, Outlook, StopCategory, scale};
 use crate::guard::{Trip, check};
 use crate::{Limits, Sample, Segment};
 
@@ -14,7 +14,7 @@ pub enum Demand {
     /// Go along the path with this share of the planned speed, 0..=1.
     Run(f64),
     /// Stop on the path and wait.
-    Stop(Manner),
+    Stop(StopCategory),
 }
 
 /// What one period gave.
@@ -27,7 +27,7 @@ pub struct Step<const N: usize> {
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Share of the planned speed.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// A command that ended at rest with this setpoint.
     pub finished: Option<u32>,
     /// A command that starts with this setpoint, at rest.
@@ -149,7 +149,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
     }
 
     /// Share of the planned speed.
-    pub fn path_rate(&self) -> f64 {
+    pub fn time_scaling(&self) -> f64 {
         self.governor.factor
     }
 
@@ -217,7 +217,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
             setpoint: self.setpoint,
             command: self.command,
             path_time: self.path_time,
-            path_rate: self.governor.factor,
+            time_scaling: self.governor.factor,
             finished,
             started,
             resting: self.is_resting(),
@@ -283,16 +283,18 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
 
     /// What the path factor shall become.
     fn aim(&self, demand: Demand) -> Aim {
-        let (target, manner) = match demand {
-            Demand::Run(share) if share.is_finite() => (share.clamp(0.0, 1.0), Manner::Gentle),
-            Demand::Run(_) => (0.0, Manner::Gentle),
-            Demand::Stop(manner) => (0.0, manner),
+        let (target, category) = match demand {
+            Demand::Run(share) if share.is_finite() => {
+                (share.clamp(0.0, 1.0), StopCategory::Gentle)
+            }
+            Demand::Run(_) => (0.0, StopCategory::Gentle),
+            Demand::Stop(category) => (0.0, category),
         };
         let period = self.period;
         if self.buffer.has_end() {
             return Aim {
                 target,
-                manner,
+                category,
                 period,
             };
         }
@@ -300,7 +302,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         let target = target.min(supply.clamp(0.0, 1.0));
         Aim {
             target: if target < 1e-3 { 0.0 } else { target },
-            manner,
+            category,
             period,
         }
     }

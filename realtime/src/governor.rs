@@ -22,7 +22,7 @@ use crate::{Limits, Sample};
 
 /// How hard the path factor is changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Manner {
+pub enum StopCategory {
     /// For pause, resume, override: a full stop takes about a third of a second where the joints
     /// can.
     Gentle,
@@ -30,7 +30,7 @@ pub enum Manner {
     Fast,
 }
 
-impl Manner {
+impl StopCategory {
     const fn bounds(self) -> (Bounds, f64) {
         match self {
             Self::Gentle => (
@@ -75,7 +75,7 @@ pub(crate) struct Governor {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Aim {
     pub(crate) target: f64,
-    pub(crate) manner: Manner,
+    pub(crate) category: StopCategory,
     pub(crate) period: f64,
 }
 
@@ -96,7 +96,7 @@ struct Candidate {
 
 /// A state of the simulation.
 #[derive(Clone, Copy, Debug)]
-struct Pace {
+struct ScalingState {
     factor: f64,
     rate: f64,
     change: f64,
@@ -184,7 +184,7 @@ impl Governor {
         outlook: &Outlook<'_, N, B>,
         aim: Aim,
     ) -> Bounds {
-        let (mut bounds, share) = aim.manner.bounds();
+        let (mut bounds, share) = aim.category.bounds();
         if let Some(plan) = outlook.buffer.sample(outlook.at) {
             let limits = outlook
                 .limits
@@ -214,12 +214,12 @@ impl Governor {
             return false;
         }
         let change = (candidate.rate - self.rate) / period;
-        let now = Pace {
+        let now = ScalingState {
             factor: self.factor,
             rate: self.rate,
             change,
         };
-        let after = Pace {
+        let after = ScalingState {
             factor,
             rate: candidate.rate,
             change,
@@ -237,7 +237,7 @@ impl Governor {
 /// Whether a ramp of `duration` (s) from `start` to rate zero keeps all limits.
 fn ramp_is_safe<const N: usize, const B: usize>(
     outlook: &Outlook<'_, N, B>,
-    start: Pace,
+    start: ScalingState,
     duration: f64,
 ) -> bool {
     if duration <= 0.0 {
@@ -246,7 +246,7 @@ fn ramp_is_safe<const N: usize, const B: usize>(
     let change = -start.rate / duration;
     let samples = libm::ceil(duration / LOOK_AHEAD * SAMPLES).clamp(4.0, SAMPLES);
     let step = duration / samples;
-    let mut pace = Pace { change, ..start };
+    let mut pace = ScalingState { change, ..start };
     let mut at = outlook.at;
     for _ in 0..samples as u32 {
         if !keeps(outlook, at, pace) {
@@ -271,7 +271,7 @@ fn ramp_is_safe<const N: usize, const B: usize>(
 fn keeps<const N: usize, const B: usize>(
     outlook: &Outlook<'_, N, B>,
     at: Cursor,
-    pace: Pace,
+    pace: ScalingState,
 ) -> bool {
     // The limits hold between the samples of a simulation too; there, jerk has its peaks.
     const MARGIN: f64 = 0.97;

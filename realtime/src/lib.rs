@@ -32,7 +32,7 @@ pub use approach::{Bounds, next_rate, ramp_periods};
 pub use brake::{at_rest, brake};
 pub use buffer::Pushed;
 pub use cycle::{Cycle, Demand, Step};
-pub use governor::Manner;
+pub use governor::StopCategory;
 pub use guard::{Following, Quantity, Trip, check, check_following};
 pub use limits::Limits;
 pub use piece::{Piece, Sample, Segment};

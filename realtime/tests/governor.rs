@@ -11,7 +11,7 @@
 use nalgebra::SVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use realtime::{Cycle, Demand, Limits, Manner, Piece, Pushed, Sample, Segment};
+use realtime::{Cycle, Demand, Limits, Piece, Pushed, Sample, Segment, StopCategory};
 
 const N: usize = 3;
 type Joints = SVector<f64, N>;
@@ -104,8 +104,8 @@ fn demand() -> impl Strategy<Value = Demand> {
         4 => (0.0..1.0_f64).prop_map(Demand::Run),
         2 => Just(Demand::Run(1.0)),
         1 => Just(Demand::Run(0.0)),
-        2 => Just(Demand::Stop(Manner::Gentle)),
-        2 => Just(Demand::Stop(Manner::Fast)),
+        2 => Just(Demand::Stop(StopCategory::Gentle)),
+        2 => Just(Demand::Stop(StopCategory::Fast)),
     ]
 }
 
@@ -257,16 +257,16 @@ proptest! {
         for _ in 0..(at * total * 1000.0) as usize {
             cycle.step(Demand::Run(1.0));
         }
-        let manner = if fast { Manner::Fast } else { Manner::Gentle };
+        let category = if fast { StopCategory::Fast } else { StopCategory::Gentle };
         let mut periods = 0;
         while !cycle.is_resting() {
-            cycle.step(Demand::Stop(manner));
+            cycle.step(Demand::Stop(category));
             periods += 1;
             prop_assert!(periods < 1000, "no rest after a second");
         }
         let there = cycle.setpoint().position;
         for _ in 0..50 {
-            prop_assert_eq!(cycle.step(Demand::Stop(manner)).setpoint.position, there);
+            prop_assert_eq!(cycle.step(Demand::Stop(category)).setpoint.position, there);
         }
     }
 

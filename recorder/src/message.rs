@@ -40,7 +40,7 @@ pub(crate) fn setpoint(time_ns: u64, sample: &Sample, joints: usize) -> Vec<u8> 
     out.u64(sample.tick);
     out.u32(sample.command);
     out.f64(sample.path_time);
-    out.f64(sample.path_rate);
+    out.f64(sample.time_scaling);
     for list in [&sample.position, &sample.velocity, &sample.acceleration] {
         out.numbers(list.get(..joints).unwrap_or(list));
     }
@@ -56,7 +56,7 @@ pub(crate) fn setpoint_of(message: &[u8]) -> Option<Sample> {
         tick: from.u64()?,
         command: from.u32()?,
         path_time: from.f64()?,
-        path_rate: from.f64()?,
+        time_scaling: from.f64()?,
         position: from.numbers()?,
         velocity: from.numbers()?,
         acceleration: from.numbers()?,

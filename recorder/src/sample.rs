@@ -14,7 +14,7 @@ pub struct Sample {
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Speed along the path as a share of the planned one, 0..=1.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Joint positions published (rad, m).
     pub position: [f64; MAX_JOINTS],
     /// Joint velocities published (rad/s, m/s).

@@ -97,7 +97,7 @@ pub(crate) const SETPOINT: Schema = Schema {
     text: concat!(
         "# What the joints shall do in one servo period: rad or m, per s, per s2.\n",
         "std_msgs/Header header\nuint64 tick\nuint32 command\nfloat64 path_time\n",
-        "float64 path_rate\nfloat64[] position\nfloat64[] velocity\nfloat64[] acceleration\n",
+        "float64 time_scaling\nfloat64[] position\nfloat64[] velocity\nfloat64[] acceleration\n",
         "# The controlled point in the workstation: x, y, z (m), qw, qx, qy, qz.\n",
         "float64[] tool\n",
         header!()

@@ -41,7 +41,7 @@ fn sample(tick: u64) -> Sample {
         tick,
         command: 1 + (tick / 1000) as u32,
         path_time: t,
-        path_rate: 1.0,
+        time_scaling: 1.0,
         position: list(t.sin(), t.cos()),
         velocity: list(t.cos(), -t.sin()),
         acceleration: list(-t.sin(), -t.cos()),

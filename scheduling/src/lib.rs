@@ -5,7 +5,7 @@
 //! knows a robot, a message or a period.
 
 mod clock;
-mod urgency;
+mod real_time;
 
 pub use clock::{now_ns, sleep_until_ns};
-pub use urgency::{Granted, Urgency, urge};
+pub use real_time::{Granted, RealTimeRequest, request_real_time};

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use ipc::{Arm, Clock, IpcError};
 use realtime::{Following, Limits};
-use scheduling::Urgency;
+use scheduling::RealTimeRequest;
 use thiserror::Error;
 
 /// What the real-time thread needs to know.
@@ -29,9 +29,9 @@ pub struct ExecutorConfig<const N: usize> {
     /// [`ipc::model_hash`] of the robot; 0 is any.
     pub model: u64,
     /// What the thread asks of the operating system; nothing of it in lock-step.
-    pub urgency: Urgency,
+    pub real_time: RealTimeRequest,
     /// In lock-step: time stands while the planner thinks or there is nothing to do, so that the
-    /// same program gives the same periods. The planner must tell: [`super::Feeder::settle`].
+    /// same program gives the same periods. The planner must tell: [`super::SegmentSender::settle`].
     pub wait_for_planner: bool,
     /// Whether each setpoint and measured position is recorded for [`super::Monitor::sample`].
     pub record: bool,
@@ -53,7 +53,7 @@ impl<const N: usize> ExecutorConfig<N> {
             patience: Duration::from_millis(100),
             connect: Duration::from_secs(3),
             model: 0,
-            urgency: Urgency::default(),
+            real_time: RealTimeRequest::default(),
             wait_for_planner: false,
             record: false,
         }

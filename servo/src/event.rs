@@ -144,7 +144,7 @@ pub struct Recorded<const N: usize> {
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Share of the planned speed.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// What was published.
     pub setpoint: Sample<N>,
     /// Positions of the last state before the next setpoint (rad).

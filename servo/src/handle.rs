@@ -4,10 +4,10 @@ use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
 
 use super::config::{ExecutorConfig, ExecutorError};
-use super::feed::Feeder;
 use super::monitor::Monitor;
 use super::remote::Remote;
 use super::runner::Runner;
+use super::segment_sender::SegmentSender;
 use super::thread;
 
 /// Stack of the real-time thread (bytes).
@@ -33,9 +33,9 @@ impl<const N: usize> Executor<N> {
     /// another engine on the same arm.
     pub fn start(
         config: ExecutorConfig<N>,
-    ) -> Result<(Self, Feeder<N>, Monitor<N>), ExecutorError> {
+    ) -> Result<(Self, SegmentSender<N>, Monitor<N>), ExecutorError> {
         config.check()?;
-        let (runner, feeder, remote, monitor) = Runner::new(config.clone());
+        let (runner, sender, remote, monitor) = Runner::new(config.clone());
         let (tell, started) = mpsc::sync_channel(1);
         let thread = Builder::new()
             .name("servo".to_owned())
@@ -58,7 +58,7 @@ impl<const N: usize> Executor<N> {
                     warning,
                     driver,
                 };
-                Ok((executor, feeder, monitor))
+                Ok((executor, sender, monitor))
             }
             Err(error) => {
                 // The thread has ended or is about to; what it would say has been said.

@@ -1,7 +1,7 @@
 //! The real-time thread and its link to the driver.
 //!
 //! [`Executor::start`] opens a session with the driver and starts the thread. Beside the
-//! [`Executor`] itself there are three ends, each for one thread of the engine: a [`Feeder`] for
+//! [`Executor`] itself there are three ends, each for one thread of the engine: a [`SegmentSender`] for
 //! the planner (segments and tool orders, in order), a [`Remote`] for anyone (pause, override,
 //! stop, where the arm is; [`Steering`] is the part of it that knows no joints), and a [`Monitor`]
 //! for reports (events, samples).
@@ -21,22 +21,22 @@
 mod config;
 mod control;
 mod event;
-mod feed;
 mod handle;
 mod histogram;
 mod monitor;
 mod orders;
 mod remote;
 mod runner;
+mod segment_sender;
 mod thread;
 
 pub use config::{ExecutorConfig, ExecutorError};
 pub use control::Control;
 pub use event::{Event, Fault, Recorded};
-pub use feed::{Feeder, Full, ToolOrder};
 pub use handle::Executor;
 pub use histogram::Histogram;
 pub use monitor::Monitor;
 pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};
+pub use segment_sender::{Full, SegmentSender, ToolOrder};

@@ -20,7 +20,7 @@ impl<const N: usize> Monitor<N> {
         event
     }
 
-    /// How many events were read, for [`super::Feeder::settle`].
+    /// How many events were read, for [`super::SegmentSender::settle`].
     pub fn seen(&self) -> u64 {
         self.seen
     }

@@ -7,7 +7,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
 use std::sync::Arc;
 
-use realtime::{Demand, Manner};
+use realtime::{Demand, StopCategory};
 use thiserror::Error;
 
 use super::control::Control;
@@ -46,11 +46,11 @@ impl Asked {
     }
 
     /// How the last abort comes to rest.
-    pub(super) fn abort_manner(self) -> Manner {
+    pub(super) fn abort_category(self) -> StopCategory {
         if self.word & ABORT_FAST == 0 {
-            Manner::Gentle
+            StopCategory::Gentle
         } else {
-            Manner::Fast
+            StopCategory::Fast
         }
     }
 
@@ -62,8 +62,8 @@ impl Asked {
     pub(super) fn demand(self) -> Demand {
         match self.word & DEMAND {
             RUN => Demand::Run(self.share),
-            GENTLE => Demand::Stop(Manner::Gentle),
-            _ => Demand::Stop(Manner::Fast),
+            GENTLE => Demand::Stop(StopCategory::Gentle),
+            _ => Demand::Stop(StopCategory::Fast),
         }
     }
 }
@@ -76,7 +76,7 @@ pub struct Progress {
     /// The period since the start.
     pub tick: u64,
     /// Share of the planned speed; 0 at rest.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Whether the last setpoint rests.
     pub resting: bool,
     /// Whether a pause or stop holds the arm.
@@ -118,7 +118,7 @@ pub(super) struct Orders {
     version: AtomicU32,
     seen: AtomicU32,
     tick: AtomicU64,
-    path_rate: AtomicU64,
+    time_scaling: AtomicU64,
     flags: AtomicU32,
 }
 
@@ -173,8 +173,8 @@ impl Orders {
         fence(Ordering::Release);
         self.seen.store(now.order, Ordering::Relaxed);
         self.tick.store(now.tick, Ordering::Relaxed);
-        self.path_rate
-            .store(now.path_rate.to_bits(), Ordering::Relaxed);
+        self.time_scaling
+            .store(now.time_scaling.to_bits(), Ordering::Relaxed);
         let flags = [now.resting, now.held, now.idle].into_iter().enumerate();
         let bits = flags.fold(0, |bits, (at, flag)| bits | u32::from(flag) << at);
         self.flags.store(bits, Ordering::Relaxed);
@@ -223,7 +223,7 @@ impl Orders {
             let now = Progress {
                 order: self.seen.load(Ordering::Relaxed),
                 tick: self.tick.load(Ordering::Relaxed),
-                path_rate: f64::from_bits(self.path_rate.load(Ordering::Relaxed)),
+                time_scaling: f64::from_bits(self.time_scaling.load(Ordering::Relaxed)),
                 resting: flags & 1 != 0,
                 held: flags & 2 != 0,
                 idle: flags & 4 != 0,
@@ -313,7 +313,10 @@ mod tests {
         assert_eq!(hand.control(Control::Override(0.3)), 1);
         assert_eq!(hand.orders.asked().demand(), Demand::Run(0.3));
         let fast = hand.control(Control::Stop { fast: true });
-        assert_eq!(hand.orders.asked().demand(), Demand::Stop(Manner::Fast));
+        assert_eq!(
+            hand.orders.asked().demand(),
+            Demand::Stop(StopCategory::Fast)
+        );
         let progress = Progress {
             order: fast,
             ..Progress::default()
@@ -323,7 +326,7 @@ mod tests {
         let abort = hand.control(Control::Abort);
         let asked = hand.orders.asked();
         assert_eq!((asked.order(), asked.aborts()), (abort, 1));
-        assert_eq!(asked.abort_manner(), Manner::Fast);
+        assert_eq!(asked.abort_category(), StopCategory::Fast);
         assert!(!asked.holds());
         // A stop after the abort holds, whatever the abort let go of.
         hand.control(Control::Pause);

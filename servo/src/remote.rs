@@ -19,7 +19,7 @@ pub struct Measured<const N: usize> {
     /// Positions of the last setpoint (rad).
     pub setpoint: SVector<f64, N>,
     /// Share of the planned speed.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Whether the last setpoint rests.
     pub resting: bool,
     /// Whether nothing is left to execute.
@@ -54,7 +54,7 @@ pub struct Counters {
 pub(super) struct Shared<const N: usize> {
     /// What is asked for.
     pub(super) orders: Arc<Orders>,
-    age: AtomicU32,
+    epoch: AtomicU32,
     /// Events reported, and how many of them the planner had seen when it had no more to do.
     reported: AtomicU64,
     answered: AtomicU64,
@@ -62,7 +62,7 @@ pub(super) struct Shared<const N: usize> {
     position: [AtomicU64; N],
     velocity: [AtomicU64; N],
     setpoint: [AtomicU64; N],
-    path_rate: AtomicU64,
+    time_scaling: AtomicU64,
     flags: AtomicU32,
     tools: [AtomicU32; 2],
     pub(super) published: AtomicU64,
@@ -80,14 +80,14 @@ impl<const N: usize> Shared<N> {
         let zeros = || core::array::from_fn(|_| AtomicU64::new(0));
         Self {
             orders: Arc::new(Orders::default()),
-            age: AtomicU32::new(0),
+            epoch: AtomicU32::new(0),
             reported: AtomicU64::new(0),
             answered: AtomicU64::new(0),
             version: AtomicU32::new(0),
             position: zeros(),
             velocity: zeros(),
             setpoint: zeros(),
-            path_rate: AtomicU64::new(0),
+            time_scaling: AtomicU64::new(0),
             flags: AtomicU32::new(0),
             tools: [AtomicU32::new(0), AtomicU32::new(0)],
             published: AtomicU64::new(0),
@@ -101,13 +101,13 @@ impl<const N: usize> Shared<N> {
         }
     }
 
-    pub(super) fn age(&self) -> u32 {
-        self.age.load(Ordering::Acquire)
+    pub(super) fn epoch(&self) -> u32 {
+        self.epoch.load(Ordering::Acquire)
     }
 
-    /// Begins a new age: what belongs to the old one is dropped.
-    pub(super) fn new_age(&self) -> u32 {
-        self.age.fetch_add(1, Ordering::AcqRel).wrapping_add(1)
+    /// Begins a new epoch: what belongs to the old one is dropped.
+    pub(super) fn new_epoch(&self) -> u32 {
+        self.epoch.fetch_add(1, Ordering::AcqRel).wrapping_add(1)
     }
 
     /// Counts an event that the planner shall see.
@@ -140,8 +140,8 @@ impl<const N: usize> Shared<N> {
         store(&self.position, &now.position);
         store(&self.velocity, &now.velocity);
         store(&self.setpoint, &now.setpoint);
-        self.path_rate
-            .store(now.path_rate.to_bits(), Ordering::Relaxed);
+        self.time_scaling
+            .store(now.time_scaling.to_bits(), Ordering::Relaxed);
         let flags = [now.resting, now.idle, now.faulted];
         let bits = flags
             .iter()
@@ -172,7 +172,7 @@ impl<const N: usize> Shared<N> {
                 position: load(&self.position),
                 velocity: load(&self.velocity),
                 setpoint: load(&self.setpoint),
-                path_rate: f64::from_bits(self.path_rate.load(Ordering::Relaxed)),
+                time_scaling: f64::from_bits(self.time_scaling.load(Ordering::Relaxed)),
                 resting: flags & 1 != 0,
                 idle: flags & 2 != 0,
                 faulted: flags & 4 != 0,

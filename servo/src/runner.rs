@@ -8,15 +8,15 @@ use std::sync::Arc;
 
 use ipc::{DriverState, HelloAck, MAX_TOOLS, Setpoint, State, ToolCommand};
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Following, Manner, Pushed, Sample, Step, check_following};
+use realtime::{Cycle, Demand, Following, Pushed, Sample, Step, StopCategory, check_following};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::config::ExecutorConfig;
 use super::event::{Event, Fault, Recorded};
-use super::feed::{Feeder, Item, ToolOrder, Work};
 use super::monitor::Monitor;
 use super::orders::Asked;
 use super::remote::{Remote, Shared};
+use super::segment_sender::{Item, SegmentSender, ToolOrder, Work};
 
 use message::first;
 
@@ -67,14 +67,14 @@ pub struct Runner<const N: usize> {
     events: Producer<Event>,
     samples: Option<Producer<Recorded<N>>>,
     shared: Arc<Shared<N>>,
-    age: u32,
+    epoch: u32,
     session: u64,
     sequence: u64,
     state: State,
     quiet: u64,
     ready: bool,
     asked: Asked,
-    aborting: Option<Manner>,
+    aborting: Option<StopCategory>,
     leaving: bool,
     stopped: bool,
     fault: Option<Fault>,
@@ -90,7 +90,7 @@ pub struct Runner<const N: usize> {
 
 impl<const N: usize> Runner<N> {
     /// A runner with its three ends. It needs a session before it moves: [`Runner::open`].
-    pub fn new(config: ExecutorConfig<N>) -> (Self, Feeder<N>, Remote<N>, Monitor<N>) {
+    pub fn new(config: ExecutorConfig<N>) -> (Self, SegmentSender<N>, Remote<N>, Monitor<N>) {
         let shared = Arc::new(Shared::new());
         let (ring, items) = RingBuffer::new(RING);
         let (events, event_reader) = RingBuffer::new(REPORTS);
@@ -103,7 +103,7 @@ impl<const N: usize> Runner<N> {
             events,
             samples: config.record.then_some(samples),
             shared: Arc::clone(&shared),
-            age: 0,
+            epoch: 0,
             session: 0,
             sequence: 0,
             state: State::default(),
@@ -123,17 +123,17 @@ impl<const N: usize> Runner<N> {
             tick: 0,
             config,
         };
-        let feeder = Feeder {
+        let sender = SegmentSender {
             ring,
             shared: Arc::clone(&shared),
-            age: 0,
+            epoch: 0,
         };
         let monitor = Monitor {
             events: event_reader,
             samples: sample_reader,
             seen: 0,
         };
-        (runner, feeder, Remote { shared }, monitor)
+        (runner, sender, Remote { shared }, monitor)
     }
 
     /// Begins a session at the position that the driver measured; what was planned is forgotten
@@ -160,9 +160,9 @@ impl<const N: usize> Runner<N> {
         self.share_position();
     }
 
-    /// Drops the age, tells that the session is new.
+    /// Drops the epoch, tells that the session is new.
     pub(super) fn recovered(&mut self) {
-        self.age = self.shared.new_age();
+        self.epoch = self.shared.new_epoch();
         self.report(Event::Recovered { tick: self.tick });
     }
 
@@ -234,7 +234,7 @@ impl<const N: usize> Runner<N> {
         if self.fault.is_none() {
             self.fault = Some(fault);
             self.shared.orders.latch();
-            self.age = self.shared.new_age();
+            self.epoch = self.shared.new_epoch();
             self.report(Event::Faulted {
                 fault,
                 tick: self.tick,
@@ -323,7 +323,7 @@ impl<const N: usize> Runner<N> {
     fn obey(&mut self) {
         let asked = self.shared.orders.asked();
         if asked.aborts() != self.asked.aborts() {
-            self.aborting = Some(asked.abort_manner());
+            self.aborting = Some(asked.abort_category());
         }
         self.asked = asked;
         if !self.cycle.is_resting() {
@@ -336,7 +336,7 @@ impl<const N: usize> Runner<N> {
         if self.aborting.take().is_some() {
             self.cycle.flush();
             self.tool = None;
-            self.age = self.shared.new_age();
+            self.epoch = self.shared.new_epoch();
             self.report(Event::Aborted {
                 aborts: asked.aborts(),
                 tick: self.tick,
@@ -349,7 +349,7 @@ impl<const N: usize> Runner<N> {
         for _ in 0..A_PERIOD {
             let Ok(item) = self.items.peek() else { return };
             let item = *item;
-            let done = if item.age != self.age || self.fault.is_some() {
+            let done = if item.epoch != self.epoch || self.fault.is_some() {
                 true
             } else {
                 match item.work {
@@ -378,12 +378,14 @@ impl<const N: usize> Runner<N> {
     /// What the cycle shall do now.
     fn demand(&self) -> Demand {
         if self.fault.is_some() {
-            return Demand::Stop(Manner::Fast);
+            return Demand::Stop(StopCategory::Fast);
         }
         match (self.asked.demand(), self.aborting) {
-            (Demand::Stop(Manner::Fast), _) => Demand::Stop(Manner::Fast),
-            (_, Some(manner)) => Demand::Stop(manner),
-            (Demand::Run(_), None) if self.leaving || !self.ready => Demand::Stop(Manner::Gentle),
+            (Demand::Stop(StopCategory::Fast), _) => Demand::Stop(StopCategory::Fast),
+            (_, Some(category)) => Demand::Stop(category),
+            (Demand::Run(_), None) if self.leaving || !self.ready => {
+                Demand::Stop(StopCategory::Gentle)
+            }
             (demand, None) => demand,
         }
     }
@@ -412,7 +414,7 @@ impl<const N: usize> Runner<N> {
             tick: self.tick,
             command: made.command,
             path_time: made.path_time,
-            path_rate: made.path_rate,
+            time_scaling: made.time_scaling,
             setpoint: made.setpoint,
             measured: [0.0; N],
         });

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use ipc::{Clock, DriverState, EngineLink, Hello, Setpoint, SetpointFlags, State, text_of};
-use scheduling::{Granted, now_ns, sleep_until_ns, urge};
+use scheduling::{Granted, now_ns, request_real_time, sleep_until_ns};
 
 use super::config::{ExecutorConfig, ExecutorError};
 use super::event::Fault;
@@ -77,7 +77,7 @@ pub(super) fn main<const N: usize>(
     };
     // A thread that waits awake, as in lock-step, must not be a real-time thread.
     let granted = match config.clock {
-        Clock::Wall => urge(config.urgency),
+        Clock::Wall => request_real_time(config.real_time),
         Clock::LockStep => Granted::default(),
     };
     // Whoever asked may have gone; then the drop of its handle ends the thread.
@@ -160,10 +160,10 @@ impl<const N: usize> Loop<'_, N> {
     fn by_the_clock(&mut self) {
         let period = self.config.period_ns();
         self.origin = now_ns() + period;
-        let mut alarm = Alarm::new(period);
+        let mut timer = PeriodicTimer::new(period);
         loop {
             let begin = self.origin + self.tick * period;
-            let now_ns = alarm.wait(begin);
+            let now_ns = timer.wait(begin);
             let late = now_ns.saturating_sub(begin);
             self.shared.latency.count(late);
             let skipped = late / period;
@@ -305,14 +305,14 @@ impl<const N: usize> Loop<'_, N> {
 
 /// Wakes up at a time by going to bed for a little less: about as long as waking up usually takes,
 /// which is then waited awake.
-struct Alarm {
+struct PeriodicTimer {
     /// How much less (ns): the middle of what waking up took.
     early: u64,
     /// The most of it (ns).
     most: u64,
 }
 
-impl Alarm {
+impl PeriodicTimer {
     /// Part of a period that may be waited awake, at most.
     const AWAKE: u64 = 50;
 

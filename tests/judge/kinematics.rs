@@ -4,18 +4,18 @@ use k::nalgebra::{Isometry3, Vector3};
 
 /// Controlled point and tool at one time, in the workstation.
 #[derive(Clone, Copy)]
-pub struct State {
-    pub pose: Isometry3<f64>,
-    pub velocity: Vector3<f64>,
-    pub acceleration: Vector3<f64>,
-    pub spin: Vector3<f64>,
-    pub spin_rate: Vector3<f64>,
+pub(crate) struct State {
+    pub(crate) pose: Isometry3<f64>,
+    pub(crate) velocity: Vector3<f64>,
+    pub(crate) acceleration: Vector3<f64>,
+    pub(crate) spin: Vector3<f64>,
+    pub(crate) spin_rate: Vector3<f64>,
 }
 
 /// State of the tool when the joints have positions, velocities and accelerations.
 ///
 /// `axes` are the joints at these positions: a point on the axis, its direction, whether it slides.
-pub fn state(
+pub(crate) fn state(
     axes: &[(Vector3<f64>, Vector3<f64>, bool)],
     [dq, ddq]: [&[f64]; 2],
     pose: Isometry3<f64>,

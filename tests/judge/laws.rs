@@ -9,7 +9,7 @@ use crate::programs::{Meaning, Move, Shape};
 use crate::tally::Tally;
 
 /// Servo rate of the plans, Hz, and time between samples, s.
-pub const RATE: f64 = 1000.0;
+pub(crate) const RATE: f64 = 1000.0;
 const PERIOD: f64 = 1e-3;
 
 /// Finite arithmetic on both sides of a limit.
@@ -22,7 +22,7 @@ const ARRIVED: f64 = 2e-6;
 const STRAIGHT: f64 = 1e-5;
 
 /// Judges a plan; `meanings` has one entry per command of the program.
-pub fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
+pub(crate) fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
     let samples: Vec<PlanSample> = plan.samples(PERIOD).collect();
     joints(arm, &samples, tally);
     ticks(plan, &samples, tally);

@@ -8,7 +8,7 @@ use crate::random::Random;
 
 /// What a command means, for the judge.
 #[derive(Clone, Debug)]
-pub enum Meaning {
+pub(crate) enum Meaning {
     /// Nothing moves, for so long (s).
     Still(f64),
     Move(Move),
@@ -16,30 +16,30 @@ pub enum Meaning {
 
 /// A move in SI units, in the workstation.
 #[derive(Clone, Debug)]
-pub struct Move {
-    pub shape: Shape,
-    pub poses: Vec<Isometry3<f64>>,
-    pub tolerance: f64,
+pub(crate) struct Move {
+    pub(crate) shape: Shape,
+    pub(crate) poses: Vec<Isometry3<f64>>,
+    pub(crate) tolerance: f64,
     /// Parts of the largest speed and acceleration that are in force.
-    pub speed: f64,
-    pub acceleration: f64,
+    pub(crate) speed: f64,
+    pub(crate) acceleration: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub(crate) enum Shape {
     Joint,
     Straight,
     Smooth,
 }
 
 /// A program: commands with their meaning.
-pub struct Program {
-    pub commands: Vec<Command>,
-    pub meanings: Vec<Meaning>,
+pub(crate) struct Program {
+    pub(crate) commands: Vec<Command>,
+    pub(crate) meanings: Vec<Meaning>,
 }
 
 /// Writes a program.
-pub struct Writer<'a> {
+pub(crate) struct Writer<'a> {
     arm: &'a Arm,
     random: Random,
     program: Program,
@@ -53,7 +53,7 @@ pub struct Writer<'a> {
 }
 
 /// Program number `seed` for an arm.
-pub fn program(arm: &Arm, seed: u64) -> Program {
+pub(crate) fn program(arm: &Arm, seed: u64) -> Program {
     let mut writer = Writer {
         arm,
         random: Random::new(seed),

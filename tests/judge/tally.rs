@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 
 /// Laws with how often they were judged and broken.
 #[derive(Default)]
-pub struct Tally {
+pub(crate) struct Tally {
     laws: BTreeMap<&'static str, Law>,
     /// The program that is judged, for the list of faults.
-    pub program: String,
+    pub(crate) program: String,
     /// The first faults, in words.
-    pub faults: Vec<String>,
-    pub programs: usize,
-    pub moves: usize,
-    pub refused: usize,
+    pub(crate) faults: Vec<String>,
+    pub(crate) programs: usize,
+    pub(crate) moves: usize,
+    pub(crate) refused: usize,
 }
 
 #[derive(Default)]
@@ -28,7 +28,7 @@ const KEPT: usize = 40;
 
 impl Tally {
     /// A value may be at most its limit.
-    pub fn at_most(&mut self, law: &'static str, value: f64, limit: f64) {
+    pub(crate) fn at_most(&mut self, law: &'static str, value: f64, limit: f64) {
         let ratio = if limit > 0.0 { value / limit } else { 0.0 };
         let entry = self.laws.entry(law).or_default();
         entry.judged += 1;
@@ -44,12 +44,12 @@ impl Tally {
     }
 
     /// Something must be so.
-    pub fn must(&mut self, law: &'static str, holds: bool) {
+    pub(crate) fn must(&mut self, law: &'static str, holds: bool) {
         self.at_most(law, if holds { 0.0 } else { 1.0 }, 0.5);
     }
 
     /// Takes in what another one counted.
-    pub fn merge(&mut self, other: Tally) {
+    pub(crate) fn merge(&mut self, other: Tally) {
         for (law, counts) in other.laws {
             let entry = self.laws.entry(law).or_default();
             entry.judged += counts.judged;
@@ -63,12 +63,12 @@ impl Tally {
     }
 
     /// How many laws were broken.
-    pub fn broken(&self) -> usize {
+    pub(crate) fn broken(&self) -> usize {
         self.laws.values().filter(|law| law.broken > 0).count()
     }
 
     /// A line for each law.
-    pub fn table(&self) -> String {
+    pub(crate) fn table(&self) -> String {
         let mut table = format!(
             "{} programs, {} moves made, {} refused\n",
             self.programs, self.moves, self.refused

@@ -25,9 +25,9 @@ fn run(name: &str, commands: u32) -> Run {
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
         let config = executor_config(arm, Clock::LockStep);
         let start = Instant::now();
-        let (executor, mut feeder, mut monitor) = Executor::start(config).unwrap();
+        let (executor, mut sender, mut monitor) = Executor::start(config).unwrap();
         for index in 0..commands {
-            assert!(feed(&mut feeder, index));
+            assert!(feed(&mut sender, index));
             if index == 0 {
                 let order = ToolOrder {
                     command: 1000,
@@ -35,7 +35,7 @@ fn run(name: &str, commands: u32) -> Run {
                     action: ToolAction::Close,
                     timeout: 1.0,
                 };
-                feeder.tool(order).unwrap();
+                sender.tool(order).unwrap();
             }
         }
         let (mut events, mut samples) = (Vec::new(), Vec::new());

@@ -181,7 +181,7 @@ fn a_hog_of_the_processors() {
         for _ in 0..4 {
             scope.spawn(|| {
                 // Where the user may not, the hog has an ordinary priority.
-                scheduling::urge(scheduling::Urgency {
+                scheduling::request_real_time(scheduling::RealTimeRequest {
                     priority: 90,
                     processor: None,
                     lock_memory: false,

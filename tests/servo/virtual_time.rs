@@ -5,13 +5,13 @@ mod orders;
 
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
 use realtime::{Piece, Sample, Segment};
-use servo::{Control, Event, Fault, Feeder, Monitor, Remote, Runner, Tick};
+use servo::{Control, Event, Fault, Monitor, Remote, Runner, SegmentSender, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
 
 /// A runner, its ends, and a driver that is always exactly at the last setpoint.
 struct Bench {
     runner: Runner<JOINTS>,
-    feeder: Feeder<JOINTS>,
+    sender: SegmentSender<JOINTS>,
     remote: Remote<JOINTS>,
     monitor: Monitor<JOINTS>,
     state: State,
@@ -23,7 +23,7 @@ impl Bench {
     fn new() -> Self {
         let mut config = executor_config(system_tests::domain::arm("virtual/arm"), Clock::Wall);
         config.record = false;
-        let (mut runner, feeder, remote, monitor) = Runner::new(config);
+        let (mut runner, sender, remote, monitor) = Runner::new(config);
         let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
         ack.session = 1;
         ack.position[..JOINTS].copy_from_slice(home().as_slice());
@@ -36,7 +36,7 @@ impl Bench {
         state.position = ack.position;
         Self {
             runner,
-            feeder,
+            sender,
             remote,
             monitor,
             state,
@@ -97,7 +97,7 @@ impl Bench {
 #[test]
 fn the_operator_changes_time_only() {
     let mut bench = Bench::new();
-    (0..6).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    (0..6).for_each(|index| assert!(feed(&mut bench.sender, index)));
     let script = [
         (300, Control::Pause),
         (900, Control::Resume),
@@ -134,7 +134,7 @@ fn the_operator_changes_time_only() {
 /// How a fault in the middle of a move ends: latched, at rest, on the path, deaf to `Resume`.
 fn faulted(change: impl Fn(State) -> Option<State> + Copy, periods: u64) -> Fault {
     let mut bench = Bench::new();
-    assert!(feed(&mut bench.feeder, 0));
+    assert!(feed(&mut bench.sender, 0));
     bench.run(400);
     for _ in 0..periods {
         bench.period(0, change);
@@ -149,7 +149,7 @@ fn faulted(change: impl Fn(State) -> Option<State> + Copy, periods: u64) -> Faul
     assert!(now.faulted && now.resting);
     let before = now.setpoint;
     assert!(
-        feed(&mut bench.feeder, 1),
+        feed(&mut bench.sender, 1),
         "the ring takes it, nobody executes it"
     );
     bench.run(1000);
@@ -243,7 +243,7 @@ fn what_a_driver_may_do_wrong() {
 #[test]
 fn late_periods_are_left_out() {
     let mut bench = Bench::new();
-    assert!(feed(&mut bench.feeder, 0));
+    assert!(feed(&mut bench.sender, 0));
     bench.run(200);
     for skipped in [1, 4, 0, 17, 2] {
         let before = *bench.setpoints.last().unwrap();
@@ -292,7 +292,7 @@ fn a_starved_planner() {
         ..whole
     };
     bench
-        .feeder
+        .sender
         .push(Segment {
             piece: half,
             command: 0,
@@ -313,11 +313,11 @@ fn a_starved_planner() {
 #[test]
 fn abort_and_begin_anew() {
     let mut bench = Bench::new();
-    (0..4).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    (0..4).for_each(|index| assert!(feed(&mut bench.sender, index)));
     bench.run(400);
     bench.remote.control(Control::Abort);
     assert!(
-        feed(&mut bench.feeder, 0),
+        feed(&mut bench.sender, 0),
         "too late, it belongs to the old program"
     );
     bench.run(1000);
@@ -326,10 +326,10 @@ fn abort_and_begin_anew() {
     assert!(bench.events().iter().any(aborted));
     let here = bench.remote.measured();
     assert!(here.resting && here.idle && !here.faulted);
-    bench.feeder.renew();
+    bench.sender.renew();
     let back = Piece::hermite(1.0, &Sample::rest(here.setpoint), &Sample::rest(home()));
     bench
-        .feeder
+        .sender
         .push(Segment {
             piece: back,
             command: 5,
@@ -348,7 +348,7 @@ fn abort_and_begin_anew() {
 fn a_clock_that_jumps() {
     const HOUR: u64 = 3_600_000_000_000;
     let mut bench = Bench::new();
-    assert!(feed(&mut bench.feeder, 0));
+    assert!(feed(&mut bench.sender, 0));
     bench.run(400);
     // Time stamps of the driver from the future and from the past are no time to rely on.
     for published_ns in [u64::MAX, 0, HOUR] {

@@ -26,9 +26,9 @@ fn the_periods_add_up() {
         config.watchdog = Duration::from_secs(2);
         config.patience = Duration::from_secs(2);
         config.following.base = 0.5;
-        let (executor, mut feeder, mut monitor) = Executor::start(config).unwrap();
+        let (executor, mut sender, mut monitor) = Executor::start(config).unwrap();
         for index in 0..3 {
-            assert!(feed(&mut feeder, index));
+            assert!(feed(&mut sender, index));
         }
         let (mut events, mut samples) = (Vec::new(), Vec::new());
         let start = Instant::now();
@@ -107,8 +107,8 @@ fn a_following_error_latches_until_recovery() {
         config.record = false;
         config.following.base = 1e-5;
         config.following.delay = 0.0;
-        let (executor, mut feeder, mut monitor) = Executor::start(config).unwrap();
-        assert!(feed(&mut feeder, 0));
+        let (executor, mut sender, mut monitor) = Executor::start(config).unwrap();
+        assert!(feed(&mut sender, 0));
         let mut wait_for = |wanted: &dyn Fn(&Event) -> bool| {
             let start = Instant::now();
             loop {

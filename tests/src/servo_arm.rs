@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 use realtime::{Limits, Piece, Sample, Segment};
-use servo::{ExecutorConfig, Feeder};
+use servo::{ExecutorConfig, SegmentSender};
 
 /// Joints of the test arm.
 pub const JOINTS: usize = 6;
@@ -89,9 +89,9 @@ pub fn planned(index: u32, time: f64) -> Joints {
 }
 
 /// Hands a whole command to the executor; `false` when there was no room for it.
-pub fn feed(feeder: &mut Feeder<JOINTS>, index: u32) -> bool {
-    feeder.room() >= 2
+pub fn feed(sender: &mut SegmentSender<JOINTS>, index: u32) -> bool {
+    sender.room() >= 2
         && command(index)
             .into_iter()
-            .all(|segment| feeder.push(segment).is_ok())
+            .all(|segment| sender.push(segment).is_ok())
 }

@@ -66,7 +66,10 @@ fn stops(burden: Burden, way: Way, count: usize) -> Vec<Taken> {
         let client = ControlClient::open(&scene.arm).unwrap();
         let until = scene.episode();
         while taken.len() < count && Instant::now() < until {
-            watch.wait_for_speed();
+            if !watch.wait_for_speed() {
+                println!("the arm does not move: {}", scene.status());
+                break;
+            }
             std::thread::sleep(Duration::from_secs_f64(0.02 + 0.2 * random.next()));
             let ask = match way {
                 Way::Pause => ControlAsk::Pause,
@@ -92,7 +95,10 @@ fn interrupts(burden: Burden, count: usize) -> Vec<Taken> {
     while taken.len() < count {
         let mut scene = Scene::engine(burden);
         let watch = Watch::start(&scene.arm);
-        watch.wait_for_speed();
+        if !watch.wait_for_speed() {
+            println!("the arm does not move: {}", scene.status());
+            continue;
+        }
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.5 * random.next()));
         let called = scheduling::now_ns();
         scene.interrupt();

@@ -126,6 +126,12 @@ impl Scene {
         }
     }
 
+    /// What the engine says of itself.
+    pub(crate) fn status(&self) -> String {
+        let client = Client::open(&self.arm, "stops").unwrap();
+        format!("{:?}", client.ask(Verb::Status, Duration::from_secs(3)))
+    }
+
     fn load(&mut self, name: &str) {
         match self.burden {
             Burden::Watch => {

@@ -103,7 +103,7 @@ fn wait_for(arm: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
 }
 
 fn moves(now: &Value) -> bool {
-    now["path_rate"].as_f64() > Some(0.9)
+    now["time_scaling"].as_f64() > Some(0.9)
 }
 
 /// A slow move of about a minute, and behind it a smooth path of `poses` poses.
@@ -153,7 +153,7 @@ fn a_stop_does_not_wait_for_the_planner() {
         );
         let now = status(&arm);
         assert_eq!(
-            (&now["path_rate"], &now["held"]),
+            (&now["time_scaling"], &now["held"]),
             (&0.0.into(), &true.into())
         );
         // Far less than the planner needs, and than the move would take.
@@ -327,7 +327,7 @@ fn a_stopped_engine_ends_at_the_first_signal() {
     wait_for(&arm, "motion", moves);
     assert_eq!(canter(["stop", "--arm", &arm]).code, 0);
     wait_for(&arm, "rest", |now| {
-        now["held"] == true && now["path_rate"] == 0.0
+        now["held"] == true && now["time_scaling"] == 0.0
     });
     std::thread::sleep(Duration::from_millis(200));
     signal::send(&engine.0, libc::SIGTERM);
@@ -353,7 +353,7 @@ fn a_recovery_without_a_fault_is_refused() {
     assert!(refused.stderr.contains("no fault"), "{}", refused.stderr);
     assert_eq!(canter(["pause", "--arm", &arm]).code, 0);
     let now = wait_for(&arm, "rest", |now| {
-        now["held"] == true && now["path_rate"] == 0.0
+        now["held"] == true && now["time_scaling"] == 0.0
     });
     std::thread::sleep(Duration::from_millis(300));
     let then = status(&arm);

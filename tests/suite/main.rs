@@ -14,7 +14,7 @@ mod domains;
 mod drivers;
 mod faults;
 mod killed_plans;
-mod made_kits;
+mod kitting_end_to_end;
 mod plan_costs;
 mod planned_motions;
 mod planned_once;

@@ -6,7 +6,7 @@ use serde_json::Value;
 use system_tests::repository;
 
 use crate::canter::{Ran, canter};
-use crate::made_kits::assert_kits;
+use crate::kitting_end_to_end::assert_kits;
 
 pub(crate) const WORLD: &str = "examples/kitting/workstation.toml";
 pub(crate) const PLAN: &str = "examples/kitting/kit-abc.plan";

@@ -383,14 +383,16 @@ fn an_engine_serves_clients() {
         &arm,
     ]);
     assert_eq!(sent.code, 0, "{}", sent.stderr);
-    wait_for(&arm, "motion", |now| now["path_rate"].as_f64() > Some(0.5));
+    wait_for(&arm, "motion", |now| {
+        now["time_scaling"].as_f64() > Some(0.5)
+    });
     assert_eq!(canter(["pause", "--arm", &arm]).code, 0);
     wait_for(&arm, "rest", |now| {
-        now["held"] == true && now["path_rate"] == 0.0
+        now["held"] == true && now["time_scaling"] == 0.0
     });
     assert_eq!(canter(["resume", "--arm", &arm]).code, 0);
     wait_for(&arm, "motion again", |now| {
-        now["path_rate"].as_f64() > Some(0.5)
+        now["time_scaling"].as_f64() > Some(0.5)
     });
     assert_eq!(canter(["override", "20", "--arm", &arm]).code, 0);
     assert_eq!(canter(["abort", "--arm", &arm]).code, 0);

@@ -118,9 +118,9 @@ fn passes_in_order(
     let mut at = 0.0;
     for (i, goal) in goals.iter().enumerate() {
         let distance = |time: f64| (place(time) - goal).norm();
-        let named = plan.passes()[i].time;
+        let named = plan.crossings()[i].time;
         let fault = |what: &str, time: f64| {
-            let known = plan.passes()[i];
+            let known = plan.crossings()[i];
             Err(format!(
                 "pose {}: {what} at {time}, {:e} away, tolerance {tolerance:e}, {known:?}",
                 i + 1,
@@ -276,7 +276,7 @@ fn report(seed: u64) -> Result<[f64; 2], String> {
     let options = SmoothOptions::new(tolerance, limits);
     let plan = plan(&poses, &options).map_err(|error| error.to_string())?;
     if !plan.certificate().holds() {
-        let bad = plan.passes().iter().find(|pass| !pass.holds());
+        let bad = plan.crossings().iter().find(|pass| !pass.holds());
         return Err(format!("certificate: {:?} {bad:?}", plan.certificate()));
     }
     if plan.duration() > plan.exact_stop() * (1.0 + 1e-9) {

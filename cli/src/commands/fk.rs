@@ -7,7 +7,7 @@ use planner::robot::Robot;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::robot::{RobotOption, with_joints};
-use crate::table::{self, Row};
+use crate::table::{self, CsvRow};
 
 /// Forward kinematics: joint positions to poses of the flange in the robot's base
 ///
@@ -32,7 +32,7 @@ impl Fk {
     }
 }
 
-fn poses<const N: usize>(robot: &Robot, rows: &[Row]) -> Result<Exit, Failure> {
+fn poses<const N: usize>(robot: &Robot, rows: &[CsvRow]) -> Result<Exit, Failure> {
     let chain = robot
         .model
         .chain::<N>()

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use kinematics::{Obstacle, Report, Solution, Solver};
+use kinematics::{IkFailure, IkReport, Solution, Solver};
 use nalgebra::{Isometry3, Quaternion, SVector, Translation3, UnitQuaternion};
 use planner::robot::Robot;
 
@@ -12,7 +12,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
 use crate::robot::{RobotOption, with_joints};
-use crate::table::{self, Row};
+use crate::table::{self, CsvRow};
 
 /// Inverse kinematics: poses of the flange in the robot's base to joint positions
 ///
@@ -48,7 +48,7 @@ impl Ik {
 }
 
 /// A row as a pose; the quaternion may be a little off unit length, as printed numbers are.
-fn pose(row: &Row) -> anyhow::Result<Isometry3<f64>> {
+fn pose(row: &CsvRow) -> anyhow::Result<Isometry3<f64>> {
     let line = row.line;
     let [x, y, z, w, i, j, k] = row.numbers.as_slice() else {
         return Err(anyhow!("line {line}: expected 7 numbers"));
@@ -166,15 +166,15 @@ impl Sheet {
     fn report<const N: usize>(
         &mut self,
         row: usize,
-        report: &Report<N>,
+        report: &IkReport<N>,
         time: u128,
     ) -> io::Result<()> {
-        let status = match report.obstacle {
-            Obstacle::NotFinite => "not-finite",
-            Obstacle::OutOfReach { .. } => "out-of-reach",
-            Obstacle::Orientation { .. } => "orientation",
-            Obstacle::AtLimit { .. } => "at-limit",
-            Obstacle::Singular { .. } => "singular",
+        let status = match report.failure {
+            IkFailure::NotFinite => "not-finite",
+            IkFailure::OutOfReach { .. } => "out-of-reach",
+            IkFailure::Orientation { .. } => "orientation",
+            IkFailure::AtLimit { .. } => "at-limit",
+            IkFailure::Singular { .. } => "singular",
             _ => "not-reached",
         };
         self.count(status);

@@ -7,7 +7,7 @@ use engine::arm_motion::ArmMotion;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
 use plan::run::{
-    Cell, Controller, Event, Motion, Policy, Program, Report, RobotOptions, RunOptions,
+    Cell, Controller, Event, Motion, PlanRunReport, Policy, Program, RobotOptions, RunOptions,
     SimulatedFactotum, Stock, parameters, prepare,
 };
 use plan::world::{Model, Reader, StoredRun, Writer};
@@ -246,7 +246,7 @@ impl Task<'_> {
         self.source.as_deref().or(stored).is_some_and(is_pddl)
     }
 
-    fn kitting(self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, PlanError> {
+    fn kitting(self, robot: &Robot, motion: &mut dyn Motion) -> Result<PlanRunReport, PlanError> {
         let Self {
             command,
             printer,
@@ -283,7 +283,7 @@ impl Task<'_> {
         controller.run(&mut |event| command.observe(printer, event))
     }
 
-    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<Report, Failure> {
+    fn pddl(mut self, robot: &Robot, motion: &mut dyn Motion) -> Result<PlanRunReport, Failure> {
         let (command, printer) = (self.command, self.printer);
         let table = action_table(command.actions.as_deref())?;
         let options = &command.robot_options(robot);

@@ -242,7 +242,7 @@ impl Watch {
             tick: setpoint.tick,
             command: setpoint.command,
             path_time: setpoint.path_time,
-            path_rate: setpoint.path_rate,
+            time_scaling: setpoint.time_scaling,
             position: list(&setpoint.position),
             velocity: list(&setpoint.velocity),
             acceleration: list(&setpoint.acceleration),

@@ -228,7 +228,7 @@ fn compare(
         }
         let command = sample.command - given.first;
         // A command that was slowed down once is at other places of its path from then on.
-        if sample.path_rate.to_bits() != 1.0_f64.to_bits() && sample.path_rate > 0.0 {
+        if sample.time_scaling.to_bits() != 1.0_f64.to_bits() && sample.time_scaling > 0.0 {
             altered = Some(command);
         }
         let counterpart = made.get(&(command, sample.path_time.to_bits()));

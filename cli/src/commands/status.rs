@@ -61,7 +61,7 @@ fn text(status: &Value) -> String {
             |value: &Value| format!("{:.decimals$}", value.as_f64().unwrap_or(0.0) * factor);
         list.iter().map(number).collect::<Vec<_>>().join(", ")
     };
-    let rate = status["path_rate"].as_f64().unwrap_or(0.0) * 100.0;
+    let rate = status["time_scaling"].as_f64().unwrap_or(0.0) * 100.0;
     let held = if status["held"] == true { ", held" } else { "" };
     let cycles = &status["cycles"];
     format!(

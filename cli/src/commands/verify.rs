@@ -4,7 +4,9 @@ use std::path::Path;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use planner::recorded::{CommandVerdict, ProgramVerdict, Row, RunColumns, verify_program};
+use planner::recorded::{
+    CommandVerdict, ProgramVerdict, RecordedSample, RunColumns, verify_program,
+};
 use planner::robot::Robot;
 
 use crate::exit::Exit;
@@ -55,7 +57,12 @@ impl Verify {
         self.judge(&robot, &program, &rows)
     }
 
-    fn judge(&self, robot: &Robot, program: &ProgramFile, rows: &[Row]) -> Result<Exit, Failure> {
+    fn judge(
+        &self,
+        robot: &Robot,
+        program: &ProgramFile,
+        rows: &[RecordedSample],
+    ) -> Result<Exit, Failure> {
         let verdict = verify_program(robot, program.program(), program.default_length(), rows);
         if self.json {
             output::json(&verdict)?;
@@ -96,12 +103,12 @@ impl Verify {
 }
 
 /// Rows of a sample file, found by the names of its columns.
-fn read(path: &str, joints: usize) -> Result<Vec<Row>, Failure> {
+fn read(path: &str, joints: usize) -> Result<Vec<RecordedSample>, Failure> {
     let source = BufReader::new(input::lines(path)?);
     input::unreadable(path, parse(source, joints))
 }
 
-fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
+fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<RecordedSample>> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(source);
@@ -153,7 +160,7 @@ fn parse(source: impl Read, joints: usize) -> anyhow::Result<Vec<Row>> {
 }
 
 /// A row from the numbers of its columns.
-fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
+fn row(numbers: &[f64], joints: usize) -> anyhow::Result<RecordedSample> {
     let mut numbers = numbers.iter().copied();
     let mut next = || numbers.next().ok_or_else(|| anyhow!("too few columns"));
     let (t_s, command) = (next()?, next()?);
@@ -175,7 +182,7 @@ fn row(numbers: &[f64], joints: usize) -> anyhow::Result<Row> {
         }),
         Err(_) => None,
     };
-    Ok(Row {
+    Ok(RecordedSample {
         t_s,
         command: command as usize,
         joints: joints_now,

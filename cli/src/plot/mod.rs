@@ -22,7 +22,7 @@ pub(crate) struct Drawing {
     /// Commands that take time, in order.
     pub(crate) spans: Vec<Span>,
     /// States in the order of time, at a constant period.
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<PlotRow>,
     /// Poses that the program asks for.
     pub(crate) targets: Vec<Target>,
 }
@@ -43,7 +43,7 @@ pub(crate) struct Span {
 
 /// State at one time. The four lists have one entry a joint and are parts of the limits: the
 /// position runs from -1 at the lower to 1 at the upper limit, the others are divided by theirs.
-pub(crate) struct Row {
+pub(crate) struct PlotRow {
     /// Time, s.
     pub(crate) time: f64,
     /// Position, velocity, acceleration, jerk.
@@ -90,7 +90,7 @@ mod tests {
         let row = |k: usize| {
             let time = k as f64 * 0.01;
             let wave = |phase: f64| vec![(time * 2.0 + phase).sin(), (time * 3.0 + phase).cos()];
-            Row {
+            PlotRow {
                 time,
                 ratios: [wave(0.0), wave(1.0), wave(2.0), wave(3.0)],
                 point: [

@@ -2,7 +2,7 @@
 
 use super::scale::{Scale, marks};
 use super::svg::{Anchor, Svg};
-use super::{Drawing, Row};
+use super::{Drawing, PlotRow};
 
 const GAP: f64 = 30.0;
 /// Room for the marks of the axes, left of and below each view.
@@ -154,7 +154,7 @@ fn millimetres(meters: f64) -> String {
 /// The way in pieces of one colour each, by speed.
 fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
     let peak = peak_speed(&drawing.rows);
-    let at = |row: &Row| {
+    let at = |row: &PlotRow| {
         [
             layout.across.at(row.point[view.across]),
             layout.up.at(row.point[view.up]),
@@ -186,7 +186,7 @@ fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
 }
 
 /// Mean speed of the controlled point between two rows, m/s.
-fn speed(from: &Row, to: &Row) -> f64 {
+fn speed(from: &PlotRow, to: &PlotRow) -> f64 {
     let squares: f64 = from
         .point
         .iter()
@@ -196,7 +196,7 @@ fn speed(from: &Row, to: &Row) -> f64 {
     squares.sqrt() / (to.time - from.time).max(1e-9)
 }
 
-fn peak_speed(rows: &[Row]) -> f64 {
+fn peak_speed(rows: &[PlotRow]) -> f64 {
     rows.windows(2)
         .map(|pair| speed(&pair[0], &pair[1]))
         .fold(0.0, f64::max)

@@ -50,7 +50,7 @@ pub struct Clause {
 
 /// What a test of a driver came to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Report {
+pub struct ConformanceReport {
     /// The driver's name.
     pub driver: String,
     /// How many joints it has.
@@ -75,7 +75,7 @@ type Trial = fn(&mut Player) -> Seen;
 ///
 /// # Errors
 /// When there is no driver, or an engine already drives it.
-pub fn test_driver(arm: &Arm) -> Result<Report, IpcError> {
+pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
     let link = EngineLink::open(arm)?;
     let joints = link.joints(Duration::from_secs(3))?;
     let hello = Hello::new(joints, PERIOD, WATCHDOG, Clock::Wall);
@@ -119,7 +119,7 @@ pub fn test_driver(arm: &Arm) -> Result<Report, IpcError> {
         ("goodbye ends the session without a fault", Player::goodbye),
     ];
     clauses.extend(sessions.map(|(name, clause)| judge(name, player.attempt(clause))));
-    Ok(Report {
+    Ok(ConformanceReport {
         driver,
         joints,
         clauses,

@@ -25,7 +25,7 @@ mod robot;
 pub use driver::Driver;
 pub use error::DriverError;
 use limiter::Limiter;
-pub use process::{Report, RunOptions, asked_to_end, run};
+pub use process::{DriverReport, RunOptions, asked_to_end, run};
 use ramp::Ramp;
 pub use reference::Reference;
 pub use robot::{About, Measured, Robot};

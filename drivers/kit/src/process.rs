@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ipc::{Arm, Clock, DriverLink};
-use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
+use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -28,7 +28,7 @@ const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
 
 /// What a run of the driver came to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Report {
+pub struct DriverReport {
     /// Periods.
     pub periods: u64,
     /// Periods of sessions without a new setpoint.
@@ -47,16 +47,16 @@ pub struct RunOptions {
     /// Where to write each setpoint received, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
-    pub urgency: Urgency,
+    pub real_time: RealTimeRequest,
 }
 
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
             log: None,
-            urgency: Urgency {
+            real_time: RealTimeRequest {
                 priority: 50,
-                ..Urgency::default()
+                ..RealTimeRequest::default()
             },
         }
     }
@@ -90,12 +90,12 @@ pub fn run<R: Robot>(
     robot: R,
     options: &RunOptions,
     stop: &AtomicBool,
-) -> Result<Report, DriverError> {
-    let urgency = options.urgency;
+) -> Result<DriverReport, DriverError> {
+    let real_time = options.real_time;
     let link = DriverLink::open(arm)?;
     let mut log = Log::open(options.log.as_deref())?;
     let mut driver = Driver::new(robot)?;
-    let mut report = Report::default();
+    let mut report = DriverReport::default();
     // While an engine paces the driver it may spin, which a real-time thread must not.
     let mut granted = None;
     while !stop.load(Ordering::Relaxed) {
@@ -105,7 +105,7 @@ pub fn run<R: Robot>(
             }
             _ => {
                 if driver.clock().is_some() && granted.is_none() {
-                    let given = urge(urgency);
+                    let given = request_real_time(real_time);
                     report.warning = given.warning();
                     granted = Some(given);
                 }

@@ -63,7 +63,7 @@ class Setpoint(ctypes.Structure):
         ("valid", c_uint32),
         ("reserved_word", c_uint32),
         ("path_time", c_double),
-        ("path_rate", c_double),
+        ("time_scaling", c_double),
         ("position", Joints),
         ("velocity", Joints),
         ("acceleration", Joints),

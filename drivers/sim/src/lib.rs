@@ -16,7 +16,7 @@ mod tool;
 use std::sync::atomic::AtomicBool;
 
 use driver_kit::RunOptions;
-pub use driver_kit::{DriverError, Report, asked_to_end};
+pub use driver_kit::{DriverError, DriverReport, asked_to_end};
 pub use options::{Options, ToolOptions};
 pub use robot::Simulated;
 
@@ -36,10 +36,10 @@ pub fn driver(options: Options) -> Result<Driver, DriverError> {
 /// # Errors
 /// When the options do not fit together, or the arm already has a driver, or shared memory cannot
 /// be used.
-pub fn run(options: Options, stop: &AtomicBool) -> Result<Report, DriverError> {
+pub fn run(options: Options, stop: &AtomicBool) -> Result<DriverReport, DriverError> {
     let how = RunOptions {
         log: options.log.clone(),
-        urgency: options.urgency,
+        real_time: options.real_time,
     };
     let arm = options.arm.clone();
     driver_kit::run(&arm, Simulated::new(options)?, &how, stop)

@@ -67,7 +67,7 @@ pub struct Options {
     /// Where to write each setpoint received, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
-    pub urgency: scheduling::Urgency,
+    pub real_time: scheduling::RealTimeRequest,
 }
 
 impl Options {
@@ -95,9 +95,9 @@ impl Options {
                 ..ToolOptions::default()
             }),
             log: None,
-            urgency: scheduling::Urgency {
+            real_time: scheduling::RealTimeRequest {
                 priority: 50,
-                ..scheduling::Urgency::default()
+                ..scheduling::RealTimeRequest::default()
             },
         }
     }

@@ -7,7 +7,7 @@ use std::fs;
 use std::thread;
 
 use ipc::{Arm, Domain, Probe};
-use scheduling::{Urgency, now_ns, sleep_until_ns, urge};
+use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 use serde::Serialize;
 
 use planner::robot::Robot;
@@ -217,14 +217,14 @@ fn leftovers(domain: &Domain) -> Check {
 
 /// Asks for each right in a thread of its own, which ends at once.
 fn rights() -> Vec<Check> {
-    let none = Urgency {
+    let none = RealTimeRequest {
         priority: 0,
         processor: None,
         lock_memory: false,
         low_latency: false,
     };
-    let ask = |name, wish: Urgency, remedy: &str| {
-        let refused = thread::spawn(move || urge(wish).refused)
+    let ask = |name, wish: RealTimeRequest, remedy: &str| {
+        let refused = thread::spawn(move || request_real_time(wish).refused)
             .join()
             .unwrap_or_default();
         match refused.first() {
@@ -235,7 +235,7 @@ fn rights() -> Vec<Check> {
     vec![
         ask(
             "real-time priority",
-            Urgency {
+            RealTimeRequest {
                 priority: 60,
                 ..none
             },
@@ -243,7 +243,7 @@ fn rights() -> Vec<Check> {
         ),
         ask(
             "memory lock",
-            Urgency {
+            RealTimeRequest {
                 lock_memory: true,
                 ..none
             },
@@ -251,7 +251,7 @@ fn rights() -> Vec<Check> {
         ),
         ask(
             "processor latency",
-            Urgency {
+            RealTimeRequest {
                 low_latency: true,
                 ..none
             },
@@ -270,12 +270,12 @@ fn quantile(sorted: &[u64], share: f64) -> u64 {
 fn wake_up(options: &DoctorOptions) -> Check {
     let period = (1e9 / options.rate_hz.clamp(100.0, 4000.0)) as u64;
     let count = options.wake_up.as_nanos() as u64 / period;
-    let wish = Urgency {
+    let wish = RealTimeRequest {
         lock_memory: false,
-        ..Urgency::default()
+        ..RealTimeRequest::default()
     };
     let measured = thread::spawn(move || {
-        let _granted = urge(wish);
+        let _granted = request_real_time(wish);
         let origin = now_ns() + period;
         let mut late = Vec::with_capacity(count as usize);
         for tick in 0..count {

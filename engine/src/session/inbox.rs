@@ -51,7 +51,7 @@ impl Inbox {
                 capacity: self.capacity,
             }));
         }
-        let age = steering.aborts();
+        let epoch = steering.aborts();
         let mut ids = Vec::with_capacity(commands.len());
         for given in commands {
             if let Command::StopMotion { emergency } = given.located.command
@@ -61,33 +61,35 @@ impl Inbox {
                     fast: emergency != 0,
                 });
             }
-            ids.push(self.queue.push(given, age)?);
+            ids.push(self.queue.push(given, epoch)?);
         }
         Ok(ids)
     }
 
-    /// Takes the oldest command off the queue, if it was given at `age`.
-    pub(super) fn take(&mut self, age: u32) -> Option<Queued> {
-        self.queue.front().filter(|queued| queued.age == age)?;
+    /// Takes the oldest command off the queue, if it was given at `epoch`.
+    pub(super) fn take(&mut self, epoch: u32) -> Option<Queued> {
+        self.queue.front().filter(|queued| queued.epoch == epoch)?;
         self.flying += 1;
         self.queue.pop()
     }
 
-    /// Whether a command of this age can be taken.
-    pub(super) fn has(&self, age: u32) -> bool {
-        self.queue.front().is_some_and(|queued| queued.age == age)
+    /// Whether a command of this epoch can be taken.
+    pub(super) fn has(&self, epoch: u32) -> bool {
+        self.queue
+            .front()
+            .is_some_and(|queued| queued.epoch == epoch)
     }
 
-    /// What waits counts as given at `age`.
-    pub(super) fn renew(&mut self, age: u32) {
-        self.queue.renew(age);
+    /// What waits counts as given at `epoch`.
+    pub(super) fn renew(&mut self, epoch: u32) {
+        self.queue.renew(epoch);
     }
 
-    /// Drops what waits and, unless it is given, what was given at another age than `age`;
+    /// Drops what waits and, unless it is given, what was given at another age than `epoch`;
     /// returns how many commands that were.
-    pub(super) fn drop_all(&mut self, age: Option<u32>) -> usize {
-        match age {
-            Some(age) => self.queue.keep(age),
+    pub(super) fn drop_all(&mut self, epoch: Option<u32>) -> usize {
+        match epoch {
+            Some(epoch) => self.queue.keep(epoch),
             None => self.queue.flush(),
         }
     }

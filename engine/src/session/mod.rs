@@ -103,7 +103,7 @@ pub struct RunSample {
     /// Planned time since the command's start, s.
     pub path_time: f64,
     /// Share of the planned speed.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Joint positions published, rad or m.
     pub q: Vec<f64>,
     /// Joint velocities published.

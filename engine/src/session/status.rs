@@ -28,7 +28,7 @@ pub struct Status {
     /// The latched fault, if any.
     pub fault: Option<String>,
     /// Share of the planned speed, now.
-    pub path_rate: f64,
+    pub time_scaling: f64,
     /// Measured joint positions, rad or m.
     pub joints: Vec<f64>,
     /// Joint positions of the last setpoint, rad or m.

@@ -23,7 +23,7 @@ use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
-use servo::{Executor, ExecutorConfig, Feeder, Monitor, Remote, Steering, ToolOrder};
+use servo::{Executor, ExecutorConfig, Monitor, Remote, SegmentSender, Steering, ToolOrder};
 
 /// How many commands are planned ahead of the one that moves.
 const AHEAD: usize = 8;
@@ -63,12 +63,12 @@ pub(super) struct Worker<'a, const N: usize> {
     /// Largest speeds of the controlled point, for jogs.
     pub(super) most: ToolLimits,
     pub(super) controller: Controller<N>,
-    pub(super) feeder: Feeder<N>,
+    pub(super) sender: SegmentSender<N>,
     monitor: Monitor<N>,
     pub(super) remote: Remote<N>,
     steering: Steering,
-    /// How many aborts were carried out: what was given at another age waits or is dropped.
-    age: u32,
+    /// How many aborts were carried out: what was given at another epoch waits or is dropped.
+    epoch: u32,
     /// Aborts of jogs that are under way.
     pub(super) jog_aborts: u32,
     /// The chain in force, for who asks where the controlled point is.
@@ -140,7 +140,7 @@ fn start<'a, const N: usize>(
     wanted.record = config.record;
     wanted.connect = config.connect;
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
-    let (executor, feeder, monitor) = Executor::start(wanted)?;
+    let (executor, sender, monitor) = Executor::start(wanted)?;
     let remote = executor.remote();
     controller.set_joints(remote.measured().setpoint);
     let worker = Worker {
@@ -149,10 +149,10 @@ fn start<'a, const N: usize>(
         chains: VecDeque::from([(0, *controller.chain())]),
         seen: Arc::new(Mutex::new(*controller.chain())),
         controller,
-        feeder,
+        sender,
         monitor,
         steering: remote.steering(),
-        age: remote.steering().aborts(),
+        epoch: remote.steering().aborts(),
         jog_aborts: 0,
         remote,
         work: VecDeque::new(),
@@ -174,12 +174,12 @@ impl<const N: usize> Worker<'_, N> {
         self.report_done();
         self.watch_jog();
         if self.may_take() {
-            self.feeder.settle(None);
+            self.sender.settle(None);
             self.take_next();
         }
         let all_fits = self.feed();
         if !all_fits || !self.may_take() {
-            self.feeder.settle(Some(self.monitor.seen()));
+            self.sender.settle(Some(self.monitor.seen()));
         }
     }
 
@@ -191,8 +191,8 @@ impl<const N: usize> Worker<'_, N> {
             && self.fault.is_none()
             && self.jogging.is_none()
             // While an abort is under way nobody knows where the next command begins.
-            && self.steering.aborts() == self.age
-            && self.ends.shared.inbox().has(self.age)
+            && self.steering.aborts() == self.epoch
+            && self.ends.shared.inbox().has(self.epoch)
     }
 
     /// Whether a refusal holds the arm until a `Resume` comes.
@@ -238,7 +238,7 @@ impl<const N: usize> Worker<'_, N> {
 
     /// Takes the next command off the queue and turns it into work.
     fn take_next(&mut self) {
-        let Some(queued) = self.ends.shared.inbox().take(self.age) else {
+        let Some(queued) = self.ends.shared.inbox().take(self.epoch) else {
             return;
         };
         // Read before the command is looked at: who resumes later has seen what it came to.
@@ -338,8 +338,8 @@ impl<const N: usize> Worker<'_, N> {
     fn feed(&mut self) -> bool {
         while let Some(work) = self.work.front() {
             let taken = match work {
-                Work::Motion(segment) => self.feeder.push(*segment),
-                Work::Tool(order) => self.feeder.tool(*order),
+                Work::Motion(segment) => self.sender.push(*segment),
+                Work::Tool(order) => self.sender.tool(*order),
             };
             if taken.is_err() {
                 return false;
@@ -378,7 +378,7 @@ impl<const N: usize> Worker<'_, N> {
             let now = remote.measured();
             status.idle &= now.idle;
             status.held |= now.held;
-            status.path_rate = now.path_rate;
+            status.time_scaling = now.time_scaling;
             status.joints = now.position.as_slice().to_vec();
             status.setpoint = now.setpoint.as_slice().to_vec();
             let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);

@@ -2,7 +2,7 @@
 
 use super::TwistPoint;
 use super::linear::{self, Rows};
-use super::redundancy::Spare;
+use super::redundancy::NullSpace;
 use crate::ik::LENGTH;
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -35,8 +35,11 @@ impl Screw {
     }
 }
 
-/// Task rows of a Jacobian, lengths in units of [`LENGTH`], with those of the spare motion.
-pub(super) fn task_rows<const N: usize>(jacobian: &SMatrix<f64, 6, N>, spare: &Spare<N>) -> Rows {
+/// Task rows of a Jacobian, lengths in units of [`LENGTH`], with those of the null-space motion.
+pub(super) fn task_rows<const N: usize>(
+    jacobian: &SMatrix<f64, 6, N>,
+    null_space: &NullSpace<N>,
+) -> Rows {
     let mut rows: Rows = [[0.0; 8]; 8];
     for j in 0..N {
         for i in 0..3 {
@@ -44,7 +47,7 @@ pub(super) fn task_rows<const N: usize>(jacobian: &SMatrix<f64, 6, N>, spare: &S
             rows[3 + i][j] = jacobian[(3 + i, j)];
         }
         for k in 0..N.saturating_sub(6) {
-            rows[6 + k][j] = spare.direction(k)[j];
+            rows[6 + k][j] = null_space.direction(k)[j];
         }
     }
     rows
@@ -64,11 +67,11 @@ pub(super) fn task_rows<const N: usize>(jacobian: &SMatrix<f64, 6, N>, spare: &S
 pub(super) fn derivatives<const N: usize>(
     jacobian: &SMatrix<f64, 6, N>,
     point: &TwistPoint,
-    spare: &Spare<N>,
+    null_space: &NullSpace<N>,
     prior: &[SVector<f64, N>; 3],
 ) -> [SVector<f64, N>; 3] {
-    let rows = task_rows(jacobian, spare);
-    let u_rows = spare.rates();
+    let rows = task_rows(jacobian, null_space);
+    let u_rows = null_space.rates();
     let solve = |goal: &Screw, order: usize| -> SVector<f64, N> {
         let mut b = [0.0; 8];
         for i in 0..3 {

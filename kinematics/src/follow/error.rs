@@ -1,6 +1,6 @@
 //! Why a tool path cannot be followed.
 
-use crate::ik::Obstacle;
+use crate::ik::IkFailure;
 use std::fmt;
 
 /// Why a tool path cannot be followed: where, which joint, why, and by how much.
@@ -25,7 +25,7 @@ pub enum FollowCause {
     /// The arm does not stand at the start of the path; amount: distance, m (rad times 0.3 m).
     Start,
     /// The pose cannot be reached at all; amount: m or rad.
-    Unreachable(Obstacle),
+    Unreachable(IkFailure),
     /// A joint would pass its limit; amount: by how much at the worst, rad or m.
     Limit,
     /// The path runs into a singular pose in a direction that the arm cannot move in
@@ -54,7 +54,7 @@ impl fmt::Display for FollowError {
                     amount * 1e3
                 )
             }
-            FollowCause::Unreachable(obstacle) => write!(f, "{obstacle}"),
+            FollowCause::Unreachable(failure) => write!(f, "{failure}"),
             FollowCause::Limit => {
                 write!(
                     f,

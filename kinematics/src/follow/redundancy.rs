@@ -1,36 +1,36 @@
-//! The spare motion of arms with more than six joints.
+//! The null-space motion of arms with more than six joints.
 //!
-//! The spare motion is fixed by linear functions of the joints, `c . q = r(u)`, where
+//! The null-space motion is fixed by linear functions of the joints, `c . q = r(u)`, where
 //! `c` is the direction in which the arm can move at the start without moving its
 //! tool, and `r` a polynomial of `u`. Thus it has exact derivatives, and nothing drifts.
-//! With two spare joints the second one stands still.
+//! With two redundant joints the second one stands still.
 
 use super::FollowPoint;
-use super::course;
 use super::error::FollowError;
+use super::null_space_path;
 use super::trace::Task;
 use nalgebra::{SMatrix, SVector};
 
-/// Coefficients of a course `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
-pub(super) type Course = [f64; 6];
+/// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
+pub(super) type NullSpacePolynomial = [f64; 6];
 
-/// Spare motion: up to two linear functions of the joints with their courses.
+/// NullSpace motion: up to two linear functions of the joints with their polynomials.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spare<const N: usize> {
+pub(super) struct NullSpace<const N: usize> {
     directions: [SVector<f64, N>; 2],
-    courses: [Course; 2],
+    polynomials: [NullSpacePolynomial; 2],
     pub(super) from: f64,
     pub(super) span: f64,
     u: f64,
     still_ends: bool,
 }
 
-impl<const N: usize> Spare<N> {
+impl<const N: usize> NullSpace<N> {
     /// For arms of up to six joints, which have none.
     pub(super) fn none() -> Self {
         Self {
             directions: [SVector::zeros(); 2],
-            courses: [[0.0; 6]; 2],
+            polynomials: [[0.0; 6]; 2],
             from: 0.0,
             span: 1.0,
             u: 0.0,
@@ -49,14 +49,14 @@ impl<const N: usize> Spare<N> {
         self
     }
 
-    /// Value of each course at `u`.
+    /// Value of each polynomial at `u`.
     pub(super) fn at(&self, u: f64) -> [f64; 2] {
         let [w, ..] = self.progress((u - self.from) / self.span);
-        self.courses
-            .map(|course| course.iter().rev().fold(0.0, |sum, c| sum * w + c))
+        self.polynomials
+            .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c))
     }
 
-    /// Progress of the courses and its first three derivatives at `x` from 0 to 1: `x`
+    /// Progress of the polynomials and its first three derivatives at `x` from 0 to 1: `x`
     /// itself, or a shape that rises from rest in the first [`EASE`] of the way, goes on
     /// evenly and comes to rest in the last.
     pub(super) fn progress(&self, x: f64) -> [f64; 4] {
@@ -71,11 +71,11 @@ impl<const N: usize> Spare<N> {
         [1.0 - w, w1, -w2, w3]
     }
 
-    /// First to third derivative of each course to `u`, by the chain rule through its progress.
+    /// First to third derivative of each polynomial to `u`, by the chain rule through its progress.
     pub(super) fn rates(&self) -> [[f64; 3]; 2] {
         let [w, w1, w2, w3] = self.progress((self.u - self.from) / self.span);
-        self.courses.map(|course| {
-            let mut c = course;
+        self.polynomials.map(|null_space_path| {
+            let mut c = null_space_path;
             let [r1, r2, r3]: [f64; 3] = std::array::from_fn(|_| {
                 for k in 0..5 {
                     c[k] = c[k + 1] * (k as f64 + 1.0);
@@ -98,7 +98,7 @@ impl<const N: usize> Spare<N> {
     }
 }
 
-/// Part of the way in which a course gets going, where it begins at rest.
+/// Part of the way in which a polynomial gets going, where it begins at rest.
 const EASE: f64 = 0.2;
 
 /// First half of an eased progress: its rate is `10 t^3 - 15 t^4 + 6 t^5` of what it
@@ -122,8 +122,8 @@ const ROOM: f64 = 0.1;
 /// Smallest singular value that counts as well away from singular poses.
 const NIMBLE: f64 = 0.05;
 
-/// Follows with the spare motion standing still if that goes well, else along the
-/// course that a search over the whole path finds.
+/// Follows with the null-space motion standing still if that goes well, else along the
+/// polynomial that a search over the whole path finds.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -131,10 +131,10 @@ pub(super) fn resolve<const N: usize>(
     let (_, jacobian) = task.solver.chain().jacobian(start);
     let directions = null_space(&jacobian);
     let (from, to) = (task.grid[0], task.grid[task.grid.len() - 1]);
-    let courses = directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let still = Spare {
+    let polynomials = directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let still = NullSpace {
         directions,
-        courses,
+        polynomials,
         from,
         span: to - from,
         u: from,
@@ -148,9 +148,9 @@ pub(super) fn resolve<const N: usize>(
         return first;
     }
     let mut answer = first;
-    for course in course::search(task, start, &still) {
+    for null_space_path in null_space_path::search(task, start, &still) {
         let mut moving = still;
-        moving.courses[0] = course;
+        moving.polynomials[0] = null_space_path;
         if let Ok(points) = task.trace(start, &moving) {
             let found = quality(&points);
             if found > best {

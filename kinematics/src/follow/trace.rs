@@ -2,7 +2,7 @@
 
 use super::differential::{derivatives, task_rows};
 use super::error::{FollowCause, FollowError};
-use super::redundancy::Spare;
+use super::redundancy::NullSpace;
 use super::{FollowOptions, FollowPoint, TwistPoint, linear};
 use crate::ik::{Goal, LENGTH, Solver};
 use crate::measure;
@@ -52,13 +52,13 @@ impl<const N: usize> Task<'_, N> {
         })
     }
 
-    /// The joint path from `start`, with the spare motion given.
+    /// The joint path from `start`, with the null-space motion given.
     pub(super) fn trace(
         &self,
         start: &SVector<f64, N>,
-        spare: &Spare<N>,
+        null_space: &NullSpace<N>,
     ) -> Result<Vec<FollowPoint<N>>, FollowError> {
-        let first = self.first(start, spare);
+        let first = self.first(start, null_space);
         let mut points = vec![first];
         let mut overrun = self.overrun(first.u, start);
         let mut last = first;
@@ -74,7 +74,7 @@ impl<const N: usize> Task<'_, N> {
                         amount,
                     });
                 }
-                last = self.advance(&last, goal, spare)?;
+                last = self.advance(&last, goal, null_space)?;
                 points.push(last);
                 let next = self.overrun(last.u, &last.q[0]);
                 if next.amount > overrun.amount {
@@ -94,7 +94,7 @@ impl<const N: usize> Task<'_, N> {
         Ok(points)
     }
 
-    fn first(&self, start: &SVector<f64, N>, spare: &Spare<N>) -> FollowPoint<N> {
+    fn first(&self, start: &SVector<f64, N>, null_space: &NullSpace<N>) -> FollowPoint<N> {
         let u = self.grid[0];
         let still = FollowPoint {
             u,
@@ -102,8 +102,8 @@ impl<const N: usize> Task<'_, N> {
             smallest: 0.0,
         };
         // The start may be off by rounding; the path goes on from the exact point.
-        let exact = self.settle(&still, u, spare).unwrap_or(*start);
-        self.finish(u, &exact, &still, spare)
+        let exact = self.settle(&still, u, null_space).unwrap_or(*start);
+        self.finish(u, &exact, &still, null_space)
     }
 
     /// The farthest point that one step reaches towards `goal`.
@@ -111,12 +111,12 @@ impl<const N: usize> Task<'_, N> {
         &self,
         last: &FollowPoint<N>,
         goal: f64,
-        spare: &Spare<N>,
+        null_space: &NullSpace<N>,
     ) -> Result<FollowPoint<N>, FollowError> {
         let shortest = SHORTEST * (self.grid[self.grid.len() - 1] - self.grid[0]);
         let mut u = goal;
         loop {
-            if let Some(point) = self.step(last, u, spare) {
+            if let Some(point) = self.step(last, u, null_space) {
                 return Ok(point);
             }
             let half = 0.5 * (last.u + u);
@@ -128,9 +128,14 @@ impl<const N: usize> Task<'_, N> {
     }
 
     /// One step, or `None` where it is too long to be sure of it.
-    fn step(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<FollowPoint<N>> {
-        let q = self.settle(last, u, spare)?;
-        let point = self.finish(u, &q, last, spare);
+    fn step(
+        &self,
+        last: &FollowPoint<N>,
+        u: f64,
+        null_space: &NullSpace<N>,
+    ) -> Option<FollowPoint<N>> {
+        let q = self.settle(last, u, null_space)?;
+        let point = self.finish(u, &q, last, null_space);
         let middle = midpoint(last, &point);
         let pose = (self.tool)(0.5 * (last.u + u)).pose;
         let error = distance(&self.solver.chain().forward(&middle), &pose);
@@ -138,8 +143,18 @@ impl<const N: usize> Task<'_, N> {
     }
 
     /// Joint positions at `u`, near those predicted from the last point.
-    fn settle(&self, last: &FollowPoint<N>, u: f64, spare: &Spare<N>) -> Option<SVector<f64, N>> {
-        self.newton((&predict(last, u), SURPRISE), u, spare, &spare.at(u))
+    fn settle(
+        &self,
+        last: &FollowPoint<N>,
+        u: f64,
+        null_space: &NullSpace<N>,
+    ) -> Option<SVector<f64, N>> {
+        self.newton(
+            (&predict(last, u), SURPRISE),
+            u,
+            null_space,
+            &null_space.at(u),
+        )
     }
 
     /// Joint positions at `u` with given values of the spare functions, within
@@ -148,19 +163,19 @@ impl<const N: usize> Task<'_, N> {
         &self,
         (predicted, surprise): (&SVector<f64, N>, f64),
         u: f64,
-        spare: &Spare<N>,
+        null_space: &NullSpace<N>,
         at: &[f64; 2],
     ) -> Option<SVector<f64, N>> {
         let target = Goal::Pose((self.tool)(u).pose);
         let mut q = *predicted;
         let mut reached = f64::INFINITY;
         for _ in 0..12 {
-            let (miss, jacobian) = self.solver.miss_at(&target, &q);
-            let rows = task_rows(&jacobian, spare);
+            let (pose_error, jacobian) = self.solver.pose_error_at(&target, &q);
+            let rows = task_rows(&jacobian, null_space);
             let mut b = [0.0; 8];
-            b[..6].copy_from_slice(&miss.rows);
+            b[..6].copy_from_slice(&pose_error.rows);
             for k in 0..N.saturating_sub(6) {
-                b[6 + k] = at[k] - spare.direction(k).dot(&q);
+                b[6 + k] = at[k] - null_space.direction(k).dot(&q);
             }
             let error = b.iter().fold(0.0_f64, |most, value| most.max(value.abs())) * LENGTH;
             if error <= EXACT || (error <= ENOUGH && error > 0.5 * reached) {
@@ -185,7 +200,7 @@ impl<const N: usize> Task<'_, N> {
         u: f64,
         q: &SVector<f64, N>,
         last: &FollowPoint<N>,
-        spare: &Spare<N>,
+        null_space: &NullSpace<N>,
     ) -> FollowPoint<N> {
         let h = u - last.u;
         let prior = [
@@ -194,7 +209,7 @@ impl<const N: usize> Task<'_, N> {
             last.q[3],
         ];
         let (_, jacobian) = self.solver.chain().jacobian(q);
-        let [q1, q2, q3] = derivatives(&jacobian, &(self.tool)(u), &spare.moved_to(u), &prior);
+        let [q1, q2, q3] = derivatives(&jacobian, &(self.tool)(u), &null_space.moved_to(u), &prior);
         FollowPoint {
             u,
             q: [*q, q1, q2, q3],
@@ -228,7 +243,7 @@ impl<const N: usize> Task<'_, N> {
             return FollowError {
                 u,
                 joint: None,
-                cause: FollowCause::Unreachable(report.obstacle),
+                cause: FollowCause::Unreachable(report.failure),
                 amount,
             };
         }

@@ -2,7 +2,7 @@
 
 use super::six::{Placing, Shape, Six};
 use super::swivel::Swivel;
-use crate::links::Line;
+use crate::links::ScrewAxis;
 use nalgebra::Vector3;
 
 /// How far the axes may be from a family's structure.
@@ -35,9 +35,9 @@ pub(crate) enum Form {
     /// Six joints.
     Six(Six),
     /// Seven joints, closed for the other six when the last is given.
-    Last(Six, Line),
+    Last(Six, ScrewAxis),
     /// Seven joints, closed for the other six when the first is given.
-    First(Six, Line),
+    First(Six, ScrewAxis),
     /// Seven joints, closed for a given angle of the elbow about the line from shoulder to wrist.
     Swivel(Swivel),
 }
@@ -50,13 +50,13 @@ pub(crate) struct Class {
 }
 
 /// The closed form of an arm with these axes, if it has one.
-pub(crate) fn classify(lines: &[Line]) -> Option<Class> {
+pub(crate) fn classify(lines: &[ScrewAxis]) -> Option<Class> {
     [(EXACT, true), (CALIBRATED, false)]
         .into_iter()
         .find_map(|(tolerance, exact)| form(lines, tolerance).map(|form| Class { form, exact }))
 }
 
-fn form(lines: &[Line], tolerance: Tolerance) -> Option<Form> {
+fn form(lines: &[ScrewAxis], tolerance: Tolerance) -> Option<Form> {
     match *lines {
         [a, b, c, d, e, f] => Some(Form::Six(six(&[a, b, c, d, e, f], tolerance)?)),
         [a, b, c, d, e, f, g] => {
@@ -80,7 +80,7 @@ fn form(lines: &[Line], tolerance: Tolerance) -> Option<Form> {
 }
 
 /// The shape of six axes, forwards or backwards, with the axes moved exactly into it.
-fn six(lines: &[Line; 6], tolerance: Tolerance) -> Option<Six> {
+fn six(lines: &[ScrewAxis; 6], tolerance: Tolerance) -> Option<Six> {
     [false, true].into_iter().find_map(|reversed| {
         let mut lines = *lines;
         if reversed {
@@ -91,7 +91,7 @@ fn six(lines: &[Line; 6], tolerance: Tolerance) -> Option<Six> {
     })
 }
 
-fn wrist(lines: &mut [Line; 6], tolerance: Tolerance) -> Option<Shape> {
+fn wrist(lines: &mut [ScrewAxis; 6], tolerance: Tolerance) -> Option<Shape> {
     let [a, b, c, d, e, f] = *lines;
     let point = concurrent([d, e, f], tolerance)?;
     let placing = if parallel(&b, &c, tolerance) && !parallel(&a, &b, tolerance) {
@@ -106,7 +106,7 @@ fn wrist(lines: &mut [Line; 6], tolerance: Tolerance) -> Option<Shape> {
     Some(Shape::Wrist(point, placing))
 }
 
-fn parallels(lines: &mut [Line; 6], tolerance: Tolerance) -> Option<Shape> {
+fn parallels(lines: &mut [ScrewAxis; 6], tolerance: Tolerance) -> Option<Shape> {
     let [a, b, c, d, e, f] = *lines;
     let three = parallel(&b, &c, tolerance) && parallel(&c, &d, tolerance);
     if !three || parallel(&a, &b, tolerance) || parallel(&d, &e, tolerance) {
@@ -123,7 +123,7 @@ fn vector(v: [f64; 3]) -> Vector3<f64> {
 }
 
 /// Gives axes that are parallel their mean direction, each keeping its way.
-fn align(lines: &mut [Line]) {
+fn align(lines: &mut [ScrewAxis]) {
     let Some(first) = lines.first().map(|line| vector(line.h)) else {
         return;
     };
@@ -137,12 +137,12 @@ fn align(lines: &mut [Line]) {
     }
 }
 
-fn parallel(a: &Line, b: &Line, tolerance: Tolerance) -> bool {
+fn parallel(a: &ScrewAxis, b: &ScrewAxis, tolerance: Tolerance) -> bool {
     vector(a.h).cross(&vector(b.h)).norm() <= tolerance.angle
 }
 
 /// The point in which two axes meet.
-fn meeting(a: &Line, b: &Line, tolerance: Tolerance) -> Option<[f64; 3]> {
+fn meeting(a: &ScrewAxis, b: &ScrewAxis, tolerance: Tolerance) -> Option<[f64; 3]> {
     let (ha, hb) = (vector(a.h), vector(b.h));
     let n = ha.cross(&hb);
     // Axes that are nearly parallel meet nowhere in particular.
@@ -157,7 +157,7 @@ fn meeting(a: &Line, b: &Line, tolerance: Tolerance) -> Option<[f64; 3]> {
 }
 
 /// The point in which three consecutive axes meet.
-fn concurrent([a, b, c]: [Line; 3], tolerance: Tolerance) -> Option<[f64; 3]> {
+fn concurrent([a, b, c]: [ScrewAxis; 3], tolerance: Tolerance) -> Option<[f64; 3]> {
     let first = meeting(&a, &b, tolerance)?;
     let second = meeting(&b, &c, tolerance)?;
     let distance = (vector(first) - vector(second)).norm();

@@ -98,7 +98,7 @@ impl Closed {
     }
 
     /// Whether the form leaves one parameter free.
-    pub(crate) fn spare(&self) -> bool {
+    pub(crate) fn is_redundant(&self) -> bool {
         !matches!(self.class.form, Form::Six(_))
     }
 

@@ -10,7 +10,7 @@
 //! that nothing grows large where axes are nearly parallel.
 
 use super::product::Columns;
-use crate::links::{Line, normal};
+use crate::links::{ScrewAxis, normal};
 use nalgebra::Vector3;
 
 /// From one axis to the next: a shift (m), then a turn about x by sine and cosine.
@@ -36,7 +36,7 @@ pub(crate) struct Frames {
 
 impl Frames {
     /// Frames with these origins, each on its axis.
-    pub(crate) fn of(lines: &[Line; 6], origins: &[Vector3<f64>; 6]) -> Self {
+    pub(crate) fn of(lines: &[ScrewAxis; 6], origins: &[Vector3<f64>; 6]) -> Self {
         let z = lines.map(|line| Vector3::from(line.h));
         let mut x = [Vector3::zeros(); 6];
         let (mut steps, mut zero) = ([Step::default(); 5], [0.0; 6]);

@@ -35,7 +35,7 @@ enum Kind {
 
 /// Distance from a goal, positions divided by [`LENGTH`], and its two plain sizes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Miss {
+pub(crate) struct PoseError {
     pub(crate) rows: [f64; 6],
     /// m.
     pub(crate) position: f64,
@@ -66,7 +66,7 @@ impl Goal {
 impl Target {
     /// How far the tool is from the goal: what is to be added, in base axes.
     #[inline(always)]
-    pub(crate) fn miss<A: Arith>(&self, a: A, tool: &Frame) -> Miss {
+    pub(crate) fn pose_error<A: Arith>(&self, a: A, tool: &Frame) -> PoseError {
         let d = self.frame.p.sub(tool.p).0;
         let w = match self.kind {
             Kind::Pose => rotation_between(a, tool, &self.frame),
@@ -75,7 +75,7 @@ impl Target {
         };
         let square = |v: [f64; 3]| a.fma(v[0], v[0], a.fma(v[1], v[1], v[2] * v[2]));
         let scale = 1.0 / LENGTH;
-        Miss {
+        PoseError {
             rows: [d[0] * scale, d[1] * scale, d[2] * scale, w[0], w[1], w[2]],
             position: square([d[0], d[1], d[2]]).sqrt(),
             rotation: square(w).sqrt(),

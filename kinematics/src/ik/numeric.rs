@@ -24,7 +24,7 @@ pub(crate) struct Stop {
 
 /// Where a descent ended.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Landing<const N: usize> {
+pub(crate) struct SolverResult<const N: usize> {
     pub(crate) q: SVector<f64, N>,
     /// Distance from the goal, m.
     pub(crate) position: f64,
@@ -50,7 +50,7 @@ pub(crate) struct Descent<'a, const N: usize> {
 }
 
 impl<const N: usize> Op for Descent<'_, N> {
-    type Output = Landing<N>;
+    type Output = SolverResult<N>;
 
     /// Levenberg-Marquardt with damping in proportion to the squared distance.
     ///
@@ -58,14 +58,14 @@ impl<const N: usize> Op for Descent<'_, N> {
     /// T. Sugihara, "Solvability-unconcerned inverse kinematics by the
     /// Levenberg-Marquardt method", IEEE Trans. Robotics 27(5), 2011, eq. 8 and 23.
     #[inline(always)]
-    fn run<A: Arith>(self, a: A) -> Landing<N> {
+    fn run<A: Arith>(self, a: A) -> SolverResult<N> {
         let Self {
             chain,
             target,
             stop,
             mut seed,
         } = self;
-        let mut best = Landing {
+        let mut best = SolverResult {
             q: seed,
             position: f64::INFINITY,
             rotation: f64::INFINITY,
@@ -76,15 +76,19 @@ impl<const N: usize> Op for Descent<'_, N> {
         for step in 0..=stop.steps {
             let reached = chain.reach(a, &seed);
             let tool = reached.end.frame();
-            let miss = target.miss(a, &tool);
-            let square = miss.rows.iter().fold(0.0, |sum, e| a.fma(*e, *e, sum));
+            let pose_error = target.pose_error(a, &tool);
+            let square = pose_error
+                .rows
+                .iter()
+                .fold(0.0, |sum, e| a.fma(*e, *e, sum));
             if square < best_square {
                 best_square = square;
-                best = Landing {
+                best = SolverResult {
                     q: seed,
-                    position: miss.position,
-                    rotation: miss.rotation,
-                    reached: miss.position <= stop.position && miss.rotation <= stop.rotation,
+                    position: pose_error.position,
+                    rotation: pose_error.rotation,
+                    reached: pose_error.position <= stop.position
+                        && pose_error.rotation <= stop.rotation,
                 };
                 if best.reached {
                     return best;
@@ -97,7 +101,7 @@ impl<const N: usize> Op for Descent<'_, N> {
             }
             let mut rows = chain.rows(&reached);
             target.shape(&tool, &mut rows);
-            let mut rest = miss.rows;
+            let mut rest = pose_error.rows;
             let damping = a.fma(0.03, square, 1e-12);
             let mut held = [None; 8];
             let mut step = [0.0; 8];
@@ -124,10 +128,10 @@ impl<const N: usize> Op for Descent<'_, N> {
 
 /// `J^T e`.
 #[inline(always)]
-fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], miss: &[f64; 6]) -> [f64; 8] {
+fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f64; 8] {
     let mut sum = [F4::splat(a, 0.0); 2];
     for r in 0..6 {
-        let e = F4::splat(a, miss[r]);
+        let e = F4::splat(a, pose_error[r]);
         sum = [rows[r][0].fma(e, sum[0]), rows[r][1].fma(e, sum[1])];
     }
     let ([a, b, c, d], [e, f, g, h]) = (sum[0].array(), sum[1].array());

@@ -1,6 +1,8 @@
 //! Three turns that bring one orientation to another, four branches side by side.
 
-use super::lanes::{Angle, Held, Pair, Vec4, Wave, angle_of, angles_of, last_turn_to, turn_to};
+use super::simd::{
+    Angle, Held, Pair, TrigEquation, Vec4, angle_of, angles_of, last_turn_to, turn_to,
+};
 use super::six::dot;
 use crate::arith::Arith;
 use crate::wide::{B4, F4};
@@ -19,7 +21,7 @@ pub(crate) fn orient<A: Arith>(
 ) -> ([Angle<A>; 3], Pair<A>) {
     let a = axis.0[0].build();
     let level = axis.along(first);
-    let wave = Wave::of(Vec4::splat(a, first), middle, Vec4::splat(a, last), level);
+    let wave = TrigEquation::of(Vec4::splat(a, first), middle, Vec4::splat(a, last), level);
     // With the middle axis square to both, the discriminant is the squared sine between
     // first axis and target; taken from their product it stays exact when small.
     let tilts = if square([first, middle, last]) {

@@ -129,7 +129,7 @@ impl<const N: usize> Solver<N> {
 
     /// Brings a near branch onto the pose; `None` where it does not get there.
     fn polished(&self, target: &Target, q: &SVector<f64, N>) -> Option<SVector<f64, N>> {
-        let landing = self.descend(
+        let result = self.descend(
             target,
             q,
             Stop {
@@ -139,7 +139,7 @@ impl<const N: usize> Solver<N> {
             },
         );
         // A seed that had to go far was none.
-        (landing.reached && turns::distance(&self.chain, &landing.q, q) < 2.0).then_some(landing.q)
+        (result.reached && turns::distance(&self.chain, &result.q, q) < 2.0).then_some(result.q)
     }
 
     /// Direction of the joints that moves the tool least, and by how much: the last

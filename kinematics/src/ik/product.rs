@@ -1,7 +1,7 @@
 //! The product of the turns of an arm's joints, as closed forms take it.
 
 use crate::arith::{self, Arith};
-use crate::links::Line;
+use crate::links::ScrewAxis;
 use crate::wide::F4;
 use nalgebra::Isometry3;
 
@@ -91,13 +91,13 @@ impl<A: Arith> Product<A> {
 
     /// Without a last turn by `angle` (rad) about a line.
     #[inline(always)]
-    pub(crate) fn without_last(&self, line: &Line, angle: f64) -> Self {
+    pub(crate) fn without_last(&self, line: &ScrewAxis, angle: f64) -> Self {
         self.times(&turn(self.build(), line, -angle))
     }
 
     /// Without a first turn by `angle` (rad) about a line.
     #[inline(always)]
-    pub(crate) fn without_first(&self, line: &Line, angle: f64) -> Self {
+    pub(crate) fn without_first(&self, line: &ScrewAxis, angle: f64) -> Self {
         let a = self.build();
         Self::new(a, turn(a, line, -angle)).times(&self.columns())
     }
@@ -146,7 +146,7 @@ pub(crate) fn inverse(&[x, y, z, p]: &Columns) -> Columns {
 
 /// One turn about a line (Rodrigues).
 #[inline(always)]
-fn turn<A: Arith>(a: A, line: &Line, angle: f64) -> Columns {
+fn turn<A: Arith>(a: A, line: &ScrewAxis, angle: f64) -> Columns {
     let ([s], [c]) = arith::sin_cos(a, [angle]);
     let ([x, y, z], p, v) = (line.h, line.p, 1.0 - c);
     let columns = [

@@ -53,7 +53,7 @@ impl<'a, const N: usize> IntoIterator for &'a Branches<N> {
 /// What keeps the arm from a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Obstacle {
+pub enum IkFailure {
     /// The goal holds a value that is not a finite number.
     NotFinite,
     /// Even the position alone is too far, or too near the base.
@@ -82,9 +82,9 @@ pub enum Obstacle {
 
 /// Why a goal is not reached, with the nearest that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report<const N: usize> {
+pub struct IkReport<const N: usize> {
     /// What is in the way.
-    pub obstacle: Obstacle,
+    pub failure: IkFailure,
     /// Joint positions whose tool pose is the nearest found.
     pub nearest: SVector<f64, N>,
     /// That tool pose.
@@ -95,7 +95,7 @@ pub struct Report<const N: usize> {
     pub rotation_error: f64,
 }
 
-impl fmt::Display for Obstacle {
+impl fmt::Display for IkFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite => write!(f, "the pose is not finite"),
@@ -123,19 +123,19 @@ impl fmt::Display for Obstacle {
     }
 }
 
-impl<const N: usize> fmt::Display for Report<N> {
+impl<const N: usize> fmt::Display for IkReport<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
             "{}; the nearest pose found is off by {} and {:.2} degrees",
-            self.obstacle,
+            self.failure,
             millimetres(self.position_error),
             self.rotation_error.to_degrees(),
         )
     }
 }
 
-impl<const N: usize> std::error::Error for Report<N> {}
+impl<const N: usize> std::error::Error for IkReport<N> {}
 
 fn millimetres(length: f64) -> String {
     let mm = length * 1e3;

@@ -12,11 +12,11 @@
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025, sections 4.1 and 4.3.
 
 use super::frames::Frames;
-use super::lanes::Held;
 use super::product::{Columns, Padded, Product, inverse, padded};
+use super::simd::Held;
 use super::solving::Solving;
 use crate::arith::Arith;
-use crate::links::{Line, foot};
+use crate::links::{ScrewAxis, foot};
 use crate::wide::{B4, F4};
 use nalgebra::Vector3;
 
@@ -81,7 +81,7 @@ pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 impl Six {
     /// The closed form of axes that have this shape exactly.
-    pub(crate) fn new(mut lines: [Line; 6], shape: Shape, reversed: bool, slack: f64) -> Self {
+    pub(crate) fn new(mut lines: [ScrewAxis; 6], shape: Shape, reversed: bool, slack: f64) -> Self {
         let way = if reversed { -1.0 } else { 1.0 };
         let mut signs = [way; 6];
         let parallel = match shape {
@@ -182,7 +182,7 @@ impl Six {
 }
 
 /// Origins of the frames: where axes meet, and else the nearest of the next axis.
-fn origins(lines: &[Line; 6], shape: Shape) -> [Vector3<f64>; 6] {
+fn origins(lines: &[ScrewAxis; 6], shape: Shape) -> [Vector3<f64>; 6] {
     let (meet, from, known) = match shape {
         Shape::Wrist(wrist, Placing::Parallel) => (wrist, lines[0].p, 3),
         Shape::Wrist(wrist, Placing::Meeting(point)) => (wrist, point, 3),

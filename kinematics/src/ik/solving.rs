@@ -1,8 +1,8 @@
 //! One closed form of six joints under way: four branches side by side, in the frames of
 //! the arm.
 
-use super::lanes::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
 use super::product::Columns;
+use super::simd::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
 use super::six::{Joints, Placing, Shape, Six, dot};
 use crate::arith::Arith;
 use crate::wide::{B4, F4};

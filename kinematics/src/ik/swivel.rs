@@ -4,26 +4,31 @@
 //! about the line from shoulder to wrist, counted from the plane through that line
 //! and axis 1.
 
-use super::lanes::{FIRST, Held, SECOND, Vec4, Wave, angle_of, angles_of};
 use super::orient::{orient, orient_both};
 use super::product::Product;
+use super::simd::{FIRST, Held, SECOND, TrigEquation, Vec4, angle_of, angles_of};
 use super::six::{Joints, dot, minus};
 use crate::arith::{self, Arith};
-use crate::links::{Line, across};
+use crate::links::{ScrewAxis, across};
 use crate::wide::F4;
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// Axes at q = 0 of an arm with spherical shoulder, one elbow joint and spherical wrist.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Swivel {
-    lines: [Line; 7],
+    lines: [ScrewAxis; 7],
     shoulder: [f64; 3],
     wrist: [f64; 3],
     slack: f64,
 }
 
 impl Swivel {
-    pub(crate) fn new(lines: &[Line; 7], shoulder: [f64; 3], wrist: [f64; 3], slack: f64) -> Self {
+    pub(crate) fn new(
+        lines: &[ScrewAxis; 7],
+        shoulder: [f64; 3],
+        wrist: [f64; 3],
+        slack: f64,
+    ) -> Self {
         Self {
             lines: *lines,
             shoulder,
@@ -90,7 +95,7 @@ impl Swivel {
         let (reach, upper) = (minus(self.wrist, elbow), minus(self.shoulder, elbow));
         let d = 0.5 * (dot(reach, reach) + dot(upper, upper) - dot(away, away));
         let forearm = Vec4::splat(a, reach);
-        let wave = Wave::of(Vec4::splat(a, upper), h(3), forearm, F4::splat(a, d));
+        let wave = TrigEquation::of(Vec4::splat(a, upper), h(3), forearm, F4::splat(a, d));
         let bends = wave.solve(self.slack);
         let bend = bends.pick(FIRST, hold[3]);
 

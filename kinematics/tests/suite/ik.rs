@@ -1,7 +1,7 @@
 //! Inverse kinematics: what comes out reaches the pose, and what does not come is explained.
 
 use crate::arms::{self, Random, SEVEN, SIX};
-use kinematics::{Goal, Obstacle, Solver};
+use kinematics::{Goal, IkFailure, Solver};
 use nalgebra::{Isometry3, SVector, Vector3};
 
 /// Distance (m) and angle (rad) between two poses.
@@ -150,7 +150,7 @@ fn out_of_reach_says_by_how_much() {
         Vector3::y() * std::f64::consts::FRAC_PI_2,
     );
     let report = solver.solve(&far).unwrap_err();
-    let Obstacle::OutOfReach { distance } = report.obstacle else {
+    let IkFailure::OutOfReach { distance } = report.failure else {
         panic!("{report}")
     };
     let reach = 0.27 + 0.302_f64.hypot(0.07) + 0.072;
@@ -165,8 +165,8 @@ fn out_of_reach_says_by_how_much() {
     );
     let nan = Isometry3::translation(f64::NAN, 0.0, 0.0);
     assert_eq!(
-        solver.solve(&nan).unwrap_err().obstacle,
-        Obstacle::NotFinite
+        solver.solve(&nan).unwrap_err().failure,
+        IkFailure::NotFinite
     );
 }
 

@@ -8,8 +8,8 @@ use super::{Code, CommandSink, PlanInterpreter};
 use crate::PlanError;
 use crate::pddl::read_plan;
 use crate::run::{
-    Batch, Counters, Motion, MotionFailure, Outcome, Report, Robot, RobotOptions, State, Tool,
-    situation,
+    Batch, Counters, Motion, MotionFailure, Outcome, PlanRunReport, Robot, RobotOptions, State,
+    Tool, situation,
 };
 use crate::world::{Change, Class, Model, StoredRun, Writer};
 
@@ -142,7 +142,7 @@ pub fn pull(
     run: PulledRun,
     place: Pull<'_>,
     observer: &mut dyn FnMut(usize),
-) -> Result<Report, PlanError> {
+) -> Result<PlanRunReport, PlanError> {
     let began = Instant::now();
     let resumed = run.id.is_some();
     if let Some(arm) = place.motion.arm().filter(|_| !resumed) {
@@ -197,13 +197,13 @@ enum End {
 }
 
 impl End {
-    fn report(self, counters: Counters, began: Instant) -> Report {
+    fn report(self, counters: Counters, began: Instant) -> PlanRunReport {
         let (outcome, code, reason) = match self {
             Self::Over(Outcome::Stopped) => ("stopped", 0, None),
             Self::Over(Outcome::Failed { code, reason }) => ("failed", code, Some(reason)),
             Self::Interrupted(reason) => ("interrupted", 0, Some(reason)),
         };
-        Report {
+        PlanRunReport {
             outcome,
             code,
             reason,

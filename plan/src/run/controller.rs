@@ -13,7 +13,7 @@ use super::motion::{Motion, MotionFailure};
 use super::order::Foresight;
 use super::preparation::{parameters, prepare};
 use super::program::Program;
-use super::report::{Event, Report};
+use super::report::{Event, PlanRunReport};
 use super::robot::{Robot, RobotOptions, situation};
 use super::state::{Act, Outcome, State, Step};
 use super::value::Value;
@@ -233,7 +233,7 @@ impl<'a> Controller<'a> {
     ///
     /// # Errors
     /// [`PlanError`] of the database; what goes wrong in the plan is in the report.
-    pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<Report, PlanError> {
+    pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<PlanRunReport, PlanError> {
         let began = Instant::now();
         match self.open() {
             // An arm that cannot be brought back now may be helped, and the run goes on later.
@@ -260,7 +260,7 @@ impl<'a> Controller<'a> {
                 self.warnings.push(format!("EndCanon: {failure}"));
             }
         }
-        Ok(Report {
+        Ok(PlanRunReport {
             outcome,
             code,
             reason,

@@ -29,7 +29,7 @@ pub use factotum::{Delivery, Factotum, FactotumStatus, SimulatedFactotum, Stock}
 pub use motion::{Motion, MotionFailure, Situation};
 pub use preparation::{parameters, prepare};
 pub use program::Program;
-pub use report::{Event, Report};
+pub use report::{Event, PlanRunReport};
 pub use robot::RobotOptions;
 pub(crate) use robot::{Robot, situation};
 pub use simulated::SimulatedMotion;

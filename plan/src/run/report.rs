@@ -30,7 +30,7 @@ pub enum Event {
 
 /// How a run went.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
+pub struct PlanRunReport {
     /// `stopped` (by Stop), `failed`, or `interrupted` by the operator: then it can be resumed.
     pub outcome: &'static str,
     /// Reason given to EndCanon: 0, or positive.

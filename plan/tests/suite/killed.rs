@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use plan::run::{
-    Batch, Cell, Controller, Motion, MotionFailure, Report, RunOptions, SimulatedFactotum,
+    Batch, Cell, Controller, Motion, MotionFailure, PlanRunReport, RunOptions, SimulatedFactotum,
     SimulatedMotion, Situation, Stock, prepare,
 };
 use plan::world::{Durability, Reader, Writer, import_toml};
@@ -38,7 +38,7 @@ impl Motion for Slow {
 }
 
 /// Starts the plan in this database, or goes on with it.
-fn run(path: &Path, motion: &mut dyn Motion) -> Report {
+fn run(path: &Path, motion: &mut dyn Motion) -> PlanRunReport {
     let source = repository_text("examples/kitting/kit-abc.plan");
     let writer = Writer::open(path, Durability::Process).unwrap();
     let world = import_toml(&repository_text("examples/kitting/workstation.toml")).unwrap();

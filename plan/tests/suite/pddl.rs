@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use plan::interp::{Code, CommandSink, PddlInterpreter, PlanInterpreter, Pull, PulledRun, pull};
 use plan::pddl::{ActionTable, Failure, read_domain, read_plan, read_problem, simulate};
-use plan::run::{Report, RobotOptions, SimulatedMotion};
+use plan::run::{PlanRunReport, RobotOptions, SimulatedMotion};
 use plan::world::{Class, Durability, Model, Writer, import_toml};
 
 use crate::fixtures::repository_text;
@@ -96,7 +96,7 @@ fn fresh_world(folder: &Path) -> PathBuf {
 }
 
 /// Executes a run with an arm that fails at these commands.
-fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]) -> Report {
+fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]) -> PlanRunReport {
     let options = &RobotOptions::default();
     let mut interpreter = PddlInterpreter::new(path, table.clone(), options.clone());
     interpreter.go_on(run.source(), run.done());
@@ -114,7 +114,7 @@ fn pull_run(path: &Path, table: &ActionTable, run: PulledRun, failures: &[usize]
 }
 
 /// Executes a plan file with a simulated arm in the example workstation for PDDL plans.
-fn execute(plan: &Path, table: &ActionTable) -> (Report, Model) {
+fn execute(plan: &Path, table: &ActionTable) -> (PlanRunReport, Model) {
     let folder = tempfile::tempdir().unwrap();
     let path = fresh_world(folder.path());
     let source = std::fs::read_to_string(plan).unwrap();

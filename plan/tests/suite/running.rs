@@ -5,8 +5,8 @@ use std::path::Path;
 
 use plan::finding::Severity;
 use plan::run::{
-    Cell, Controller, Event, Policy, Report, RunOptions, SimulatedFactotum, SimulatedMotion, Stock,
-    prepare,
+    Cell, Controller, Event, PlanRunReport, Policy, RunOptions, SimulatedFactotum, SimulatedMotion,
+    Stock, prepare,
 };
 use plan::world::{Class, Durability, Model, Reader, Scalar, Writer, check, import_toml};
 
@@ -24,7 +24,7 @@ pub(crate) struct Trial {
 
 /// What came of it.
 pub(crate) struct Result {
-    pub(crate) report: Report,
+    pub(crate) report: PlanRunReport,
     pub(crate) world: Model,
     pub(crate) events: Vec<Event>,
 }

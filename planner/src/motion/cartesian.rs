@@ -1,7 +1,7 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
 use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
-use kinematics::{Chain, Obstacle};
+use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
 use trajectory::{
@@ -81,18 +81,18 @@ impl<const N: usize> Planner<N> {
                 .max(plan.certificate().angular_jerk.ratio),
             fallbacks: plan.fallbacks(),
         };
-        let passes: Vec<f64> = plan.passes().iter().map(|pass| pass.time).collect();
-        let draft = |trajectory, passes| Draft {
-            passes,
+        let crossings: Vec<f64> = plan.crossings().iter().map(|pass| pass.time).collect();
+        let draft = |trajectory, crossings| Draft {
+            crossings,
             ..Draft::of(trajectory)
         };
         if is_still(&poses) || plan.duration() <= 0.0 {
-            let at_once = vec![0.0; passes.len()];
+            let at_once = vec![0.0; crossings.len()];
             return Ok((draft(Trajectory::new(Vec::new()), at_once), blend));
         }
         let towards = |u: f64| {
             1 + plan
-                .passes()
+                .crossings()
                 .iter()
                 .take_while(|pass| pass.time <= u)
                 .count()
@@ -102,7 +102,7 @@ impl<const N: usize> Planner<N> {
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
         let free = direct.duration();
-        let direct = self.slowed(draft(direct, passes.clone()), motion);
+        let direct = self.slowed(draft(direct, crossings.clone()), motion);
         if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
             return Ok((direct, blend));
         }
@@ -115,7 +115,7 @@ impl<const N: usize> Planner<N> {
         let path = joint_path(&plan, &points)?;
         let timed = time_path(&path, &self.limits, &motion.limits, &options);
         let timed = timed.map(|timed| {
-            let times = passes.iter().map(|u| moment(&timed.law, *u)).collect();
+            let times = crossings.iter().map(|u| moment(&timed.law, *u)).collect();
             self.slowed(draft(timed.trajectory, times), motion)
         });
         match timed {
@@ -187,11 +187,11 @@ impl<const N: usize> Planner<N> {
             .checked_sub(1)
             .and_then(|index| motion.poses.get(index));
         match ahead.map(|goal| self.solver.nearest(goal, start)) {
-            Some(Err(report)) => match report.obstacle {
-                Obstacle::OutOfReach { distance } if distance > motion.tolerance => {
+            Some(Err(report)) => match report.failure {
+                IkFailure::OutOfReach { distance } if distance > motion.tolerance => {
                     self.refusal(*pose, &report)
                 }
-                Obstacle::Orientation { .. } => self.refusal(*pose, &report),
+                IkFailure::Orientation { .. } => self.refusal(*pose, &report),
                 _ => blocked,
             },
             _ => blocked,
@@ -217,12 +217,12 @@ impl<const N: usize> Planner<N> {
                 "a singular pose, where {joint} would have to jump (smallest singular value {:.1e})",
                 error.amount
             ),
-            (FollowCause::Unreachable(Obstacle::AtLimit { joint, beyond }), _) => format!(
+            (FollowCause::Unreachable(IkFailure::AtLimit { joint, beyond }), _) => format!(
                 "{} would have to go {} beyond its limit",
                 self.joint_name(joint),
                 self.amount(joint, beyond)
             ),
-            (FollowCause::Unreachable(obstacle), _) => obstacle.to_string(),
+            (FollowCause::Unreachable(failure), _) => failure.to_string(),
             (_, _) => error.to_string(),
         };
         MotionError::Blocked {

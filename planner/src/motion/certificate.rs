@@ -14,7 +14,7 @@ use crate::task::{Move, Shape};
 
 /// How one intermediate pose was passed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PassReport {
+pub struct CrossingReport {
     /// Which pose of the command, counted from 1.
     pub index: usize,
     /// Distance of the controlled point from the pose at the pass, m.
@@ -112,7 +112,7 @@ pub struct MoveCertificate {
     /// poses or the change from one limit to the next.
     pub active: Vec<ActiveLimit>,
     /// Every intermediate pose, in the order of the command.
-    pub poses: Vec<PassReport>,
+    pub poses: Vec<CrossingReport>,
     /// Whether the intermediate poses are passed in order, each within its tolerances.
     pub in_order: bool,
     /// Peaks of limits as ratios; at most 1.
@@ -155,7 +155,7 @@ impl<const N: usize> JointsToTool<N> for Arm<'_, N> {
 
 /// The way the tool takes, held against the poses of the command.
 pub(super) struct Way {
-    pub poses: Vec<PassReport>,
+    pub poses: Vec<CrossingReport>,
     pub in_order: bool,
     pub straightness_m: Option<f64>,
     pub corridor_m: Option<f64>,
@@ -171,7 +171,7 @@ pub(super) fn way<const N: usize>(
     (draft, bounds): (&Draft<N>, &MotionBounds<N>),
 ) -> Way {
     let (poses, in_order) = match motion.shape {
-        Shape::Smooth => passes(motion, chain, (&draft.trajectory, &draft.passes)),
+        Shape::Smooth => crossings(motion, chain, (&draft.trajectory, &draft.crossings)),
         Shape::Joint | Shape::Straight => (Vec::new(), true),
     };
     let last = draft.trajectory.sample(draft.trajectory.duration());
@@ -202,8 +202,8 @@ pub(super) fn corridor(motion: &Move) -> f64 {
 const FIT: f64 = 1e-6;
 
 /// The legs of a smooth move, from pass to pass.
-fn legs(motion: &Move, start: &Isometry3<f64>, passes: &[PassReport]) -> Vec<Leg> {
-    let times = passes.iter().map(|pass| pass.time_s);
+fn legs(motion: &Move, start: &Isometry3<f64>, crossings: &[CrossingReport]) -> Vec<Leg> {
+    let times = crossings.iter().map(|pass| pass.time_s);
     let ends = times.clone().chain([f64::INFINITY]);
     let from = [start].into_iter().chain(&motion.poses);
     let pairs = from.zip(&motion.poses);
@@ -220,11 +220,11 @@ fn legs(motion: &Move, start: &Isometry3<f64>, passes: &[PassReport]) -> Vec<Leg
 /// How each intermediate pose is passed at the time known from the planned way, which is that of
 /// the closest approach. Where the joints leave the planned way by the last digits, and with them
 /// the ball, the closest moment near that time counts.
-fn passes<const N: usize>(
+fn crossings<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
     (trajectory, times): (&Trajectory<N>, &[f64]),
-) -> (Vec<PassReport>, bool) {
+) -> (Vec<CrossingReport>, bool) {
     let intermediate = &motion.poses[..motion.poses.len() - 1];
     let angular_tolerance_rad = angular_tolerance(motion.tolerance);
     let (mut since, mut in_order) = (0.0, times.len() == intermediate.len());
@@ -250,7 +250,7 @@ fn passes<const N: usize>(
                 (deviation_m, angle_rad) = seen(time_s);
             }
         }
-        let pass = PassReport {
+        let pass = CrossingReport {
             index: index + 1,
             deviation_m,
             tolerance_m: motion.tolerance,
@@ -289,7 +289,7 @@ pub(super) fn check_passes(certificate: &MoveCertificate, motion: &Move) -> Resu
 }
 
 /// Whether a pose is passed within its tolerances, not before a time (s).
-fn holds(pass: &PassReport, since: f64) -> bool {
+fn holds(pass: &CrossingReport, since: f64) -> bool {
     pass.time_s >= since
         && pass.deviation_m <= pass.tolerance_m.max(EXACT)
         && pass.angle_rad <= pass.angular_tolerance_rad.max(EXACT_ANGLE)

@@ -8,7 +8,7 @@ pub(super) struct Draft<const N: usize> {
     /// The motion.
     pub trajectory: Trajectory<N>,
     /// When it passes each intermediate pose of a smooth move, s; never decreasing.
-    pub passes: Vec<f64>,
+    pub crossings: Vec<f64>,
     /// Its bounds, once they were computed: then it keeps every limit.
     pub bounds: Option<MotionBounds<N>>,
     /// No motion along its way is shorter, s; 0 where that is not known.
@@ -20,7 +20,7 @@ impl<const N: usize> Draft<N> {
     pub(super) fn of(trajectory: Trajectory<N>) -> Self {
         Self {
             trajectory,
-            passes: Vec::new(),
+            crossings: Vec::new(),
             bounds: None,
             least: 0.0,
         }
@@ -35,7 +35,7 @@ impl<const N: usize> Draft<N> {
         }
         let slow = Self {
             trajectory: self.trajectory.stretched(slower),
-            passes: self.passes.iter().map(|time| time * slower).collect(),
+            crossings: self.crossings.iter().map(|time| time * slower).collect(),
             ..self
         };
         (slow, bounds.stretched(slower))

@@ -1,6 +1,6 @@
 //! MoveTo: the configuration that is reached soonest, moved to in joint space.
 
-use kinematics::{Obstacle, Report};
+use kinematics::{IkFailure, IkReport};
 use nalgebra::{Isometry3, SVector};
 use trajectory::bounds::JointsToTool;
 use trajectory::otg::{self, Otg};
@@ -29,7 +29,10 @@ impl<const N: usize> Planner<N> {
     ) -> Result<Draft<N>, MotionError> {
         let pose = motion.poses.first().copied().unwrap_or_default();
         let mut goals = self.configurations(&pose, start)?;
-        goals.sort_by(|a, b| self.effort(start, a).total_cmp(&self.effort(start, b)));
+        goals.sort_by(|a, b| {
+            self.time_estimate(start, a)
+                .total_cmp(&self.time_estimate(start, b))
+        });
         if N > 6 {
             let mut apart: Vec<SVector<f64, N>> = Vec::new();
             for goal in goals {
@@ -85,7 +88,7 @@ impl<const N: usize> Planner<N> {
 
     /// Time for the slowest joint at constant velocity, s: cheap, and a good order. Longer
     /// for goals from which the arm would not move on with ease.
-    fn effort(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
+    fn time_estimate(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
         let way = (goal - start).abs().component_div(&self.limits.velocity);
         way.max() / self.ease(goal)
     }
@@ -161,18 +164,18 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The report of the solver in the words of a command.
-    pub(super) fn refusal(&self, pose: usize, report: &Report<N>) -> MotionError {
-        match report.obstacle {
-            Obstacle::OutOfReach { distance } => MotionError::OutOfReach {
+    pub(super) fn refusal(&self, pose: usize, report: &IkReport<N>) -> MotionError {
+        match report.failure {
+            IkFailure::OutOfReach { distance } => MotionError::OutOfReach {
                 pose,
                 millimetres: distance * 1e3,
             },
-            Obstacle::AtLimit { joint, beyond } => MotionError::BeyondLimit {
+            IkFailure::AtLimit { joint, beyond } => MotionError::BeyondLimit {
                 pose,
                 joint: self.joint_name(joint),
                 beyond: self.amount(joint, beyond),
             },
-            Obstacle::Orientation { angle } => MotionError::Orientation {
+            IkFailure::Orientation { angle } => MotionError::Orientation {
                 pose,
                 degrees: angle.to_degrees(),
             },

@@ -57,7 +57,7 @@ impl<const N: usize> Planner<N> {
         draft: &Draft<N>,
     ) -> f64 {
         let options = SmoothOptions::new(0.0, motion.limits);
-        let stops = draft.passes.iter();
+        let stops = draft.crossings.iter();
         let stops = stops.map(|time| draft.trajectory.sample(*time).position);
         let (mut from, mut pose, mut sum) = (*start, self.chain().forward(start), 0.0);
         for (to, next) in stops.chain([*end]).zip(&motion.poses) {

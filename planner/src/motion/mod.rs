@@ -21,7 +21,7 @@ use trajectory::bounds::Held;
 use trajectory::{JointLimits, MotionBounds, Trajectory};
 
 pub use active::ActiveLimit;
-pub use certificate::{LimitReport, MoveCertificate, PassReport, Peaks};
+pub use certificate::{CrossingReport, LimitReport, MoveCertificate, Peaks};
 pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
@@ -175,9 +175,9 @@ impl<const N: usize> Planner<N> {
         if draft.trajectory.pieces().is_empty() {
             // Nothing to do: the arm is there. What is proved is that standing still is right.
             let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
-            let passes = draft.passes.clone();
+            let crossings = draft.crossings.clone();
             let still = Draft {
-                passes,
+                crossings,
                 ..Draft::of(still)
             };
             let standing = self.certify(motion, start, still)?;

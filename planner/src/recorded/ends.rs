@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::arm::angle_between;
 use super::between::from_rest;
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 use super::verdict::PassFound;
@@ -14,7 +14,7 @@ use crate::task::Move;
 pub(super) const ARRIVED: (f64, f64) = (1e-6, 1e-6);
 
 /// At rest at the start of the recording.
-pub(super) fn start(recording: &Recording<'_>, report: &mut Report) {
+pub(super) fn start(recording: &Recording<'_>, report: &mut RuleReport) {
     let Some(row) = recording.rows.first() else {
         return;
     };
@@ -33,7 +33,12 @@ pub(super) fn start(recording: &Recording<'_>, report: &mut Report) {
 /// The last row of a move: the move ends before the next row, so this one may be as far from rest
 /// and from the goal as the joints can stop from until then. Where the arm rests at the next row, it
 /// rests in the goal.
-pub(super) fn end(recording: &Recording<'_>, span: &Span<'_>, motion: &Move, report: &mut Report) {
+pub(super) fn end(
+    recording: &Recording<'_>,
+    span: &Span<'_>,
+    motion: &Move,
+    report: &mut RuleReport,
+) {
     let Some(goal) = motion.poses.last() else {
         return;
     };

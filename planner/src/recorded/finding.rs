@@ -133,7 +133,7 @@ impl std::fmt::Display for Finding {
 
 /// What was found so far: for each rule and subject the worst.
 #[derive(Debug, Default)]
-pub(super) struct Report {
+pub(super) struct RuleReport {
     findings: Vec<Finding>,
     /// The command that is judged, its line and name; none for the recording as a whole.
     command: Option<(usize, usize, &'static str)>,
@@ -141,7 +141,7 @@ pub(super) struct Report {
     peak: Option<(f64, Rule, Subject)>,
 }
 
-impl Report {
+impl RuleReport {
     /// A report about one command: its index, line and name.
     pub(super) fn of(index: usize, line: usize, name: &'static str) -> Self {
         Self {

@@ -1,6 +1,6 @@
 //! Joint columns: limits, and each column against the others.
 
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
@@ -11,7 +11,7 @@ pub(super) const ALLOWED: f64 = 1.0 + 1e-9;
 const ROUNDING: [f64; 3] = [2e-12, 1e-10, 1e-8];
 
 /// Limits at every sample.
-pub(super) fn limits(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn limits(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     let limits = recording.arm.limits;
     for row in &recording.rows[span.own.clone()] {
         let time = row.t_s;
@@ -44,7 +44,7 @@ pub(super) fn limits(recording: &Recording<'_>, span: &Span<'_>, report: &mut Re
 /// # Source
 /// Trapezoid rule and Euler-Maclaurin correction: P. Davis, P. Rabinowitz, Methods of Numerical
 /// Integration, 2nd edition 1984, section 2.9.
-pub(super) fn derivatives(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn derivatives(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     let limits = recording.arm.limits;
     for pair in recording.rows[span.shown()].windows(2) {
         let (from, to) = (&pair[0], &pair[1]);

@@ -29,7 +29,7 @@ use crcl::{LengthUnit, Program};
 use trajectory::smooth::SmoothOptions;
 
 pub use finding::{Finding, Measure, Side, Subject};
-pub use row::{Row, RunColumns};
+pub use row::{RecordedSample, RunColumns};
 pub use rule::Rule;
 pub use verdict::{CommandVerdict, PassFound, ProgramVerdict};
 
@@ -37,7 +37,7 @@ use crate::modal::Modal;
 use crate::robot::Robot;
 use crate::task::{Move, Shape, Task};
 use arm::Arm;
-use finding::Report;
+use finding::RuleReport;
 use span::{Recording, Span};
 
 /// Holds recorded rows against the program they came from.
@@ -49,7 +49,7 @@ pub fn verify_program(
     robot: &Robot,
     program: &Program,
     default_length: LengthUnit,
-    rows: &[Row],
+    rows: &[RecordedSample],
 ) -> ProgramVerdict {
     let mut verdict = ProgramVerdict {
         schema: 1,
@@ -60,7 +60,7 @@ pub fn verify_program(
         broken: Vec::new(),
         holds: false,
     };
-    let mut whole = Report::default();
+    let mut whole = RuleReport::default();
     if let Some(period) = readable(robot, rows, &mut whole) {
         let recording = Recording {
             arm: Arm::new(robot),
@@ -86,7 +86,7 @@ pub fn verify_program(
 }
 
 /// The period of rows that can be judged at all: every number finite, times growing.
-fn readable(robot: &Robot, rows: &[Row], report: &mut Report) -> Option<f64> {
+fn readable(robot: &Robot, rows: &[RecordedSample], report: &mut RuleReport) -> Option<f64> {
     if let Some(bad) = rows.iter().find(|row| !row.is_sound(robot.dof())) {
         let measure = Measure::at_most(f64::NAN, f64::MAX, "");
         report.hold(
@@ -101,7 +101,7 @@ fn readable(robot: &Robot, rows: &[Row], report: &mut Report) -> Option<f64> {
 }
 
 /// Holds one command against every rule that applies to it.
-fn command(recording: &Recording<'_>, span: &Span<'_>, mut report: Report) -> CommandVerdict {
+fn command(recording: &Recording<'_>, span: &Span<'_>, mut report: RuleReport) -> CommandVerdict {
     let mut verdict = CommandVerdict {
         index: span.index,
         line: span.located.line,
@@ -139,7 +139,7 @@ fn moved(
     recording: &Recording<'_>,
     (span, motion): (&Span<'_>, &Move),
     verdict: &mut CommandVerdict,
-    report: &mut Report,
+    report: &mut RuleReport,
 ) {
     ends::end(recording, span, motion, report);
     if span.own.is_empty() {
@@ -198,11 +198,11 @@ mod tests {
         MoveSmoothlyTo({{{400, 100, 200}, {0, 0, -1}, {1, 0, 0}}, \
         {{400, -100, 200}, {0, 0, -1}, {1, 0, 0}}}, 2)\nEndCanon(0)\n";
 
-    fn recording() -> (Robot, Program, Vec<Row>) {
+    fn recording() -> (Robot, Program, Vec<RecordedSample>) {
         let robot = crate::robot::load("ur5e").unwrap();
         let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
         let plan = plan_program(&robot, &program, &PlanOptions::default()).unwrap();
-        let rows = plan.samples(1e-3).map(|sample| Row {
+        let rows = plan.samples(1e-3).map(|sample| RecordedSample {
             t_s: sample.t_s,
             command: sample.command,
             joints: sample.q,
@@ -215,7 +215,7 @@ mod tests {
         (robot, program, rows)
     }
 
-    fn verdict(change: impl Fn(&mut Vec<Row>)) -> ProgramVerdict {
+    fn verdict(change: impl Fn(&mut Vec<RecordedSample>)) -> ProgramVerdict {
         let (robot, program, mut rows) = recording();
         change(&mut rows);
         verify_program(&robot, &program, LengthUnit::default(), &rows)

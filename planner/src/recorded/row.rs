@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 
 /// One row of a recorded motion, as `canter plan --samples` and `canter run --samples` write it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct RecordedSample {
     /// Time, s.
     pub t_s: f64,
     /// Number of the command in the program, from 0.
@@ -32,7 +32,7 @@ pub struct RunColumns {
     pub measured_point: Vector3<f64>,
 }
 
-impl Row {
+impl RecordedSample {
     /// Whether every number is finite and every list has one entry per joint.
     pub(super) fn is_sound(&self, joints: usize) -> bool {
         let lists = [&self.joints, &self.rates, &self.accelerations];

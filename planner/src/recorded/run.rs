@@ -1,6 +1,6 @@
 //! What only a recording of a run has: path time and measured joints.
 
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
@@ -11,7 +11,7 @@ const FOLLOWING: (f64, f64) = (0.02, 0.03);
 const POINT: f64 = 1e-9;
 
 /// Planned time grows from 0, never faster than time, and joints move only while it grows.
-pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     for pair in recording.rows[span.shown()].windows(2) {
         let (from, to) = (&pair[0], &pair[1]);
         let (Some(before), Some(now)) = (&from.run, &to.run) else {
@@ -41,7 +41,7 @@ pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut
 }
 
 /// Measured joints follow, and the measured point is theirs.
-pub(super) fn measured(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn measured(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     for row in &recording.rows[span.own.clone()] {
         let Some(run) = &row.run else { continue };
         for joint in 0..recording.arm.dof() {

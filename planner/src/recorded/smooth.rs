@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::arm::{ToolState, angle_between};
 use super::between::{Quintic, from_rest, off_quintic};
 use super::ends::ARRIVED;
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 use super::straight::STRAIGHT;
@@ -59,7 +59,7 @@ struct Way {
 
 impl SmoothMove<'_> {
     /// Holds it against its rules; how each intermediate pose was passed.
-    pub(super) fn check(&self, report: &mut Report) -> Vec<PassFound> {
+    pub(super) fn check(&self, report: &mut RuleReport) -> Vec<PassFound> {
         let legs = self.motion.poses.len();
         let mut way = Way {
             on: vec![[false; 2]; legs],
@@ -146,7 +146,7 @@ impl SmoothMove<'_> {
         }
     }
 
-    fn report(&self, way: &Way, report: &mut Report) {
+    fn report(&self, way: &Way, report: &mut RuleReport) {
         let end = self.recording.rows[self.span.shown().end - 1].t_s;
         let [arrived, turned] = way.on.last().copied().unwrap_or([true; 2]);
         if let Some((time, off, leg)) = way.lost {
@@ -277,7 +277,7 @@ impl<'a> Between<'a> {
         let rows = smooth.recording.rows;
         let (from, to) = (&rows[row], &rows[row + 1]);
         let time = to.t_s - from.t_s;
-        let state = |row: &super::Row, joint: usize| {
+        let state = |row: &super::RecordedSample, joint: usize| {
             [
                 row.joints[joint],
                 row.rates[joint],

@@ -6,8 +6,8 @@ use crcl::Located;
 use nalgebra::Isometry3;
 
 use super::arm::Arm;
-use super::finding::{Measure, Report, Subject};
-use super::row::Row;
+use super::finding::{Measure, RuleReport, Subject};
+use super::row::RecordedSample;
 use super::rule::Rule;
 use crate::modal::Modal;
 use crate::task::Task;
@@ -15,7 +15,7 @@ use crate::task::Task;
 /// A recorded motion with the arm it is of.
 pub(super) struct Recording<'a> {
     pub arm: Arm<'a>,
-    pub rows: &'a [Row],
+    pub rows: &'a [RecordedSample],
     /// Time between two rows, s; a run may leave some out.
     pub period: f64,
 }
@@ -77,17 +77,17 @@ pub(super) fn spans<'a>(
     recording: &Recording<'_>,
     mut modal: Modal,
     commands: &'a [Located],
-    whole: &mut Report,
-) -> Vec<(Span<'a>, Report)> {
+    whole: &mut RuleReport,
+) -> Vec<(Span<'a>, RuleReport)> {
     let rows = recording.rows;
     let mut at = 0;
     let mut flange = recording.arm.flange(&rows[0].joints);
-    let mut spans: Vec<(Span<'a>, Report)> = Vec::with_capacity(commands.len());
+    let mut spans: Vec<(Span<'a>, RuleReport)> = Vec::with_capacity(commands.len());
     for (index, located) in commands.iter().enumerate() {
         let count = rows[at..].iter().take_while(|row| row.command == index);
         let own = at..at + count.count();
         at = own.end;
-        let mut report = Report::of(index, located.line, located.command.name());
+        let mut report = RuleReport::of(index, located.line, located.command.name());
         let before = modal.tooling().flange_from_tool();
         let task = modal.resolve(&located.command, &flange);
         if let Err(error) = &task {
@@ -127,7 +127,7 @@ pub(super) fn spans<'a>(
 }
 
 /// Where the arm is seen at rest behind a command.
-fn find_rests(spans: &mut [(Span<'_>, Report)]) {
+fn find_rests(spans: &mut [(Span<'_>, RuleReport)]) {
     let mut rest = None;
     for (span, _) in spans.iter_mut().rev() {
         span.rest_after = rest;
@@ -140,7 +140,7 @@ fn find_rests(spans: &mut [(Span<'_>, Report)]) {
 }
 
 /// Rows of a run while a tool works belong to the move before.
-fn show_later_tools(spans: &mut [(Span<'_>, Report)]) {
+fn show_later_tools(spans: &mut [(Span<'_>, RuleReport)]) {
     let mut later = Vec::new();
     for (span, _) in spans.iter_mut().rev() {
         if !span.own.is_empty() {
@@ -172,7 +172,7 @@ fn flange_after(
 
 /// Commands that take no time have no rows; the first row may be of the first command, and a run
 /// waits there for its first motion.
-fn column(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+fn column(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     if span.takes_time() || span.own.is_empty() {
         return;
     }

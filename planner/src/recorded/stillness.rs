@@ -1,6 +1,6 @@
 //! Commands that move nothing: they do not, and last as long as they must.
 
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
@@ -8,7 +8,7 @@ use super::span::{Recording, Span};
 const STILL: f64 = 1e-12;
 
 /// Nothing moves.
-pub(super) fn standstill(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn standstill(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     let rows = &recording.rows[span.own.clone()];
     let Some(first) = rows.first() else { return };
     for row in rows {
@@ -35,7 +35,7 @@ pub(super) fn duration(
     recording: &Recording<'_>,
     span: &Span<'_>,
     seconds: f64,
-    report: &mut Report,
+    report: &mut RuleReport,
 ) {
     let before = span.own.start.saturating_sub(1);
     let last = span.own.end.saturating_sub(1).max(before);

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::arm::ToolState;
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
@@ -21,7 +21,7 @@ pub(super) fn straight(
     recording: &Recording<'_>,
     span: &Span<'_>,
     (states, goal): (&[ToolState], &Isometry3<f64>),
-    report: &mut Report,
+    report: &mut RuleReport,
 ) -> f64 {
     // The row before its own is up to a period before the start.
     let own = &states[states.len() - span.own.len()..];

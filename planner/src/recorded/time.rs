@@ -1,7 +1,7 @@
 //! The time column and the command column.
 
-use super::finding::{Measure, Report, Subject};
-use super::row::Row;
+use super::finding::{Measure, RuleReport, Subject};
+use super::row::RecordedSample;
 use super::rule::Rule;
 
 /// Largest error of a time, in periods: rounding of the written numbers.
@@ -9,7 +9,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// Holds the time column against its rule; the period (s), or none where times do not grow and
 /// nothing else can be said.
-pub(super) fn period(rows: &[Row], report: &mut Report) -> Option<f64> {
+pub(super) fn period(rows: &[RecordedSample], report: &mut RuleReport) -> Option<f64> {
     let subject = Subject::The("the time column");
     let first = rows.first().map_or(f64::NAN, |row| row.t_s);
     let from_zero = Measure::at_most(first.abs(), 1e-9, "s");

@@ -4,9 +4,9 @@ use nalgebra::Isometry3;
 use trajectory::ToolLimits;
 
 use super::arm::{ToolState, angle_between};
-use super::finding::{Measure, Report, Subject};
+use super::finding::{Measure, RuleReport, Subject};
 use super::joints::ALLOWED;
-use super::row::Row;
+use super::row::RecordedSample;
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
@@ -15,7 +15,7 @@ const POSE: (f64, f64) = (1e-9, 1e-8);
 
 /// The pose columns are those of the joint columns. While the tool changes, the controlled point
 /// is that of either tool; a run shows the next tools at rest, behind the move before.
-pub(super) fn pose(recording: &Recording<'_>, span: &Span<'_>, report: &mut Report) {
+pub(super) fn pose(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     for row in &recording.rows[span.own.clone()] {
         let flange = recording.arm.flange(&row.joints);
         let off = |tool: &Isometry3<f64>| {
@@ -45,7 +45,7 @@ pub(super) fn pose(recording: &Recording<'_>, span: &Span<'_>, report: &mut Repo
 
 /// States of the tool at the rows of a command and at the one before.
 pub(super) fn states(recording: &Recording<'_>, span: &Span<'_>) -> Vec<ToolState> {
-    let state = |row: &Row| {
+    let state = |row: &RecordedSample| {
         let columns = [&row.joints[..], &row.rates, &row.accelerations];
         recording.arm.tool(columns, &span.tools[1])
     };
@@ -60,7 +60,7 @@ pub(super) fn caps(
     recording: &Recording<'_>,
     span: &Span<'_>,
     (states, limits): (&[ToolState], &ToolLimits),
-    report: &mut Report,
+    report: &mut RuleReport,
 ) {
     let shown = span.shown();
     for (offset, pair) in states.windows(2).enumerate() {
@@ -112,7 +112,7 @@ pub(super) fn caps(
 }
 
 /// Whether planned time and time pass alike between two rows; always so in a plan.
-fn at_full_speed(from: &Row, to: &Row) -> bool {
+fn at_full_speed(from: &RecordedSample, to: &RecordedSample) -> bool {
     let (Some(a), Some(b)) = (&from.run, &to.run) else {
         return true;
     };

@@ -1,11 +1,11 @@
 //! Damage to single columns: each is then at odds with the others.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use planner::recorded::{Row, Rule};
+use planner::recorded::{RecordedSample, Rule};
 
 use crate::damage::{Kind, rows};
 
-pub const KINDS: [Kind; 30] = [
+pub(crate) const KINDS: [Kind; 30] = [
     rows("q: one sample off by 1e-6", &[Rule::Derivatives], |rows| {
         middle(rows).joints[1] += 1e-6;
     }),
@@ -167,9 +167,9 @@ pub const KINDS: [Kind; 30] = [
 ];
 
 /// A row in which the arm moves, about the middle of the recording.
-pub fn middle(rows: &mut [Row]) -> &mut Row {
+pub(crate) fn middle(rows: &mut [RecordedSample]) -> &mut RecordedSample {
     let half = rows.len() / 2;
-    let fast = |row: &Row| row.rates.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
+    let fast = |row: &RecordedSample| row.rates.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
     let most = rows.iter().map(fast).fold(0.0, f64::max);
     let at = (half..rows.len())
         .chain(0..half)
@@ -178,12 +178,12 @@ pub fn middle(rows: &mut [Row]) -> &mut Row {
     &mut rows[at]
 }
 
-pub fn each(rows: &mut [Row], change: impl Fn(&mut Row)) {
+pub(crate) fn each(rows: &mut [RecordedSample], change: impl Fn(&mut RecordedSample)) {
     rows.iter_mut().for_each(change);
 }
 
 /// Gives each row something of the row before it.
-fn late(rows: &mut [Row], change: impl Fn(&Row, &mut Row)) {
+fn late(rows: &mut [RecordedSample], change: impl Fn(&RecordedSample, &mut RecordedSample)) {
     let before = rows.to_vec();
     for (from, to) in before.iter().zip(&mut rows[1..]) {
         change(from, to);

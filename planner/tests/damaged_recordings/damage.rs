@@ -1,37 +1,41 @@
 //! One kind of damage: what it does, and the rule that it breaks.
 
 use crcl::Command;
-use planner::recorded::{Row, Rule};
+use planner::recorded::{RecordedSample, Rule};
 
 use crate::scene::Scene;
 
 /// What a damage leaves: the program and the recording that is held against it.
-pub struct Damaged {
-    pub commands: Vec<Command>,
-    pub rows: Vec<Row>,
+pub(crate) struct Damaged {
+    pub(crate) commands: Vec<Command>,
+    pub(crate) rows: Vec<RecordedSample>,
 }
 
 /// A kind of damage.
-pub struct Kind {
-    pub name: &'static str,
+pub(crate) struct Kind {
+    pub(crate) name: &'static str,
     /// It breaks one of these: which one depends on the limits of the robot.
-    pub rules: &'static [Rule],
-    pub make: Make,
+    pub(crate) rules: &'static [Rule],
+    pub(crate) make: Make,
 }
 
 /// How it is made.
-pub enum Make {
+pub(crate) enum Make {
     /// By changing the rows of the good recording.
-    Rows(fn(&mut Vec<Row>)),
+    Rows(fn(&mut Vec<RecordedSample>)),
     /// By changing the rows of the good recording of a run.
-    Run(fn(&mut Vec<Row>)),
+    Run(fn(&mut Vec<RecordedSample>)),
     /// By recording another program than the one that it is held against. First the one that is
     /// recorded, then the one that it claims to be.
     Program(fn(&Scene) -> [Vec<Command>; 2]),
 }
 
 /// A kind that changes rows.
-pub const fn rows(name: &'static str, rules: &'static [Rule], make: fn(&mut Vec<Row>)) -> Kind {
+pub(crate) const fn rows(
+    name: &'static str,
+    rules: &'static [Rule],
+    make: fn(&mut Vec<RecordedSample>),
+) -> Kind {
     Kind {
         name,
         rules,
@@ -40,7 +44,7 @@ pub const fn rows(name: &'static str, rules: &'static [Rule], make: fn(&mut Vec<
 }
 
 /// A kind that records another program.
-pub const fn program(
+pub(crate) const fn program(
     name: &'static str,
     rules: &'static [Rule],
     make: fn(&Scene) -> [Vec<Command>; 2],
@@ -53,7 +57,11 @@ pub const fn program(
 }
 
 /// A kind that changes rows of a run.
-pub const fn run(name: &'static str, rules: &'static [Rule], make: fn(&mut Vec<Row>)) -> Kind {
+pub(crate) const fn run(
+    name: &'static str,
+    rules: &'static [Rule],
+    make: fn(&mut Vec<RecordedSample>),
+) -> Kind {
     Kind {
         name,
         rules,

@@ -15,11 +15,11 @@ mod ways;
 use std::thread;
 
 use damage::{Damaged, Kind, Make};
-use planner::recorded::{Row, Rule};
+use planner::recorded::{RecordedSample, Rule};
 use scene::{Scene, recorded, verdict};
 
 /// Time between samples of the damaged recordings, s.
-pub const PERIOD: f64 = 0.002;
+pub(crate) const PERIOD: f64 = 0.002;
 
 const ROBOTS: [&str; 8] = [
     "ur5e",
@@ -38,7 +38,7 @@ fn kinds() -> Vec<&'static Kind> {
 }
 
 /// Does the damage; none when the robot cannot do the other program.
-fn damaged(scene: &Scene, kind: &Kind, good: &[Row]) -> Option<Damaged> {
+fn damaged(scene: &Scene, kind: &Kind, good: &[RecordedSample]) -> Option<Damaged> {
     match kind.make {
         Make::Rows(change) => {
             let mut rows = good.to_vec();

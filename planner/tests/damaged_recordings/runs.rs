@@ -1,7 +1,7 @@
 //! Damage to what only a recording of a run has: path time and measured columns.
 
 use nalgebra::Vector3;
-use planner::recorded::{Row, Rule, RunColumns};
+use planner::recorded::{RecordedSample, Rule, RunColumns};
 
 use crate::damage::{Kind, run};
 use crate::times::of;
@@ -9,7 +9,7 @@ use crate::times::of;
 const JOINT: usize = 4;
 const SMOOTH: usize = 8;
 
-pub const KINDS: [Kind; 8] = [
+pub(crate) const KINDS: [Kind; 8] = [
     run("path time: faster than time", &[Rule::PathTime], |rows| {
         columns(rows, |run| run.path_time_s *= 1.01);
     }),
@@ -70,19 +70,19 @@ pub const KINDS: [Kind; 8] = [
     ),
 ];
 
-fn set(row: &mut Row, change: impl Fn(&mut RunColumns)) {
+fn set(row: &mut RecordedSample, change: impl Fn(&mut RunColumns)) {
     row.run.iter_mut().for_each(change);
 }
 
-fn columns(rows: &mut [Row], change: impl Fn(&mut RunColumns)) {
+fn columns(rows: &mut [RecordedSample], change: impl Fn(&mut RunColumns)) {
     rows.iter_mut().for_each(|row| set(row, &change));
 }
 
 /// The recording of a run that goes as planned: it waits first, tools belong to the move before,
 /// and the measured arm is where it should be.
-pub fn as_run(rows: &[Row]) -> Vec<Row> {
+pub(crate) fn as_run(rows: &[RecordedSample]) -> Vec<RecordedSample> {
     let wait = (0..20).map(|_| rows[0].clone());
-    let mut all: Vec<Row> = wait.chain(rows.iter().cloned()).collect();
+    let mut all: Vec<RecordedSample> = wait.chain(rows.iter().cloned()).collect();
     let (mut start, mut command) = (0.0, 0);
     for (index, row) in all.iter_mut().enumerate() {
         row.t_s = index as f64 * crate::PERIOD;

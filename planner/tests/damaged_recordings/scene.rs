@@ -3,12 +3,12 @@
 use crcl::{Command, LengthUnit, Pose, Program};
 use nalgebra::{Isometry3, Vector3};
 use planner::dry_run::{PlanOptions, plan_program};
-use planner::recorded::{ProgramVerdict, Row, verify_program};
+use planner::recorded::{ProgramVerdict, RecordedSample, verify_program};
 use planner::robot::{Robot, load};
 
 /// A robot at home.
-pub struct Scene {
-    pub robot: Robot,
+pub(crate) struct Scene {
+    pub(crate) robot: Robot,
     /// The controlled point at home, in the workstation.
     home: Isometry3<f64>,
 }
@@ -22,7 +22,7 @@ fn home(robot: &Robot) -> Isometry3<f64> {
 }
 
 impl Scene {
-    pub fn new(robot: &str) -> Self {
+    pub(crate) fn new(robot: &str) -> Self {
         let robot = load(robot).unwrap();
         Self {
             home: home(&robot),
@@ -31,13 +31,13 @@ impl Scene {
     }
 
     /// A pose `way` (mm) and `turn` (rotation vector, rad) from home, in the tool's axes.
-    pub fn pose(&self, way: [f64; 3], turn: [f64; 3]) -> Pose {
+    pub(crate) fn pose(&self, way: [f64; 3], turn: [f64; 3]) -> Pose {
         let to = Isometry3::new(Vector3::from(way) * 1e-3, Vector3::from(turn));
         written(&(self.home * to))
     }
 
     /// The program that most damages are done to.
-    pub fn program(&self) -> Vec<Command> {
+    pub(crate) fn program(&self) -> Vec<Command> {
         vec![
             Command::InitCanon,
             Command::SetRelativeSpeed { percent: 20.0 },
@@ -63,12 +63,12 @@ impl Scene {
     }
 
     /// Where the straight move of [`Self::program`] ends.
-    pub fn straight_goal(&self) -> Pose {
+    pub(crate) fn straight_goal(&self) -> Pose {
         self.pose([-30.0, 10.0, -20.0], [0.0, 0.25, 0.1])
     }
 
     /// The poses of the smooth move of [`Self::program`].
-    pub fn corners(&self) -> Vec<Pose> {
+    pub(crate) fn corners(&self) -> Vec<Pose> {
         vec![
             self.pose([-30.0, 10.0, -50.0], [0.0, 0.25, 0.1]),
             self.pose([10.0, 10.0, -50.0], [0.0, 0.1, 0.1]),
@@ -79,7 +79,7 @@ impl Scene {
 }
 
 /// A pose as a program writes it, in mm.
-pub fn written(pose: &Isometry3<f64>) -> Pose {
+pub(crate) fn written(pose: &Isometry3<f64>) -> Pose {
     let point: Vector3<f64> = pose.translation.vector * 1e3;
     Pose::Axes {
         point: point.into(),
@@ -89,13 +89,17 @@ pub fn written(pose: &Isometry3<f64>) -> Pose {
 }
 
 /// What was recorded of a program; none when the robot cannot do it.
-pub fn recorded(robot: &Robot, commands: &[Command], period: f64) -> Option<Vec<Row>> {
+pub(crate) fn recorded(
+    robot: &Robot,
+    commands: &[Command],
+    period: f64,
+) -> Option<Vec<RecordedSample>> {
     let program: Program = commands.iter().cloned().collect();
     let plan = plan_program(robot, &program, &PlanOptions::default()).unwrap();
     if !plan.refusals.is_empty() {
         return None;
     }
-    let row = |sample: planner::dry_run::PlanSample| Row {
+    let row = |sample: planner::dry_run::PlanSample| RecordedSample {
         t_s: sample.t_s,
         command: sample.command,
         joints: sample.q,
@@ -108,14 +112,18 @@ pub fn recorded(robot: &Robot, commands: &[Command], period: f64) -> Option<Vec<
 }
 
 /// Rows held against commands.
-pub fn verdict(robot: &Robot, commands: &[Command], rows: &[Row]) -> ProgramVerdict {
+pub(crate) fn verdict(
+    robot: &Robot,
+    commands: &[Command],
+    rows: &[RecordedSample],
+) -> ProgramVerdict {
     let program: Program = commands.iter().cloned().collect();
     verify_program(robot, &program, LengthUnit::default(), rows)
 }
 
 impl Scene {
     /// How far from its pose a smooth move is at its widest pass, m.
-    pub fn largest_deviation(&self, commands: &[Command], command: usize) -> f64 {
+    pub(crate) fn largest_deviation(&self, commands: &[Command], command: usize) -> f64 {
         let rows = recorded(&self.robot, commands, crate::PERIOD).unwrap();
         let verdict = verdict(&self.robot, commands, &rows);
         let passes = &verdict.commands[command].poses;

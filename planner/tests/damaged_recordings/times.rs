@@ -1,6 +1,6 @@
 //! Damage to times, to the order of rows and to the command column.
 
-use planner::recorded::{Row, Rule};
+use planner::recorded::{RecordedSample, Rule};
 
 use crate::columns::each;
 use crate::damage::{Kind, rows};
@@ -11,7 +11,7 @@ const GRIPPER: usize = 6;
 const DWELL: usize = 7;
 const SMOOTH: usize = 8;
 
-pub const KINDS: [Kind; 25] = [
+pub(crate) const KINDS: [Kind; 25] = [
     rows("time: runs 2 % faster", &[Rule::Derivatives], |rows| {
         each(rows, |row| row.t_s *= 0.98);
     }),
@@ -142,7 +142,7 @@ pub const KINDS: [Kind; 25] = [
 ];
 
 /// Rows of a command.
-pub fn of(rows: &[Row], command: usize) -> std::ops::Range<usize> {
+pub(crate) fn of(rows: &[RecordedSample], command: usize) -> std::ops::Range<usize> {
     let start = rows.iter().position(|row| row.command == command).unwrap();
     let count = rows[start..]
         .iter()
@@ -151,26 +151,26 @@ pub fn of(rows: &[Row], command: usize) -> std::ops::Range<usize> {
 }
 
 /// A row of the straight move at which the arm moves.
-fn fast(rows: &[Row]) -> usize {
+fn fast(rows: &[RecordedSample]) -> usize {
     let own = of(rows, STRAIGHT);
     own.start + own.len() / 2
 }
 
 /// Takes rows out and closes the times up.
-fn cut(rows: &mut Vec<Row>, range: std::ops::Range<usize>) {
+fn cut(rows: &mut Vec<RecordedSample>, range: std::ops::Range<usize>) {
     rows.drain(range);
     even(rows);
 }
 
 /// Repeats a row.
-fn insert(rows: &mut Vec<Row>, at: usize, times: usize) {
+fn insert(rows: &mut Vec<RecordedSample>, at: usize, times: usize) {
     let row = rows[at].clone();
     rows.splice(at..at, vec![row; times]);
     even(rows);
 }
 
 /// Times at even distances.
-fn even(rows: &mut [Row]) {
+fn even(rows: &mut [RecordedSample]) {
     for (index, row) in rows.iter_mut().enumerate() {
         row.t_s = index as f64 * crate::PERIOD;
     }

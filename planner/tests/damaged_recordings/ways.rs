@@ -15,7 +15,7 @@ const DWELL: usize = 7;
 const SMOOTH: usize = 8;
 const TURN: usize = 10;
 
-pub const KINDS: [Kind; 30] = [
+pub(crate) const KINDS: [Kind; 30] = [
     program(
         "speed: 10 % beyond the program's",
         &[Rule::ToolSpeed, Rule::AngularSpeed],

@@ -11,13 +11,17 @@ use crate::remote::Measured;
 impl<const N: usize> Runner<N> {
     pub(super) fn share_position(&self) {
         let resting = self.cycle.is_resting();
-        let path_rate = if resting { 0.0 } else { self.cycle.path_rate() };
+        let time_scaling = if resting {
+            0.0
+        } else {
+            self.cycle.time_scaling()
+        };
         let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
         self.shared.write(&Measured {
             position: self.measured(),
             velocity: first(&self.state.velocity),
             setpoint: self.published.position,
-            path_rate,
+            time_scaling,
             resting,
             idle,
             faulted: self.fault.is_some(),
@@ -27,7 +31,7 @@ impl<const N: usize> Runner<N> {
         self.shared.orders.tell(&Progress {
             order: self.asked.order(),
             tick: self.tick,
-            path_rate,
+            time_scaling,
             resting,
             held: self.asked.holds(),
             idle,
@@ -60,7 +64,7 @@ impl<const N: usize> Runner<N> {
             },
             valid: (1_u32 << N) - 1,
             path_time: self.cycle.path_time(),
-            path_rate: self.cycle.path_rate(),
+            time_scaling: self.cycle.time_scaling(),
             tools: self.tools,
             ..Setpoint::default()
         };

@@ -5,7 +5,7 @@ use realtime::Demand;
 
 use super::{Runner, Working};
 use crate::event::{Event, Fault};
-use crate::feed::ToolOrder;
+use crate::segment_sender::ToolOrder;
 
 impl<const N: usize> Runner<N> {
     /// Sends a tool order; says whether it may begin now.

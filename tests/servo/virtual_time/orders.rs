@@ -11,7 +11,7 @@ use super::Bench;
 #[test]
 fn a_recovery_without_a_fault_leaves_nothing_behind() {
     let mut bench = Bench::new();
-    (0..2).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    (0..2).for_each(|index| assert!(feed(&mut bench.sender, index)));
     bench.run(400);
     assert!(bench.remote.recover().is_err());
     bench.remote.control(Control::Pause);
@@ -31,7 +31,7 @@ fn a_recovery_without_a_fault_leaves_nothing_behind() {
 #[test]
 fn an_order_acts_in_the_next_period() {
     let mut bench = Bench::new();
-    assert!(feed(&mut bench.feeder, 0));
+    assert!(feed(&mut bench.sender, 0));
     bench.run(400);
     let steering = bench.remote.steering();
     let orders = [
@@ -41,15 +41,15 @@ fn an_order_acts_in_the_next_period() {
         Control::Stop { fast: true },
     ];
     for control in orders {
-        let before = bench.setpoints.last().unwrap().path_rate;
+        let before = bench.setpoints.last().unwrap().time_scaling;
         let order = steering.control(control);
         assert!(!steering.progress().has(order));
         let setpoint = bench.period(0, Some);
         let now = steering.progress();
         assert!(now.has(order) && now.tick == setpoint.tick);
-        assert!((now.path_rate - setpoint.path_rate).abs() < 1e-12);
+        assert!((now.time_scaling - setpoint.time_scaling).abs() < 1e-12);
         if control != Control::Resume {
-            assert!(setpoint.path_rate < before, "{control:?} does not act");
+            assert!(setpoint.time_scaling < before, "{control:?} does not act");
         }
         bench.run(60);
     }
@@ -60,7 +60,7 @@ fn an_order_acts_in_the_next_period() {
 #[test]
 fn a_stop_during_an_abort_holds() {
     let mut bench = Bench::new();
-    (0..2).for_each(|index| assert!(feed(&mut bench.feeder, index)));
+    (0..2).for_each(|index| assert!(feed(&mut bench.sender, index)));
     bench.run(400);
     bench.remote.control(Control::Abort);
     bench.run(20);
@@ -68,7 +68,7 @@ fn a_stop_during_an_abort_holds() {
     bench.run(1000);
     let aborted = |event: &Event| matches!(event, Event::Aborted { aborts: 1, .. });
     assert!(bench.events().iter().any(aborted));
-    bench.feeder.renew();
+    bench.sender.renew();
     let here = bench.remote.measured();
     assert!(here.resting && here.idle && here.held);
     let back = Piece::hermite(1.0, &Sample::rest(here.setpoint), &Sample::rest(home()));
@@ -77,7 +77,7 @@ fn a_stop_during_an_abort_holds() {
         command: 5,
         last: true,
     };
-    bench.feeder.push(segment).unwrap();
+    bench.sender.push(segment).unwrap();
     bench.run(200);
     assert_eq!(bench.remote.measured().setpoint, here.setpoint);
     bench.remote.control(Control::Resume);

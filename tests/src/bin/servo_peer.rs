@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use servo::{Event, Executor, Feeder};
+use servo::{Event, Executor, SegmentSender};
 use system_tests::domain::inherited;
 use system_tests::servo_arm::{JOINTS, driver_options, executor_config, feed};
 
@@ -48,7 +48,7 @@ fn driver(arm: &str, log: &str) -> Outcome {
 fn engine(arm: &str) -> Outcome {
     let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::Wall);
     config.record = false;
-    let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
+    let (executor, mut sender, mut monitor) = Executor::<JOINTS>::start(config)?;
     let remote = executor.remote();
     static STARVE: AtomicBool = AtomicBool::new(false);
     thread::spawn(move || {
@@ -65,15 +65,15 @@ fn engine(arm: &str) -> Outcome {
         }
     });
     say("ready");
-    let mut next = return_home(&mut feeder, &executor, 0);
+    let mut next = return_home(&mut sender, &executor, 0);
     let (mut finished, mut starved) = (next, false);
     loop {
         while let Some(event) = monitor.event() {
             say(&format!("{event:?}"));
             match event {
                 Event::Recovered { .. } => {
-                    feeder.renew();
-                    next = return_home(&mut feeder, &executor, next);
+                    sender.renew();
+                    next = return_home(&mut sender, &executor, next);
                     finished = next;
                 }
                 Event::Finished { command, .. } => finished = command + 1,
@@ -85,9 +85,9 @@ fn engine(arm: &str) -> Outcome {
         if STARVE.load(Ordering::Relaxed) {
             if !starved && executor.remote().measured().idle {
                 starved = true;
-                half_a_command(&mut feeder, &executor);
+                half_a_command(&mut sender, &executor);
             }
-        } else if queued < 3 && feed(&mut feeder, next) {
+        } else if queued < 3 && feed(&mut sender, next) {
             next += 1;
         }
         thread::sleep(Duration::from_millis(1));
@@ -95,7 +95,7 @@ fn engine(arm: &str) -> Outcome {
 }
 
 /// The first 3 s of a command of 6 s; the rest never comes.
-fn half_a_command(feeder: &mut Feeder<JOINTS>, executor: &Executor<JOINTS>) {
+fn half_a_command(sender: &mut SegmentSender<JOINTS>, executor: &Executor<JOINTS>) {
     let from = executor.remote().measured().setpoint;
     let to = from.map(|at| at + 0.8);
     let whole = realtime::Piece::hermite(
@@ -104,7 +104,7 @@ fn half_a_command(feeder: &mut Feeder<JOINTS>, executor: &Executor<JOINTS>) {
         &realtime::Sample::rest(to),
     );
     // The ring is empty.
-    let _ = feeder.push(realtime::Segment {
+    let _ = sender.push(realtime::Segment {
         piece: realtime::Piece {
             duration: 3.0,
             ..whole
@@ -217,9 +217,9 @@ fn paced(arm: &str, commands: &str) -> Outcome {
     let last: u32 = commands.parse()?;
     let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::LockStep);
     config.record = true;
-    let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
+    let (executor, mut sender, mut monitor) = Executor::<JOINTS>::start(config)?;
     let start = Instant::now();
-    let mut next = return_home(&mut feeder, &executor, 0);
+    let mut next = return_home(&mut sender, &executor, 0);
     let mut worst = 0.0_f64;
     loop {
         while let Some(sample) = monitor.sample() {
@@ -241,7 +241,7 @@ fn paced(arm: &str, commands: &str) -> Outcome {
                 _ => {}
             }
         }
-        while next <= last && feeder.room() > 4000 && feed(&mut feeder, next) {
+        while next <= last && sender.room() > 4000 && feed(&mut sender, next) {
             next += 1;
         }
         thread::sleep(Duration::from_micros(200));
@@ -249,13 +249,13 @@ fn paced(arm: &str, commands: &str) -> Outcome {
 }
 
 /// From wherever the arm is slowly to where the even commands begin.
-fn return_home(feeder: &mut Feeder<JOINTS>, executor: &Executor<JOINTS>, next: u32) -> u32 {
+fn return_home(sender: &mut SegmentSender<JOINTS>, executor: &Executor<JOINTS>, next: u32) -> u32 {
     let from = realtime::Sample::rest(executor.remote().measured().setpoint);
     let to = realtime::Sample::rest(system_tests::servo_arm::home());
     let piece = realtime::Piece::hermite(1.5, &from, &to);
     let command = next + next % 2;
     // The ring was emptied by the recovery.
-    let _ = feeder.push(realtime::Segment {
+    let _ = sender.push(realtime::Segment {
         piece,
         command,
         last: true,

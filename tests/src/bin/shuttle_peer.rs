@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use driver_kit::RunOptions;
 use realtime::{Piece, Sample, Segment};
-use servo::{Event, Executor, Feeder};
+use servo::{Event, Executor, SegmentSender};
 use system_tests::domain::inherited;
 use system_tests::servo_arm::{JOINTS, Joints, driver_options, executor_config, limits};
 use system_tests::witness::Witness;
@@ -55,7 +55,7 @@ fn driver(arm: &str, file: &str) -> Outcome {
 fn engine(arm: &str) -> Outcome {
     let mut config = executor_config(inherited()?.arm(arm)?, ipc::Clock::Wall);
     config.record = false;
-    let (executor, mut feeder, mut monitor) = Executor::<JOINTS>::start(config)?;
+    let (executor, mut sender, mut monitor) = Executor::<JOINTS>::start(config)?;
     let remote = executor.remote();
     thread::spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
@@ -71,7 +71,7 @@ fn engine(arm: &str) -> Outcome {
             say(&format!("{event:?}"));
             match event {
                 Event::Recovered { .. } => {
-                    feeder.renew();
+                    sender.renew();
                     from = executor.remote().measured().setpoint;
                     finished = next;
                 }
@@ -81,7 +81,7 @@ fn engine(arm: &str) -> Outcome {
         }
         if next.saturating_sub(finished) < 3 {
             let to = Joints::from_element(ENDS[next as usize % 2]);
-            if shuttle(&mut feeder, next, [from, to]) {
+            if shuttle(&mut sender, next, [from, to]) {
                 (next, from) = (next + 1, to);
             }
         }
@@ -90,7 +90,7 @@ fn engine(arm: &str) -> Outcome {
 }
 
 /// Hands over a move from rest to rest; says whether there was room.
-fn shuttle(feeder: &mut Feeder<JOINTS>, command: u32, [from, to]: [Joints; 2]) -> bool {
+fn shuttle(sender: &mut SegmentSender<JOINTS>, command: u32, [from, to]: [Joints; 2]) -> bool {
     let limits = limits();
     let (mut far, mut duration) = (0.0_f64, 0.1_f64);
     for joint in 0..JOINTS {
@@ -107,7 +107,7 @@ fn shuttle(feeder: &mut Feeder<JOINTS>, command: u32, [from, to]: [Joints; 2]) -
         command,
         last: true,
     };
-    feeder.push(segment).is_ok()
+    sender.push(segment).is_ok()
 }
 
 fn say(line: &str) {

@@ -1,7 +1,7 @@
 //! One joint between two states: which durations are possible, and the profile for one of them.
 
-use super::side::{Bounds, End, Extremal, Side};
-use super::strand::{Course, Strand};
+use super::extremal::{Bounds, End, Extremal, ExtremalFamily};
+use super::profile::{BlendedProfile, Profile};
 
 /// Relative residual of positions and velocities that counts as rounding: a start that was sampled
 /// from a motion of our own must find that motion again.
@@ -10,7 +10,7 @@ const SLACK: f64 = 3e-13;
 /// The normalised problem of one joint: from `start` to `end`, which are `distance` apart.
 ///
 /// For a duration `T` the displacements that can be reached are exactly the interval between the
-/// farthest profile backward and the farthest forward ([`Side`]), because dynamics are linear and
+/// farthest profile backward and the farthest forward ([`ExtremalFamily`]), because dynamics are linear and
 /// limits convex. So `T` is possible if `distance` is in that interval, and then a weighted mean of
 /// the two farthest profiles is a profile that keeps every limit and ends exactly at the target.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,8 +21,8 @@ pub(crate) struct Axis {
     distance: f64,
     /// How exactly `distance` is known.
     slack: f64,
-    up: Side,
-    down: Side,
+    up: ExtremalFamily,
+    down: ExtremalFamily,
     resting: bool,
 }
 
@@ -42,8 +42,8 @@ impl Axis {
             bounds,
             distance,
             slack: 64.0 * noise + SLACK * (1.0 + distance.abs()),
-            up: Side::new(start, end, bounds),
-            down: Side::new(start.mirrored(), end.mirrored(), bounds.mirrored()),
+            up: ExtremalFamily::new(start, end, bounds),
+            down: ExtremalFamily::new(start.mirrored(), end.mirrored(), bounds.mirrored()),
             resting: still(start) && still(end),
         }
     }
@@ -57,8 +57,8 @@ impl Axis {
     /// look is needed.
     fn glance(&self, time: f64) -> Option<bool> {
         if self.resting {
-            let (side, distance) = self.leading();
-            return Some(side.at(time).distance >= distance && time >= 0.0);
+            let (family, distance) = self.leading();
+            return Some(family.at(time).distance >= distance && time >= 0.0);
         }
         let up = self.up.at(time);
         let down = self.down.at(time);
@@ -85,7 +85,7 @@ impl Axis {
     }
 
     /// The side that leads towards the target of a move between states at rest.
-    fn leading(&self) -> (&Side, f64) {
+    fn leading(&self) -> (&ExtremalFamily, f64) {
         if self.distance < 0.0 {
             (&self.down, -self.distance)
         } else {
@@ -148,9 +148,9 @@ impl Axis {
     }
 
     /// The profile of duration `time`, which must be possible.
-    pub(crate) fn course(&self, time: f64) -> Course {
+    pub(crate) fn blended_profile(&self, time: f64) -> BlendedProfile {
         if self.resting {
-            return self.resting_course(time);
+            return self.resting_profile(time);
         }
         let up = self.up.at(time);
         let down = self.down.at(time);
@@ -162,44 +162,44 @@ impl Axis {
         } else {
             (self.distance - lowest) / (highest - lowest)
         };
-        let mut course = Course::default();
+        let mut blended_profile = BlendedProfile::default();
         if weight > 0.0 {
-            course.push(self.strand(&self.up, &up, 1.0), weight);
+            blended_profile.push(self.profile(&self.up, &up, 1.0), weight);
         }
         if weight < 1.0 {
-            course.push(self.strand(&self.down, &down, -1.0), 1.0 - weight);
+            blended_profile.push(self.profile(&self.down, &down, -1.0), 1.0 - weight);
         }
-        course
+        blended_profile
     }
 
-    fn resting_course(&self, time: f64) -> Course {
-        let (side, distance) = self.leading();
-        let mut course = Course::default();
+    fn resting_profile(&self, time: f64) -> BlendedProfile {
+        let (family, distance) = self.leading();
+        let mut blended_profile = BlendedProfile::default();
         if distance == 0.0 {
-            return course;
+            return blended_profile;
         }
-        let extremal = side.at(time);
+        let extremal = family.at(time);
         let weight = if distance >= extremal.distance {
             1.0
         } else {
             distance / extremal.distance
         };
         let sign = if self.distance < 0.0 { -1.0 } else { 1.0 };
-        course.push(self.strand(side, &extremal, sign), weight);
-        course
+        blended_profile.push(self.profile(family, &extremal, sign), weight);
+        blended_profile
     }
 
-    fn strand(&self, side: &Side, extremal: &Extremal, sign: f64) -> Strand {
-        let times = side.phases(extremal);
+    fn profile(&self, family: &ExtremalFamily, extremal: &Extremal, sign: f64) -> Profile {
+        let times = family.phases(extremal);
         if self.bounds.smooth {
-            Strand::jerks(times, sign)
+            Profile::jerks(times, sign)
         } else {
             let bounds = if sign < 0.0 {
                 self.bounds.mirrored()
             } else {
                 self.bounds
             };
-            Strand::accelerations(times, sign * bounds.rise, -sign * bounds.fall)
+            Profile::accelerations(times, sign * bounds.rise, -sign * bounds.fall)
         }
     }
 }
@@ -271,47 +271,47 @@ fn pulse_windows(square: f64, bound: f64, a0: f64, af: f64) -> (Option<f64>, f64
 ///
 /// The slope of the distance falls, then rises (until the velocity bound is reached, where it is
 /// constant and positive): there is at most one hump before the last rise.
-fn first_above(side: &Side, target: (f64, f64), from: f64, last: f64) -> Option<f64> {
+fn first_above(family: &ExtremalFamily, target: (f64, f64), from: f64, last: f64) -> Option<f64> {
     let (goal, slack) = target;
-    let here = side.at(from);
-    if here.distance >= goal - slack - side.noise(&here) {
+    let here = family.at(from);
+    if here.distance >= goal - slack - family.noise(&here) {
         return Some(from);
     }
     let below = (from, here.distance - goal);
-    let until = |time: f64, distance: f64| root(side, goal, below, (time, distance - goal));
+    let until = |time: f64, distance: f64| root(family, goal, below, (time, distance - goal));
     if !here.crossing
         && here.slope > 0.0
-        && let Some(top) = hump(side, from, last)
+        && let Some(top) = hump(family, from, last)
     {
-        let distance = side.at(top).distance;
+        let distance = family.at(top).distance;
         if distance >= goal {
             return Some(until(top, distance));
         }
     }
     if last.is_finite() {
-        let distance = side.at(last).distance;
+        let distance = family.at(last).distance;
         return (distance >= goal).then(|| until(last, distance));
     }
-    let cruise = side.cruise_time();
+    let cruise = family.cruise_time();
     if !cruise.is_finite() {
-        return unbounded_root(side, goal, below);
+        return unbounded_root(family, goal, below);
     }
     let end = cruise.max(from);
-    let distance = side.at(end).distance;
+    let distance = family.at(end).distance;
     if distance <= goal {
-        return Some(end + (goal - distance) / side.top());
+        return Some(end + (goal - distance) / family.top());
     }
     Some(until(end, distance))
 }
 
 /// The root where velocity has no bound: double the time until it is enclosed.
-fn unbounded_root(side: &Side, goal: f64, below: (f64, f64)) -> Option<f64> {
+fn unbounded_root(family: &ExtremalFamily, goal: f64, below: (f64, f64)) -> Option<f64> {
     let mut step = 1.0 + below.0;
     for _ in 0..1100 {
         let time = below.0 + step;
-        let error = side.at(time).distance - goal;
+        let error = family.at(time).distance - goal;
         if error >= 0.0 {
-            return Some(root(side, goal, below, (time, error)));
+            return Some(root(family, goal, below, (time, error)));
         }
         step *= 2.0;
     }
@@ -319,14 +319,14 @@ fn unbounded_root(side: &Side, goal: f64, below: (f64, f64)) -> Option<f64> {
 }
 
 /// The time of the local maximum of the distance in `from..=last`, if there is one.
-fn hump(side: &Side, from: f64, last: f64) -> Option<f64> {
-    let (mut low, mut high) = (from, side.slowest(from).min(last));
-    if side.at(high).slope >= 0.0 {
+fn hump(family: &ExtremalFamily, from: f64, last: f64) -> Option<f64> {
+    let (mut low, mut high) = (from, family.slowest(from).min(last));
+    if family.at(high).slope >= 0.0 {
         return None;
     }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if side.at(middle).slope > 0.0 {
+        if family.at(middle).slope > 0.0 {
             low = middle;
         } else {
             high = middle;
@@ -337,14 +337,14 @@ fn hump(side: &Side, from: f64, last: f64) -> Option<f64> {
 
 /// The time between `below` (not far enough) and `above` (far enough) at which `goal` is reached;
 /// both are a time and the distance beyond the goal there.
-fn root(side: &Side, goal: f64, below: (f64, f64), above: (f64, f64)) -> f64 {
+fn root(family: &ExtremalFamily, goal: f64, below: (f64, f64), above: (f64, f64)) -> f64 {
     let (mut low, mut high) = (below.0, above.0);
     let width = above.1 - below.1;
     // Without limits but jerk, distance grows with the cube of time.
     let share = if width > 0.0 { -below.1 / width } else { 1.0 };
     let mut time = (low + (high - low) * rough_cube_root(share.max(0.0))).min(high);
     for _ in 0..100 {
-        let here = side.at(time);
+        let here = family.at(time);
         let error = here.distance - goal;
         if error >= 0.0 {
             high = time;

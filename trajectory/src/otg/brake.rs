@@ -1,10 +1,10 @@
 //! Back inside the limits, when a start breaks them.
 
-use super::side::{Bounds, End};
-use super::strand::Point;
+use super::extremal::{Bounds, End};
+use super::profile::Point;
 
 /// What comes first when the start breaks a limit: the fastest way back inside, at most three
-/// phases. Normalised like [`super::side::Side`].
+/// phases. Normalised like [`super::extremal::ExtremalFamily`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Brake {
     /// Time and jerk of each phase (acceleration in order two).

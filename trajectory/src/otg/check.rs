@@ -193,11 +193,11 @@ pub(crate) fn keep_positions<const N: usize>(
             continue;
         };
         let mut other = *track;
-        let course = joints
+        let blended_profile = joints
             .get(joint)
-            .and_then(|j| j.direct_course(track.duration));
-        match course {
-            Some(course) => other.course = course,
+            .and_then(|j| j.direct_profile(track.duration));
+        match blended_profile {
+            Some(blended_profile) => other.blended_profile = blended_profile,
             None => {
                 return Err(OtgError::PositionLimit {
                     joint,

@@ -1,8 +1,8 @@
 //! The profile that turns to one constant velocity at once: the one that strays least.
 
 use super::axis::Axis;
-use super::side::{Bounds, End, pulse};
-use super::strand::{Course, Strand};
+use super::extremal::{Bounds, End, pulse};
+use super::profile::{BlendedProfile, Profile};
 
 /// One pulse between a state of motion and a constant velocity.
 #[derive(Clone, Copy)]
@@ -46,8 +46,8 @@ impl Ramp {
 /// and leaves it as late as possible; `None` if there is none of this shape.
 ///
 /// Among the profiles of the same duration it spends most time at the mean velocity, so it goes
-/// least beyond start and target. [`Axis::course`] is gentler and has no such gaps.
-pub(crate) fn direct(axis: &Axis, time: f64) -> Option<Course> {
+/// least beyond start and target. [`Axis::blended_profile`] is gentler and has no such gaps.
+pub(crate) fn direct(axis: &Axis, time: f64) -> Option<BlendedProfile> {
     let (start, end, bounds, distance) = axis.parts();
     if !bounds.smooth {
         return None;
@@ -85,8 +85,8 @@ pub(crate) fn direct(axis: &Axis, time: f64) -> Option<Course> {
     let [a, b, c] = first.phases;
     let [g, f, e] = last.phases;
     let (up, down) = (first.sign as i8, last.sign as i8);
-    let mut course = Course::default();
+    let mut blended_profile = BlendedProfile::default();
     let signs = [up, 0, -up, 0, -down, 0, down];
-    course.push(Strand::phases([a, b, c, cruise, e, f, g], signs), 1.0);
-    Some(course)
+    blended_profile.push(Profile::phases([a, b, c, cruise, e, f, g], signs), 1.0);
+    Some(blended_profile)
 }

@@ -2,7 +2,7 @@
 
 use super::motion::Track;
 
-/// Most switching instants of one track: brake, two strands, start and end.
+/// Most switching instants of one track: brake, two profiles, start and end.
 const SWITCHES: usize = 3 + 2 * 7 + 2;
 
 impl Track {
@@ -16,7 +16,7 @@ impl Track {
         let mut times = [self.duration; SWITCHES];
         times[0] = 0.0;
         let mut count = 1;
-        self.frame.switches(&self.course, |time| {
+        self.frame.switches(&self.blended_profile, |time| {
             if let Some(place) = times.get_mut(count) {
                 *place = time.min(self.duration);
                 count += 1;

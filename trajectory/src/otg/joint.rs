@@ -3,12 +3,12 @@
 use super::axis::Axis;
 use super::brake::Brake;
 use super::direct::direct;
+use super::extremal::{Bounds, End};
 use super::limits::Limits;
 use super::options::Interface;
-use super::pace::Pace;
-use super::side::{Bounds, End};
+use super::profile::{BlendedProfile, Point};
 use super::state::State;
-use super::strand::{Course, Point};
+use super::velocity_problem::VelocityProblem;
 
 /// The units of the normalised form of one joint: jerk limit and acceleration limit are 1.
 ///
@@ -106,7 +106,7 @@ pub(crate) enum Task {
     /// Reach a state.
     Reach(Axis),
     /// Reach a velocity.
-    Pace(Pace),
+    VelocityProblem(VelocityProblem),
 }
 
 /// Where one joint's profile lives: its units, and what comes before the profile.
@@ -192,7 +192,7 @@ impl Joint {
                     noise,
                 ))
             }
-            Interface::Velocity => Task::Pace(Pace::new(ready, to, bounds)),
+            Interface::Velocity => Task::VelocityProblem(VelocityProblem::new(ready, to, bounds)),
         };
         let frame = Frame {
             units,
@@ -214,7 +214,7 @@ impl Joint {
         let next = match &self.task {
             Task::Idle => return from,
             Task::Reach(axis) => axis.next_possible(wanted),
-            Task::Pace(pace) => pace.next_possible(wanted),
+            Task::VelocityProblem(velocity_problem) => velocity_problem.next_possible(wanted),
         };
         if next <= wanted {
             from
@@ -224,20 +224,20 @@ impl Joint {
     }
 
     /// The profile of `duration` (s) after braking, which must be possible.
-    pub(crate) fn course(&self, duration: f64) -> Course {
+    pub(crate) fn blended_profile(&self, duration: f64) -> BlendedProfile {
         let time = (duration / self.frame.units.time - self.frame.pause).max(0.0);
         match &self.task {
-            Task::Idle => Course::default(),
-            Task::Reach(axis) => axis.course(time),
-            Task::Pace(pace) => pace.course(time),
+            Task::Idle => BlendedProfile::default(),
+            Task::Reach(axis) => axis.blended_profile(time),
+            Task::VelocityProblem(velocity_problem) => velocity_problem.blended_profile(time),
         }
     }
 
     /// The profile of `duration` (s) that strays least, if there is one of that shape.
-    pub(crate) fn direct_course(&self, duration: f64) -> Option<Course> {
+    pub(crate) fn direct_profile(&self, duration: f64) -> Option<BlendedProfile> {
         match &self.task {
             Task::Reach(axis) => direct(axis, duration / self.frame.units.time - self.frame.pause),
-            Task::Idle | Task::Pace(_) => None,
+            Task::Idle | Task::VelocityProblem(_) => None,
         }
     }
 
@@ -268,25 +268,25 @@ impl Frame {
     }
 
     /// The normalised point at `time` (s).
-    pub(crate) fn point(&self, course: &Course, time: f64) -> Point {
+    pub(crate) fn point(&self, blended_profile: &BlendedProfile, time: f64) -> Point {
         let time = time / self.units.time;
         if time < self.pause {
             self.brake.point(self.start, time)
         } else {
-            course.point(self.launch, time - self.pause)
+            blended_profile.point(self.launch, time - self.pause)
         }
     }
 
-    /// The switching instants (s) of `course`, each after the one before it on its strand.
-    pub(crate) fn switches(&self, course: &Course, mut visit: impl FnMut(f64)) {
+    /// The switching instants (s) of `blended profile`, each after the one before it on its profile.
+    pub(crate) fn switches(&self, blended_profile: &BlendedProfile, mut visit: impl FnMut(f64)) {
         let mut time = 0.0;
         for (length, _) in self.brake.parts() {
             time += length;
             visit(time * self.units.time);
         }
-        for (strand, _) in course.parts() {
+        for (profile, _) in blended_profile.parts() {
             let mut time = self.pause;
-            for length in strand.times {
+            for length in profile.times {
                 time += length;
                 visit(time * self.units.time);
             }

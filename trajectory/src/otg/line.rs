@@ -9,8 +9,8 @@ use super::limits::Limits;
 use super::motion::{Motion, Track};
 use super::options::{Interface, Options};
 use super::plan::common_duration;
+use super::profile::BlendedProfile;
 use super::state::State;
-use super::strand::Course;
 
 /// Relative deviation from a straight line that is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -37,13 +37,13 @@ pub(crate) fn plan<const N: usize>(
     let given = scalar(&vectors, &direction, leader, limits, grain(start, target));
     let joint = Joint::new(&given, interface);
     let duration = common_duration(std::slice::from_ref(&joint), options)?;
-    let course = joint.course(duration);
+    let blended_profile = joint.blended_profile(duration);
     let mut motion = standing(start, target, options);
     motion.duration = duration;
     for (index, track) in motion.tracks.iter_mut().enumerate() {
         let share = direction[index];
         track.duration = duration;
-        track.course = course;
+        track.blended_profile = blended_profile;
         track.frame = joint.frame.scaled(share);
         if interface == Interface::Velocity && options.enabled[index] {
             track.end[0] = track.last_position();
@@ -199,7 +199,7 @@ fn scalar<const N: usize>(
     }
 }
 
-/// No joint moves: the frame into which the courses are put.
+/// No joint moves: the frame into which the blended profiles are put.
 fn standing<const N: usize>(
     start: &State<N>,
     target: &State<N>,
@@ -225,7 +225,7 @@ fn standing<const N: usize>(
         Track {
             frame: Joint::default().frame,
             placed: options.interface[joint] == Interface::Position,
-            course: Course::default(),
+            blended_profile: BlendedProfile::default(),
             duration,
             start: begin,
             end,

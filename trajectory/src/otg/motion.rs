@@ -6,8 +6,8 @@ use realtime::{Piece, Sample};
 use crate::Trajectory;
 
 use super::joint::Frame;
+use super::profile::BlendedProfile;
 use super::state::State;
-use super::strand::Course;
 
 /// One joint's part of a move.
 #[derive(Clone, Copy, Debug)]
@@ -15,7 +15,7 @@ pub(crate) struct Track {
     pub(crate) frame: Frame,
     /// Whether a position had to be reached.
     pub(crate) placed: bool,
-    pub(crate) course: Course,
+    pub(crate) blended_profile: BlendedProfile,
     /// When this joint arrives (s).
     pub(crate) duration: f64,
     /// Position, velocity and acceleration at the start (SI) and on arrival.
@@ -37,7 +37,7 @@ impl Track {
     /// The same before arrival, where the end of the profile is not the exact target.
     pub(crate) fn inside(&self, time: f64) -> [f64; 4] {
         let units = self.frame.units();
-        let point = self.frame.point(&self.course, time.max(0.0));
+        let point = self.frame.point(&self.blended_profile, time.max(0.0));
         [
             self.start[0] + units.position * point.position,
             units.velocity * point.velocity,
@@ -145,7 +145,9 @@ impl<const N: usize> Motion<N> {
     fn switches(&self) -> Vec<f64> {
         let mut times = vec![0.0];
         for track in &self.tracks {
-            track.frame.switches(&track.course, |time| times.push(time));
+            track
+                .frame
+                .switches(&track.blended_profile, |time| times.push(time));
             times.push(track.duration);
         }
         times.sort_by(f64::total_cmp);

@@ -131,7 +131,7 @@ fn assemble<const N: usize>(
         let mut track = Track {
             frame: joints[joint].frame,
             placed: options.interface[joint] == Interface::Position,
-            course: joints[joint].course(durations[joint]),
+            blended_profile: joints[joint].blended_profile(durations[joint]),
             duration: durations[joint],
             start: [
                 start.position[joint],

@@ -7,7 +7,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::pass::RESOLUTION;
+use super::crossing::RESOLUTION;
 use super::poly::{self, halve};
 use super::span::Span;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::crossing::{self, Crossing, RESOLUTION};
 use super::options::SmoothOptions;
-use super::pass::{self, Pass, RESOLUTION};
 use super::poly::{bernstein, halve};
 use super::span::Span;
 use crate::active::Active;
@@ -141,7 +141,7 @@ pub(crate) fn certify(
     spans: &[Span],
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
-) -> (Certificate, Vec<Pass>) {
+) -> (Certificate, Vec<Crossing>) {
     let mut certificate = Certificate {
         duration: spans.last().map_or(0.0, Span::end),
         ..Certificate::default()
@@ -151,10 +151,10 @@ pub(crate) fn certify(
         active.add(span.start, &limits_of(span, options, &mut certificate));
     }
     certificate.active = active.finish(certificate.duration);
-    let passes = pass::passes(spans, poses, options);
-    certificate.in_order = passes.iter().all(Pass::holds);
-    certificate.corridor = corridor(spans, poses, &passes, options.corridor());
-    (certificate, passes)
+    let crossings = crossing::crossings(spans, poses, options);
+    certificate.in_order = crossings.iter().all(Crossing::holds);
+    certificate.corridor = corridor(spans, poses, &crossings, options.corridor());
+    (certificate, crossings)
 }
 
 /// Raises the six peaks by one span; its own six ratios.
@@ -298,7 +298,7 @@ fn sine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 }
 
 /// Greatest distance from the leg being travelled over the half width.
-fn corridor(spans: &[Span], poses: &[Isometry3<f64>], passes: &[Pass], width: f64) -> Peak {
+fn corridor(spans: &[Span], poses: &[Isometry3<f64>], crossings: &[Crossing], width: f64) -> Peak {
     let mut peak = Peak::default();
     if width.is_infinite() {
         return peak;
@@ -307,12 +307,16 @@ fn corridor(spans: &[Span], poses: &[Isometry3<f64>], passes: &[Pass], width: f6
     let mut at = 0;
     let end = spans.last().map_or(0.0, Span::end);
     for leg in 1..poses.len() {
-        let until = passes.get(leg - 1).map_or(end, |pass| pass.time);
+        let until = crossings.get(leg - 1).map_or(end, |crossing| crossing.time);
         let ends = [
             poses[leg - 1].translation.vector,
             poses[leg].translation.vector,
         ];
-        let since = if leg == 1 { 0.0 } else { passes[leg - 2].time };
+        let since = if leg == 1 {
+            0.0
+        } else {
+            crossings[leg - 2].time
+        };
         while at < spans.len() {
             let span = &spans[at];
             let from = (since - span.start).clamp(0.0, span.duration);

@@ -3,9 +3,9 @@
 use nalgebra::Isometry3;
 
 use super::certificate::{Certificate, certify};
+use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::options::SmoothOptions;
-use super::pass::{Pass, RESOLUTION, settled};
 use super::plan::Method;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
@@ -157,23 +157,23 @@ fn spline(
             }
             continue;
         };
-        let (mut certificate, mut passes) = certify(&spans, poses, options);
+        let (mut certificate, mut crossings) = certify(&spans, poses, options);
         let over = certificate.worst_limit();
         if over > 1.0 && over < 1.3 && moving.is_none() {
             stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-            (certificate, passes) = certify(&spans, poses, options);
+            (certificate, crossings) = certify(&spans, poses, options);
         }
-        let settled = then == Then::Stop || settled(&spans, poses, &passes, options);
+        let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
         if certificate.holds() && settled {
             return Some(spans);
         }
         // Narrower bounds make it slower still.
         let slow = spans.last().map_or(0.0, Span::end) > most;
         let last = request.coupled || !request.moves()[1];
-        if last && (slow || broken(&certificate, &passes) > HOPELESS[attempt.min(1)]) {
+        if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
             return None;
         }
-        narrow(&mut inner, &certificate, &passes, request.coupled);
+        narrow(&mut inner, &certificate, &crossings, request.coupled);
         if certificate.in_order && !settled {
             inner.tolerance *= 0.5;
         }
@@ -183,26 +183,32 @@ fn spline(
 }
 
 /// The greatest ratio of a quantity to its bound.
-fn broken(certificate: &Certificate, passes: &[Pass]) -> f64 {
-    let miss = |pass: &Pass| {
-        (pass.deviation / pass.tolerance).max(pass.angle / pass.angular_tolerance.max(RESOLUTION))
+fn broken(certificate: &Certificate, crossings: &[Crossing]) -> f64 {
+    let miss = |crossing: &Crossing| {
+        (crossing.deviation / crossing.tolerance)
+            .max(crossing.angle / crossing.angular_tolerance.max(RESOLUTION))
     };
     let bounds = [certificate.corridor.ratio, certificate.worst_limit()];
     bounds
         .into_iter()
-        .chain(passes.iter().map(miss))
+        .chain(crossings.iter().map(miss))
         .fold(0.0, f64::max)
 }
 
 /// Narrows the options by what a motion exceeded.
-fn narrow(options: &mut SmoothOptions, certificate: &Certificate, passes: &[Pass], coupled: bool) {
+fn narrow(
+    options: &mut SmoothOptions,
+    certificate: &Certificate,
+    crossings: &[Crossing],
+    coupled: bool,
+) {
     if certificate.corridor.ratio > 1.0 {
         options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
     }
     let (mut far, mut turned) = (1.0_f64, 1.0_f64);
-    for pass in passes.iter().filter(|pass| !pass.holds()) {
-        far = far.max(pass.deviation / pass.tolerance);
-        turned = turned.max(pass.angle / pass.angular_tolerance);
+    for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
+        far = far.max(crossing.deviation / crossing.tolerance);
+        turned = turned.max(crossing.angle / crossing.angular_tolerance);
     }
     if turned > 1.0 && coupled {
         options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));

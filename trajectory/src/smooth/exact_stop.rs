@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::pass::RESOLUTION;
+use super::crossing::RESOLUTION;
 use super::ramp::{self, Caps, Gate};
 use super::span::{Span, Turn};
 use crate::ToolLimits;

@@ -14,8 +14,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::crossing::RESOLUTION;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::RESOLUTION;
 use super::ramp::{self, Caps};
 use crate::line::body_turn;
 use crate::timing::least_time as rest_to_rest;

@@ -15,10 +15,10 @@
 mod approach;
 mod certificate;
 mod choose;
+mod crossing;
 mod exact_stop;
 mod lower_bound;
 mod options;
-mod pass;
 mod plan;
 pub(crate) mod poly;
 mod ramp;
@@ -28,8 +28,8 @@ mod windows;
 
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
+pub use crossing::{Crossing, RESOLUTION};
 pub use lower_bound::least_time;
 pub use options::{SmoothError, SmoothOptions, angular_tolerance};
-pub use pass::{Pass, RESOLUTION};
 pub use plan::{Method, SmoothPlan, plan};
 pub use windows::Windows;

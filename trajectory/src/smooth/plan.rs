@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::certificate::Certificate;
 use super::choose::Motion;
+use super::crossing::Crossing;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::Pass;
 use super::span::Span;
 use super::windows::Windows;
 use crate::{ToolCurve, ToolPoint};
@@ -32,7 +32,7 @@ pub struct SmoothPlan {
     start: Isometry3<f64>,
     goal: Isometry3<f64>,
     spans: Vec<Span>,
-    passes: Vec<Pass>,
+    crossings: Vec<Crossing>,
     certificate: Certificate,
     parts: Vec<(Method, usize)>,
     exact_stop: f64,
@@ -43,7 +43,7 @@ impl SmoothPlan {
     pub(crate) fn new(
         poses: &[Isometry3<f64>],
         motion: Motion,
-        (certificate, passes): (Certificate, Vec<Pass>),
+        (certificate, crossings): (Certificate, Vec<Crossing>),
         exact_stop: f64,
     ) -> Self {
         let (start, goal) = (poses[0], poses[poses.len() - 1]);
@@ -51,7 +51,7 @@ impl SmoothPlan {
             start,
             goal,
             spans: motion.spans,
-            passes,
+            crossings,
             certificate,
             parts: motion.parts,
             exact_stop,
@@ -66,8 +66,8 @@ impl SmoothPlan {
 
     /// How each intermediate pose is passed, in order.
     #[must_use]
-    pub fn passes(&self) -> &[Pass] {
-        &self.passes
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.crossings
     }
 
     /// What holds for every moment of the motion.
@@ -96,7 +96,7 @@ impl SmoothPlan {
             .iter()
             .filter(|part| part.0 != Method::Spline)
             .count();
-        if self.passes.is_empty() { 0 } else { stops }
+        if self.crossings.is_empty() { 0 } else { stops }
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -206,7 +206,7 @@ mod tests {
             plan.certificate().holds(),
             "{:?} {:?}",
             plan.certificate(),
-            plan.passes()
+            plan.crossings()
         );
         assert!(plan.duration() <= plan.exact_stop());
         plan

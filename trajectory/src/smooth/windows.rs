@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::certificate::certify;
 use super::choose::{Motion, Then, corners, from_motion, from_rest};
+use super::crossing::{RESOLUTION, crossings};
 use super::exact_stop;
 use super::lower_bound::lower_bound;
 use super::options::{SmoothError, SmoothOptions};
-use super::pass::{RESOLUTION, passes};
 use super::plan::{Method, SmoothPlan};
 use super::span::Span;
 use super::spline::Moving;
@@ -251,24 +251,24 @@ impl Windows {
     fn commit(&mut self) {
         let poses = &self.poses[self.passed..=self.end];
         let latest = self.tail.duration() - AGAIN_BRAKES * self.brake();
-        let passes = passes(&self.tail.spans, poses, &self.options);
+        let crossings = crossings(&self.tail.spans, poses, &self.options);
         let smooth = self.tail.parts.len() == 1 && self.tail.parts[0].0 == Method::Spline;
         let mut best = None;
-        for (i, pass) in passes.iter().enumerate().filter(|_| smooth) {
-            let next = passes
+        for (i, crossing) in crossings.iter().enumerate().filter(|_| smooth) {
+            let next = crossings
                 .get(i + 1)
                 .map_or(self.tail.duration(), |next| next.time);
             let cut = self
                 .tail
                 .spans
-                .partition_point(|span| span.start < pass.time);
+                .partition_point(|span| span.start < crossing.time);
             let start = self
                 .tail
                 .spans
                 .get(cut)
                 .map_or(f64::INFINITY, |span| span.start);
             if start < next && start <= latest {
-                best = Some((cut, self.passed + pass.index));
+                best = Some((cut, self.passed + crossing.index));
             }
         }
         let Some((cut, passed)) = best else {

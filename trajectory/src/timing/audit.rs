@@ -6,9 +6,9 @@ use realtime::Piece;
 use super::bound::bound;
 use super::certificate::{ActiveSpan, Limit, LimitPeak, order, root};
 use super::grid::Bounded;
+use super::gridpoints::ToolGridpoint;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
-use super::stations::ToolStation;
 use crate::active::Active;
 use crate::wide::Wide;
 use crate::{Path, ToolLimits};
@@ -257,14 +257,14 @@ impl<const N: usize> JointBounds<N> {
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
 fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [f64; 6] {
     let at = law.sample(t);
-    let warp = [
+    let reparametrization = [
         at.position[0],
         at.velocity[0],
         at.acceleration[0],
         at.jerk[0],
     ];
-    let tool = path.tool_at(warp[0].clamp(0.0, path.end()));
-    let local = ToolStation::new(&tool, warp);
+    let tool = path.tool_at(reparametrization[0].clamp(0.0, path.end()));
+    let local = ToolGridpoint::new(&tool, reparametrization);
     let norm = |v: Vector3<f64>| v.norm();
     let [l1, l2, l3] = local.linear.map(norm);
     let [a1, a2, a3] = local.angular.map(norm);

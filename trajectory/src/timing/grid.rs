@@ -1,7 +1,7 @@
 //! Where the cells of a law lie, and what bounds a path.
 
-use super::survey::Survey;
-use super::warp::Warp;
+use super::reachability::ReachabilityPass;
+use super::reparametrization::Reparametrization;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, ToolLimits};
 
@@ -14,7 +14,7 @@ const MOST_CELLS_PER_RAMP: f64 = 40.0;
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     /// The parameter of the law.
-    pub warp: Warp,
+    pub reparametrization: Reparametrization,
     /// Nodes, over the parameter of the law (s).
     pub nodes: Vec<f64>,
     /// Whether a node lies on a knot of the path, where derivatives may jump.
@@ -81,9 +81,14 @@ impl LeadIn {
 
 impl Grid {
     /// The grid for a path with these knots, from the survey's law made smooth.
-    pub(super) fn new(survey: &Survey, knots: &[f64], end: f64, options: &TimingOptions) -> Self {
-        let fast = survey.duration();
-        let ramp = survey.ramp.clamp(0.02 * fast, fast);
+    pub(super) fn new(
+        reachability: &ReachabilityPass,
+        knots: &[f64],
+        end: f64,
+        options: &TimingOptions,
+    ) -> Self {
+        let fast = reachability.duration();
+        let ramp = reachability.ramp.clamp(0.02 * fast, fast);
         let (start_rest, end_rest) = (
             options.start == Boundary::Rest,
             options.end == Boundary::Rest,
@@ -99,35 +104,42 @@ impl Grid {
         let spans = (cells / 2).max(12);
         let span = total / spans as f64;
         let floor = 1e-3 * end / fast;
-        let smooth =
-            |t: f64| (survey.parameter(t + 0.5 * ramp) - survey.parameter(t - 0.5 * ramp)) / ramp;
+        let smooth = |t: f64| {
+            (reachability.parameter(t + 0.5 * ramp) - reachability.parameter(t - 0.5 * ramp)) / ramp
+        };
         let lead_in = LeadIn::new(options.start, smooth, ramp);
         let sample = |i: usize| {
             let t = i as f64 * span - lead;
             (smooth(t) + lead_in.at(t)).max(floor)
         };
         let samples: Vec<f64> = (0..=spans).map(sample).collect();
-        let warp = Warp::new(&samples, span, end, (options.start, options.end));
-        let warp = if warp.ascends() {
-            warp
+        let reparametrization =
+            Reparametrization::new(&samples, span, end, (options.start, options.end));
+        let reparametrization = if reparametrization.ascends() {
+            reparametrization
         } else {
             // A start too far from the law of the survey: an even speed is always sound.
             let even = vec![end / total; spans + 1];
-            Warp::new(&even, span, end, (options.start, options.end))
+            Reparametrization::new(&even, span, end, (options.start, options.end))
         };
-        Self::with_warp(warp, knots, end, cells)
+        Self::with_reparametrization(reparametrization, knots, end, cells)
     }
 
-    /// The grid of about `cells` cells over `warp`, with nodes on the knots.
-    fn with_warp(warp: Warp, knots: &[f64], end: f64, cells: usize) -> Self {
-        let total = warp.duration();
+    /// The grid of about `cells` cells over `reparametrization`, with nodes on the knots.
+    fn with_reparametrization(
+        reparametrization: Reparametrization,
+        knots: &[f64],
+        end: f64,
+        cells: usize,
+    ) -> Self {
+        let total = reparametrization.duration();
         let step = total / cells as f64;
         let mut marks = vec![0.0];
         for &u in knots
             .iter()
             .filter(|u| **u > 1e-9 * end && **u < (1.0 - 1e-9) * end)
         {
-            let w = warp.inverse(u);
+            let w = reparametrization.inverse(u);
             let last = marks.last().copied().unwrap_or(0.0);
             if w - last > 0.3 * step && total - w > 0.3 * step {
                 marks.push(w);
@@ -144,7 +156,11 @@ impl Grid {
         }
         nodes.push(total);
         knot.push(true);
-        Self { warp, nodes, knot }
+        Self {
+            reparametrization,
+            nodes,
+            knot,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use realtime::Piece;
 
-use super::lanes::{Wave, groups};
+use super::simd::{Packed, groups};
 use crate::wide::{Four, Op};
 
 /// Ratios below this need no better bound than the hull: no such piece decides anything.
@@ -46,18 +46,18 @@ impl<const N: usize> Op for Hulls<'_, N> {
         let [velocity, acceleration, jerk] = &mut hulls;
         let [n1, n2, n3] = self.narrow;
         let [_, c1, c2, c3, c4, c5] = &self.piece.coefficients;
-        let t = Wave::splat(simd, self.piece.duration);
+        let t = Packed::splat(simd, self.piece.duration);
         let t2 = t * t;
         let (t3, t4) = (t2 * t, t2 * t2);
         for at in groups(N) {
             let (c1, c2) = (
-                Wave::some(simd, c1.as_slice(), at),
-                Wave::some(simd, c2.as_slice(), at),
+                Packed::some(simd, c1.as_slice(), at),
+                Packed::some(simd, c2.as_slice(), at),
             );
             let (c3, c4, c5) = (
-                Wave::some(simd, c3.as_slice(), at),
-                Wave::some(simd, c4.as_slice(), at),
-                Wave::some(simd, c5.as_slice(), at),
+                Packed::some(simd, c3.as_slice(), at),
+                Packed::some(simd, c4.as_slice(), at),
+                Packed::some(simd, c5.as_slice(), at),
             );
             let (a, b, c) = (c2 * t, c3 * t2, c4 * t3);
             let near = c1 + a + b * 0.5;
@@ -81,10 +81,10 @@ impl<const N: usize> Hull<N> {
         &mut self,
         narrow: &SVector<f64, N>,
         at: usize,
-        points: [Wave<S>; M],
+        points: [Packed<S>; M],
     ) {
         let simd = points[0].simd();
-        let narrow = Wave::some(simd, narrow.as_slice(), at);
+        let narrow = Packed::some(simd, narrow.as_slice(), at);
         let ends = points[0].abs().max(points[M - 1].abs());
         let mut most = ends;
         for point in &points[1..M - 1] {
@@ -93,8 +93,8 @@ impl<const N: usize> Hull<N> {
         let (most, over) = (most * narrow, (most - ends) * narrow);
         most.put(&mut self.most, at);
         over.put(&mut self.over, at);
-        let below = Wave::splat(simd, FLOOR) - most;
-        let exact = Wave::splat(simd, TOLERANCE) - over;
+        let below = Packed::splat(simd, FLOOR) - most;
+        let exact = Packed::splat(simd, TOLERANCE) - over;
         self.loose |= below.max(exact).least() < 0.0;
     }
 }

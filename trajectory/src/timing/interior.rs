@@ -9,10 +9,10 @@
 //! part of its curvature, which is the convex inner approximation by its tangent.
 
 use super::band::{self, Band};
+use super::newton_system::AssembleNewton;
 use super::problem::Problem;
-use super::share::Assemble;
 use super::state::{Evaluate, Multipliers, State, Turn, Worth};
-use super::stride::{Measure, Stride};
+use super::step_length::{Measure, StepLength};
 use crate::wide::Wide;
 
 /// A law under way, with the multipliers of its rows. All problems over one grid can be solved
@@ -163,8 +163,8 @@ impl Interior {
     }
 
     /// Finds the Newton step and those of the multipliers, and how far they may go.
-    fn newton(&mut self, problem: &Problem, mu: f64) -> Stride {
-        self.wide.run(Assemble {
+    fn newton(&mut self, problem: &Problem, mu: f64) -> StepLength {
+        self.wide.run(AssembleNewton {
             problem,
             x: &self.x,
             state: &mut self.state,

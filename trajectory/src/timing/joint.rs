@@ -3,14 +3,14 @@
 use nalgebra::SVector;
 use realtime::{Piece, Sample};
 
-use super::lanes::{Wave, groups};
+use super::gridpoints::Gridpoint;
 use super::problem::Spot;
-use super::stations::Station;
+use super::simd::{Packed, groups};
 use crate::wide::{Four, Op};
 
-/// The motion of the joints at a station, where the law is `spot`.
+/// The motion of the joints at a gridpoint, where the law is `spot`.
 pub(super) struct Motion<'a, const N: usize> {
-    pub station: &'a Station<N>,
+    pub gridpoint: &'a Gridpoint<N>,
     pub spot: Spot,
 }
 
@@ -19,20 +19,20 @@ impl<const N: usize> Op for Motion<'_, N> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> Sample<N> {
-        let mut sample = Sample::rest(self.station.position);
-        let [first, second, third] = &self.station.joint;
+        let mut sample = Sample::rest(self.gridpoint.position);
+        let [first, second, third] = &self.gridpoint.joint;
         let Spot { a, b, c } = self.spot;
         let root = a.sqrt();
         let [a, b, c, root] = [
-            Wave::splat(simd, a),
-            Wave::splat(simd, b),
-            Wave::splat(simd, c),
-            Wave::splat(simd, root),
+            Packed::splat(simd, a),
+            Packed::splat(simd, b),
+            Packed::splat(simd, c),
+            Packed::splat(simd, root),
         ];
         for at in groups(N) {
-            let q1 = Wave::some(simd, first.as_slice(), at);
-            let q2 = Wave::some(simd, second.as_slice(), at);
-            let q3 = Wave::some(simd, third.as_slice(), at);
+            let q1 = Packed::some(simd, first.as_slice(), at);
+            let q2 = Packed::some(simd, second.as_slice(), at);
+            let q3 = Packed::some(simd, third.as_slice(), at);
             (q1 * root).put(sample.velocity.as_mut_slice(), at);
             (q2 * a + q1 * b).put(sample.acceleration.as_mut_slice(), at);
             let jerk = (q3 * a + q2 * b * 3.0 + q1 * c) * root;
@@ -61,10 +61,10 @@ impl<const N: usize> Op for Join<'_, N> {
         let mut piece = Piece::hold(self.start.position, self.duration);
         let [_, c1, c2, c3, c4, c5] = &mut piece.coefficients;
         let (start, end) = (self.start, self.end);
-        let t = Wave::splat(simd, self.duration);
+        let t = Packed::splat(simd, self.duration);
         let inverse = t.inverse();
         let (square, cube) = (t * t, inverse * inverse * inverse);
-        let mut off = Wave::splat(simd, 0.0);
+        let mut off = Packed::splat(simd, 0.0);
         for at in groups(N) {
             let [p, v, a, j] = sample(simd, start, at);
             let [p1, v1, a1, j1] = sample(simd, end, at);
@@ -84,7 +84,7 @@ impl<const N: usize> Op for Join<'_, N> {
             let first = third * 6.0;
             let last = first + fourth * 24.0 + fifth * 60.0;
             let worst = (first - j).abs().max((last - j1).abs());
-            let narrow = Wave::some(simd, self.narrow.as_slice(), at);
+            let narrow = Packed::some(simd, self.narrow.as_slice(), at);
             off = (worst * narrow).max(off);
         }
         (piece, off.largest())
@@ -93,12 +93,12 @@ impl<const N: usize> Op for Join<'_, N> {
 
 /// Position, velocity, acceleration and jerk of the joints from `at` on.
 #[inline(always)]
-fn sample<S: Four, const N: usize>(simd: S, sample: &Sample<N>, at: usize) -> [Wave<S>; 4] {
+fn sample<S: Four, const N: usize>(simd: S, sample: &Sample<N>, at: usize) -> [Packed<S>; 4] {
     [
-        Wave::some(simd, sample.position.as_slice(), at),
-        Wave::some(simd, sample.velocity.as_slice(), at),
-        Wave::some(simd, sample.acceleration.as_slice(), at),
-        Wave::some(simd, sample.jerk.as_slice(), at),
+        Packed::some(simd, sample.position.as_slice(), at),
+        Packed::some(simd, sample.velocity.as_slice(), at),
+        Packed::some(simd, sample.acceleration.as_slice(), at),
+        Packed::some(simd, sample.jerk.as_slice(), at),
     ]
 }
 
@@ -109,17 +109,17 @@ mod tests {
 
     fn check<const N: usize>() {
         let numbers = |x: f64| SVector::<f64, N>::from_fn(|j, _| (x + 1.7 * j as f64).sin());
-        let station = |x: f64| Station {
+        let gridpoint = |x: f64| Gridpoint {
             position: numbers(x),
             joint: [numbers(x + 1.0), numbers(x + 2.0), numbers(x + 3.0)],
-            warp: [0.0; 4],
+            reparametrization: [0.0; 4],
         };
-        let (one, two) = (station(0.3), station(4.1));
-        let [start, end] = [(&one, 1.1, 0.2), (&two, 0.8, -0.3)].map(|(station, a, b)| {
+        let (one, two) = (gridpoint(0.3), gridpoint(4.1));
+        let [start, end] = [(&one, 1.1, 0.2), (&two, 0.8, -0.3)].map(|(gridpoint, a, b)| {
             let spot = Spot { a, b, c: 0.4 };
-            let sample = Wide::detect().run(Motion { station, spot });
-            assert_eq!(sample, Wide::plain().run(Motion { station, spot }));
-            let [q1, q2, _] = station.joint;
+            let sample = Wide::detect().run(Motion { gridpoint, spot });
+            assert_eq!(sample, Wide::plain().run(Motion { gridpoint, spot }));
+            let [q1, q2, _] = gridpoint.joint;
             assert!((sample.velocity - q1 * a.sqrt()).amax() < 1e-15);
             assert!((sample.acceleration - (q2 * a + q1 * b)).amax() < 1e-15);
             sample

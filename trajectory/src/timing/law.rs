@@ -2,10 +2,10 @@
 
 use super::TimingOptions;
 use super::grid::{Bounded, Grid};
+use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::problem::Problem;
-use super::stations::Stations;
-use super::survey::Survey;
+use super::reachability::ReachabilityPass;
 use super::tighten::MOST_STEPS;
 use crate::{JointLimits, Path, TimingError, ToolLimits};
 
@@ -37,15 +37,15 @@ impl LawProblem {
         tool: &ToolLimits,
         options: &TimingOptions,
     ) -> Result<Self, TimingError> {
-        let survey = Survey::new(path, joint, tool, options)?;
-        let grid = Grid::new(&survey, path.knots(), path.end(), options);
+        let reachability = ReachabilityPass::new(path, joint, tool, options)?;
+        let grid = Grid::new(&reachability, path.knots(), path.end(), options);
         let bounded = Bounded {
             path,
             joint,
             tool,
             options,
         };
-        let problem = bounded.problem(&Stations::new(bounded, &grid));
+        let problem = bounded.problem(&Gridpoints::new(bounded, &grid));
         Ok(Self {
             problem,
             gap: options.gap,

@@ -1,33 +1,33 @@
 //! The rows of a problem with their states, slot by slot in the order they stand in.
 
-use super::lanes::Lane;
 use super::problem::{Basis, Problem};
-use super::state::{Norm, Row, State};
+use super::simd::Lane;
+use super::state::{ConstraintRow, Norm, State};
 
 /// What is left of the rows of a problem, with their states.
 pub(super) struct Lines<'a> {
     problem: &'a Problem,
-    acceleration: (&'a [[Lane; 2]], &'a mut [Row]),
-    jerk: (&'a [[Lane; 3]], &'a mut [Row]),
+    acceleration: (&'a [[Lane; 2]], &'a mut [ConstraintRow]),
+    jerk: (&'a [[Lane; 3]], &'a mut [ConstraintRow]),
     norm_acceleration: (&'a [[[Lane; 3]; 2]], &'a mut [Norm]),
     norm_jerk: (&'a [[[Lane; 3]; 3]], &'a mut [Norm]),
 }
 
 /// The rows of a slot of values.
 pub(super) struct Values<'a> {
-    pub joints: (&'a [[Lane; 2]], &'a mut [Row]),
+    pub joints: (&'a [[Lane; 2]], &'a mut [ConstraintRow]),
     pub tools: (&'a [[[Lane; 3]; 2]], &'a mut [Norm]),
 }
 
 /// The rows of a jerk slot.
 pub(super) struct Jerks<'a> {
-    pub joints: (&'a [[Lane; 3]], &'a mut [Row]),
+    pub joints: (&'a [[Lane; 3]], &'a mut [ConstraintRow]),
     pub tools: (&'a [[[Lane; 3]; 3]], &'a mut [Norm]),
 }
 
 /// What a block has besides its rows: how the law follows from the unknowns, share in the time and
 /// cap at both slots of values, and the states of the caps.
-type Block<'a> = (&'a Basis, &'a [[Lane; 2]; 2], &'a mut [Row; 2]);
+type Block<'a> = (&'a Basis, &'a [[Lane; 2]; 2], &'a mut [ConstraintRow; 2]);
 
 /// Takes the next rows of a list.
 #[inline(always)]

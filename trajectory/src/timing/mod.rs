@@ -10,26 +10,26 @@ mod band;
 mod bound;
 mod certificate;
 mod grid;
+mod gridpoints;
 mod hull;
 mod interior;
 mod joint;
-mod lanes;
 mod law;
 mod least;
 mod lines;
 mod moving;
+mod newton_system;
 mod options;
 mod pieces;
 mod problem;
 mod reach;
+mod reachability;
+mod reparametrization;
 mod rows;
-mod share;
+mod simd;
 mod state;
-mod stations;
-mod stride;
-mod survey;
+mod step_length;
 mod tighten;
-mod warp;
 
 pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
 pub(crate) use certificate::{order as limit_order, root as limit_root};
@@ -39,8 +39,8 @@ pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 
 use grid::{Bounded, Grid};
-use stations::Stations;
-use survey::Survey;
+use gridpoints::Gridpoints;
+use reachability::ReachabilityPass;
 
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
 
@@ -69,14 +69,14 @@ pub fn time_path<const N: usize>(
     joint.check()?;
     tool.check()?;
     options.check()?;
-    let survey = Survey::new(path, joint, tool, options)?;
+    let reachability = ReachabilityPass::new(path, joint, tool, options)?;
     let bounded = Bounded {
         path,
         joint,
         tool,
         options,
     };
-    let draft = draft(bounded, &survey)?;
+    let draft = draft(bounded, &reachability)?;
     let tighten::Draft { pieces, audit, .. } = draft;
     // A moving start fixes the law there, so it cannot be stretched: it holds as it is.
     let moving = matches!(options.start, Boundary::Moving { .. });
@@ -91,7 +91,7 @@ pub fn time_path<const N: usize>(
         peaks: audit.peaks(stretch),
         active: audit.active(stretch),
         duration: trajectory.duration(),
-        lower_bound: survey.bound.max(least::chord_bound(bounded)),
+        lower_bound: reachability.bound.max(least::chord_bound(bounded)),
         fit_error: pieces.fit_error,
         tool_margin: audit.tool_margin,
         stretch,
@@ -114,13 +114,18 @@ pub fn time_path<const N: usize>(
 /// law of the whole does.
 fn draft<P: Path<N>, const N: usize>(
     bounded: Bounded<'_, P, N>,
-    survey: &Survey,
+    reachability: &ReachabilityPass,
 ) -> Result<tighten::Draft<N>, TimingError> {
     let mut options = *bounded.options;
     let mut refused = None;
     for _ in 0..FINER {
-        let grid = Grid::new(survey, bounded.path.knots(), bounded.path.end(), &options);
-        match tighten::best(bounded, &Stations::new(bounded, &grid)) {
+        let grid = Grid::new(
+            reachability,
+            bounded.path.knots(),
+            bounded.path.end(),
+            &options,
+        );
+        match tighten::best(bounded, &Gridpoints::new(bounded, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

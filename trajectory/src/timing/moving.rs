@@ -6,9 +6,9 @@
 
 use super::certificate::Limit;
 use super::grid::Bounded;
+use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::problem::Problem;
-use super::stations::Stations;
 use super::tighten::{Draft, MOST_STEPS, tighten};
 use crate::{Path, TimingError};
 
@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-6;
 /// The fastest law found over `grid` that meets every bound as it is.
 pub(super) fn best<P: Path<N>, const N: usize>(
     bounded: Bounded<'_, P, N>,
-    stations: &Stations<'_, N>,
+    gridpoints: &Gridpoints<'_, N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {
     problem.release_start();
@@ -33,7 +33,7 @@ pub(super) fn best<P: Path<N>, const N: usize>(
         enter(&mut interior, &problem)?;
         interior.slow_down(&problem);
         interior.solve(&problem, bounded.options.gap, 0.3, MOST_STEPS);
-        let draft = Draft::new(bounded, (stations, &problem), &interior);
+        let draft = Draft::new(bounded, (gridpoints, &problem), &interior);
         if draft.audit.stretch_after_first() <= 1.0 {
             return start_holds(draft);
         }

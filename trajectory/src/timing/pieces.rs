@@ -4,9 +4,9 @@ use nalgebra::SVector;
 use realtime::{Piece, Sample};
 
 use super::grid::Bounded;
+use super::gridpoints::{Gridpoint, Gridpoints};
 use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
-use super::stations::{Station, Stations};
 use crate::Path;
 use crate::wide::Wide;
 
@@ -37,12 +37,12 @@ struct State<const N: usize> {
 }
 
 impl<const N: usize> State<N> {
-    /// The motion at a station, where the law is `spot`.
-    fn new(wide: Wide, station: &Station<N>, spot: Spot) -> Self {
+    /// The motion at a gridpoint, where the law is `spot`.
+    fn new(wide: Wide, gridpoint: &Gridpoint<N>, spot: Spot) -> Self {
         let root = spot.a.sqrt();
-        let joint = wide.run(Motion { station, spot });
+        let joint = wide.run(Motion { gridpoint, spot });
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
-        let [u, u1, u2, u3] = station.warp;
+        let [u, u1, u2, u3] = gridpoint.reparametrization;
         let law = Sample {
             position: one(u),
             velocity: one(u1 * root),
@@ -56,7 +56,7 @@ impl<const N: usize> State<N> {
 /// Makes pieces out of one law.
 pub(super) struct Maker<'a, P, const N: usize> {
     bounded: Bounded<'a, P, N>,
-    stations: &'a Stations<'a, N>,
+    gridpoints: &'a Gridpoints<'a, N>,
     /// One over the jerk limits.
     narrow: SVector<f64, N>,
     wide: Wide,
@@ -64,9 +64,9 @@ pub(super) struct Maker<'a, P, const N: usize> {
 }
 
 impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
-    /// For laws over the grid of `stations`.
-    pub(super) fn new(bounded: Bounded<'a, P, N>, stations: &'a Stations<'a, N>) -> Self {
-        let count = 2 * stations.grid.nodes.len();
+    /// For laws over the grid of `gridpoints`.
+    pub(super) fn new(bounded: Bounded<'a, P, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
+        let count = 2 * gridpoints.grid.nodes.len();
         let out = Pieces {
             joint: Vec::with_capacity(count),
             law: Vec::with_capacity(count),
@@ -75,7 +75,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         };
         Self {
             bounded,
-            stations,
+            gridpoints,
             narrow: bounded.joint.jerk.map(|x| 1.0 / x),
             wide: Wide::detect(),
             out,
@@ -84,11 +84,15 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
 
     /// The pieces of the law `x`.
     pub(super) fn make(mut self, problem: &Problem, x: &[f64]) -> Pieces<N> {
-        let nodes = &self.stations.grid.nodes;
+        let nodes = &self.gridpoints.grid.nodes;
         for k in 0..problem.cells() {
-            let (spot, stations) = (problem.spot(k, x), self.stations);
-            let start = State::new(self.wide, stations.left(k), spot);
-            let end = State::new(self.wide, stations.right(k), spot.moved(problem.widths[k]));
+            let (spot, gridpoints) = (problem.spot(k, x), self.gridpoints);
+            let start = State::new(self.wide, gridpoints.left(k), spot);
+            let end = State::new(
+                self.wide,
+                gridpoints.right(k),
+                spot.moved(problem.widths[k]),
+            );
             self.halve(k, (nodes[k], &start), (nodes[k + 1], &end), DEPTH);
         }
         self.out
@@ -122,9 +126,9 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
             let middle = 0.5 * (w0 + w1);
             let spot = start.spot.moved(middle - w0);
             let state = if depth == DEPTH {
-                State::new(self.wide, self.stations.middle(k), spot)
+                State::new(self.wide, self.gridpoints.middle(k), spot)
             } else {
-                let grid = self.stations.grid;
+                let grid = self.gridpoints.grid;
                 State::new(
                     self.wide,
                     &grid.place(self.bounded.path, middle, 0.0).0,

@@ -1,6 +1,6 @@
 //! The fastest law under velocity and acceleration limits alone, by reachability.
 
-use super::lanes::{LANE, Lane};
+use super::simd::{LANE, Lane};
 use crate::wide::{Four, Op, Wide};
 
 /// A path on a grid with its limits, ready for [`ReachGrid::solve`]: `a = (du/dt)^2` and

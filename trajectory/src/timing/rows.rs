@@ -3,10 +3,10 @@
 use nalgebra::{SVector, Vector3};
 
 use super::grid::Bounded;
-use super::lanes::{LANE, Lane};
+use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
-use super::stations::{Station, Stations, ToolStation};
-use super::survey::{joint_ratio, speed_cap};
+use super::reachability::{joint_ratio, speed_cap};
+use super::simd::{LANE, Lane};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, ToolLimits};
 
@@ -22,8 +22,8 @@ struct Rows<'a, const N: usize> {
 }
 
 impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
-    /// The problem over the places of `stations`.
-    pub(super) fn problem(&self, stations: &Stations<'_, N>) -> Problem {
+    /// The problem over the places of `gridpoints`.
+    pub(super) fn problem(&self, gridpoints: &Gridpoints<'_, N>) -> Problem {
         let tool = self.tool;
         let finite = |limits: [f64; 2]| limits.iter().filter(|x| x.is_finite()).count();
         let tools = [
@@ -32,7 +32,7 @@ impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
         ];
         let TimingOptions { start, .. } = self.options;
         let moving = matches!(start, Boundary::Moving { .. });
-        let nodes = &stations.grid.nodes;
+        let nodes = &gridpoints.grid.nodes;
         let mut problem = Problem::new(nodes, N, tools, moving);
         let rows = Rows {
             joint: self.joint,
@@ -43,8 +43,12 @@ impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
         };
         let cells = problem.cells();
         for k in 0..cells {
-            let (left, middle, right) = (stations.left(k), stations.middle(k), stations.right(k));
-            let [left_tool, middle_tool] = stations.tools(k);
+            let (left, middle, right) = (
+                gridpoints.left(k),
+                gridpoints.middle(k),
+                gridpoints.right(k),
+            );
+            let [left_tool, middle_tool] = gridpoints.tools(k);
             let (left, middle) = ((left, left_tool), (middle, middle_tool));
             rows.values(&mut problem, (k, false), left);
             rows.values(&mut problem, (k, true), middle);
@@ -52,16 +56,19 @@ impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
             let (first, last) = (slots.start, slots.end - 1);
             rows.jerks(&mut problem, (k, first), left);
             rows.jerks(&mut problem, (k, first + slots.len() / 2), middle);
-            rows.jerks(&mut problem, (k, last), (right, stations.tool_right(k)));
+            rows.jerks(&mut problem, (k, last), (right, gridpoints.tool_right(k)));
             if problem.dense(k) {
                 for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
                     let w = nodes[k] + share * problem.widths[k];
-                    let (joint, tool) = stations.grid.place(self.path, w, 0.0);
+                    let (joint, tool) = gridpoints.grid.place(self.path, w, 0.0);
                     rows.jerks(&mut problem, (k, slot), (&joint, tool));
                 }
             }
         }
-        let end = (stations.right(cells - 1), stations.tool_right(cells - 1));
+        let end = (
+            gridpoints.right(cells - 1),
+            gridpoints.tool_right(cells - 1),
+        );
         rows.values(&mut problem, (cells, false), end);
         problem
     }
@@ -73,10 +80,10 @@ impl<const N: usize> Rows<'_, N> {
         &self,
         problem: &mut Problem,
         (k, middle): (usize, bool),
-        (station, tool): (&Station<N>, ToolStation),
+        (gridpoint, tool): (&Gridpoint<N>, ToolGridpoint),
     ) {
         let (slot, l) = (Problem::value_slot(k, middle), k % LANE);
-        let [first, second, _] = &station.joint;
+        let [first, second, _] = &gridpoint.joint;
         for (j, row) in problem.acceleration[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.acceleration[j];
             (row[0][l], row[1][l]) = (first[j] * narrow, second[j] * narrow);
@@ -97,7 +104,9 @@ impl<const N: usize> Rows<'_, N> {
             tool.linear[0].norm(),
             tool.angular[0].norm(),
         ];
-        let rate = self.rate_cap.map_or(0.0, |cap| station.warp[1] / cap);
+        let rate = self
+            .rate_cap
+            .map_or(0.0, |cap| gridpoint.reparametrization[1] / cap);
         // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
         problem.value[slot / 2][slot % 2][1][l] =
             (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
@@ -108,10 +117,10 @@ impl<const N: usize> Rows<'_, N> {
         &self,
         problem: &mut Problem,
         (k, slot): (usize, usize),
-        (station, tool): (&Station<N>, ToolStation),
+        (gridpoint, tool): (&Gridpoint<N>, ToolGridpoint),
     ) {
         let l = k % LANE;
-        let [first, second, third] = &station.joint;
+        let [first, second, third] = &gridpoint.joint;
         for (j, row) in problem.jerk[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.jerk[j];
             row[0][l] = third[j] * narrow;

@@ -1,13 +1,13 @@
 //! Values and multipliers of the rows of a problem under a law.
 
-use super::lanes::{LANE, Lane, Wave, combine, dot};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
+use super::simd::{LANE, Lane, Packed, combine, dot};
 use crate::wide::{Four, Op};
 
 /// Values `g`, multipliers and their steps of a row in each cell of a block.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Row {
+pub(super) struct ConstraintRow {
     pub g: Lane,
     pub multiplier: Lane,
     pub change: Lane,
@@ -24,10 +24,10 @@ pub(super) struct Norm {
 /// All rows, in the order of the problem's.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    pub acceleration: Vec<Row>,
-    pub jerk: Vec<Row>,
+    pub acceleration: Vec<ConstraintRow>,
+    pub jerk: Vec<ConstraintRow>,
     /// Those of the caps, at both slots of values of each block.
-    pub cap: Vec<[Row; 2]>,
+    pub cap: Vec<[ConstraintRow; 2]>,
     pub norm_acceleration: Vec<Norm>,
     pub norm_jerk: Vec<Norm>,
 }
@@ -46,9 +46,9 @@ pub(super) struct Worth {
 /// The law in each cell of a block, at one place.
 #[derive(Clone, Copy)]
 pub(super) struct Spots<S: Four> {
-    pub a: Wave<S>,
-    pub b: Wave<S>,
-    pub c: Wave<S>,
+    pub a: Packed<S>,
+    pub b: Packed<S>,
+    pub c: Packed<S>,
 }
 
 impl<S: Four> Spots<S> {
@@ -56,25 +56,25 @@ impl<S: Four> Spots<S> {
     #[inline(always)]
     pub(super) fn left(simd: S, basis: &Basis, x: &[f64]) -> Self {
         let x: &[f64; LANE + 2] = x.first_chunk().unwrap_or(&[1.0; LANE + 2]);
-        let x0 = Wave::load(simd, &x[..LANE]);
-        let x1 = Wave::load(simd, &x[1..LANE + 1]);
-        let x2 = Wave::load(simd, &x[2..]);
-        let b = (x1 - x0) * Wave::load(simd, &basis.left);
-        let next = (x2 - x1) * Wave::load(simd, &basis.right);
+        let x0 = Packed::load(simd, &x[..LANE]);
+        let x1 = Packed::load(simd, &x[1..LANE + 1]);
+        let x2 = Packed::load(simd, &x[2..]);
+        let b = (x1 - x0) * Packed::load(simd, &basis.left);
+        let next = (x2 - x1) * Packed::load(simd, &basis.right);
         let (first, second) = (
-            Wave::load(simd, &basis.first),
-            Wave::load(simd, &basis.second),
+            Packed::load(simd, &basis.first),
+            Packed::load(simd, &basis.second),
         );
         Self {
             a: x0 * first + x1 * second,
             b,
-            c: (next - b) * Wave::load(simd, &basis.inverse),
+            c: (next - b) * Packed::load(simd, &basis.inverse),
         }
     }
 
     /// `x` further on.
     #[inline(always)]
-    pub(super) fn moved(self, x: Wave<S>) -> Self {
+    pub(super) fn moved(self, x: Packed<S>) -> Self {
         let gain = x * self.c;
         Self {
             a: self.a + x * (self.b + self.b + gain),
@@ -86,11 +86,11 @@ impl<S: Four> Spots<S> {
 
 /// A vector in registers.
 #[inline(always)]
-pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [Wave<S>; 3] {
+pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [Packed<S>; 3] {
     [
-        Wave::load(simd, &lanes[0]),
-        Wave::load(simd, &lanes[1]),
-        Wave::load(simd, &lanes[2]),
+        Packed::load(simd, &lanes[0]),
+        Packed::load(simd, &lanes[1]),
+        Packed::load(simd, &lanes[2]),
     ]
 }
 
@@ -98,9 +98,9 @@ impl State {
     /// For the rows of `problem`.
     pub(super) fn new(problem: &Problem) -> Self {
         Self {
-            acceleration: vec![Row::default(); problem.acceleration.len()],
-            jerk: vec![Row::default(); problem.jerk.len()],
-            cap: vec![[Row::default(); 2]; problem.value.len()],
+            acceleration: vec![ConstraintRow::default(); problem.acceleration.len()],
+            jerk: vec![ConstraintRow::default(); problem.jerk.len()],
+            cap: vec![[ConstraintRow::default(); 2]; problem.value.len()],
             norm_acceleration: vec![Norm::default(); problem.norm_acceleration.len()],
             norm_jerk: vec![Norm::default(); problem.norm_jerk.len()],
         }
@@ -126,15 +126,15 @@ impl Op for Evaluate<'_> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> Worth {
-        let zero = Wave::splat(simd, 0.0);
+        let zero = Packed::splat(simd, 0.0);
         let (mut flat, mut steep, mut time) = (zero, zero, zero);
         let (mut lines, blocks) = Lines::all(self.problem, self.state);
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
-            let width = Wave::load(simd, &basis.width);
+            let width = Packed::load(simd, &basis.width);
             let middle = left.moved(width * 0.5);
-            time += Wave::load(simd, &value[0][0]) / left.a.sqrt();
-            time += Wave::load(simd, &value[1][0]) / middle.a.sqrt();
+            time += Packed::load(simd, &value[0][0]) / left.a.sqrt();
+            time += Packed::load(simd, &value[1][0]) / middle.a.sqrt();
             let [first, second] = cap;
             flat = self::cap(&value[0][1], first, left).max(flat);
             flat = self::cap(&value[1][1], second, middle).max(flat);
@@ -155,19 +155,19 @@ impl Op for Evaluate<'_> {
 
 /// Sets the ratios to caps; returns their squares.
 #[inline(always)]
-fn cap<S: Four>(cap: &Lane, row: &mut Row, spot: Spots<S>) -> Wave<S> {
-    let g = Wave::load(spot.a.simd(), cap) * spot.a;
+fn cap<S: Four>(cap: &Lane, row: &mut ConstraintRow, spot: Spots<S>) -> Packed<S> {
+    let g = Packed::load(spot.a.simd(), cap) * spot.a;
     g.store(&mut row.g);
     g * g
 }
 
 /// Sets the values at a slot; returns the largest square.
 #[inline(always)]
-fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Wave<S> {
+fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Packed<S> {
     let simd = spot.a.simd();
-    let mut most = Wave::splat(simd, 0.0);
+    let mut most = Packed::splat(simd, 0.0);
     for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
-        let g = Wave::load(simd, p) * spot.b + Wave::load(simd, q) * spot.a;
+        let g = Packed::load(simd, p) * spot.b + Packed::load(simd, q) * spot.a;
         g.store(&mut row.g);
         most = (g * g).max(most);
     }
@@ -181,16 +181,16 @@ fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> Wave<S> {
 
 /// Sets the values at a jerk slot; returns the largest square.
 #[inline(always)]
-fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Wave<S> {
+fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Packed<S> {
     let simd = spot.a.simd();
     let root = spot.a.sqrt();
     let (a, b, c) = (root * spot.a, root * spot.b, root * spot.c);
-    let mut most = Wave::splat(simd, 0.0);
+    let mut most = Packed::splat(simd, 0.0);
     for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
         let (x, y, z) = (
-            Wave::load(simd, x),
-            Wave::load(simd, y),
-            Wave::load(simd, z),
+            Packed::load(simd, x),
+            Packed::load(simd, y),
+            Packed::load(simd, z),
         );
         let g = x * a + y * b + z * c;
         g.store(&mut row.g);
@@ -207,7 +207,7 @@ fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> Wave<S> {
 
 /// Writes a vector to memory.
 #[inline(always)]
-fn store<S: Four>(vector: [Wave<S>; 3], to: &mut [Lane; 3]) {
+fn store<S: Four>(vector: [Packed<S>; 3], to: &mut [Lane; 3]) {
     for (lane, x) in to.iter_mut().zip(vector) {
         x.store(lane);
     }
@@ -233,15 +233,15 @@ impl Op for Multipliers<'_> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> f64 {
-        let one = Wave::splat(simd, 1.0);
-        let mut total = Wave::splat(simd, 0.0);
+        let one = Packed::splat(simd, 1.0);
+        let mut total = Packed::splat(simd, 0.0);
         let (state, turn) = (self.state, self.turn);
         for row in state.acceleration.iter_mut().chain(&mut state.jerk) {
-            let g = Wave::load(simd, &row.g);
+            let g = Packed::load(simd, &row.g);
             total += turn.take(one - g * g, &mut row.multiplier, &row.change);
         }
         for row in state.cap.iter_mut().flatten() {
-            let g = Wave::load(simd, &row.g);
+            let g = Packed::load(simd, &row.g);
             total += turn.take(one - g, &mut row.multiplier, &row.change);
         }
         for row in state
@@ -259,12 +259,12 @@ impl Op for Multipliers<'_> {
 impl Turn {
     /// Turns one multiplier; returns its product with the slack.
     #[inline(always)]
-    fn take<S: Four>(self, slack: Wave<S>, multiplier: &mut Lane, change: &Lane) -> Wave<S> {
+    fn take<S: Four>(self, slack: Packed<S>, multiplier: &mut Lane, change: &Lane) -> Packed<S> {
         let simd = slack.simd();
         let new = match self {
-            Self::Balance(mu) => Wave::splat(simd, mu) / slack,
+            Self::Balance(mu) => Packed::splat(simd, mu) / slack,
             Self::Advance(factor) => {
-                Wave::load(simd, multiplier) + Wave::load(simd, change) * factor
+                Packed::load(simd, multiplier) + Packed::load(simd, change) * factor
             }
         };
         new.store(multiplier);

@@ -4,11 +4,11 @@
 use super::audit::Audit;
 use super::certificate::{Limit, order};
 use super::grid::Bounded;
+use super::gridpoints::Gridpoints;
 use super::interior::Interior;
-use super::lanes::{LANE, Lane};
 use super::pieces::{Maker, Pieces};
 use super::problem::Problem;
-use super::stations::Stations;
+use super::simd::{LANE, Lane};
 use crate::{Path, TimingError};
 
 /// Newton steps after which the best law so far is taken.
@@ -34,10 +34,10 @@ impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
     pub(super) fn new<P: Path<N>>(
         bounded: Bounded<'_, P, N>,
-        (stations, problem): (&Stations<'_, N>, &Problem),
+        (gridpoints, problem): (&Gridpoints<'_, N>, &Problem),
         interior: &Interior,
     ) -> Self {
-        let pieces = Maker::new(bounded, stations).make(problem, &interior.x);
+        let pieces = Maker::new(bounded, gridpoints).make(problem, &interior.x);
         let audit = Audit::new(bounded, &pieces);
         let total: f64 = pieces.joint.iter().map(|piece| piece.duration).sum();
         let duration = total * audit.stretch;
@@ -54,17 +54,17 @@ impl<const N: usize> Draft<N> {
 /// The fastest law found over `grid` once it is stretched to meet every bound.
 pub(super) fn best<P: Path<N>, const N: usize>(
     bounded: Bounded<'_, P, N>,
-    stations: &Stations<'_, N>,
+    gridpoints: &Gridpoints<'_, N>,
 ) -> Result<Draft<N>, TimingError> {
-    let mut problem = bounded.problem(stations);
+    let mut problem = bounded.problem(gridpoints);
     if problem.moving {
-        return super::moving::best(bounded, stations, problem);
+        return super::moving::best(bounded, gridpoints, problem);
     }
     let gap = bounded.options.gap;
     let mut interior = Interior::new(&problem);
     interior.slow_down(&problem);
     interior.solve(&problem, gap, 0.3, MOST_STEPS);
-    let mut last = Draft::new(bounded, (stations, &problem), &interior);
+    let mut last = Draft::new(bounded, (gridpoints, &problem), &interior);
     let mut best = None;
     for _ in 0..ROUNDS {
         if last.audit.stretch < ENOUGH {
@@ -74,7 +74,7 @@ pub(super) fn best<P: Path<N>, const N: usize>(
         best = Some(faster(best, last));
         interior.slow_down(&problem);
         interior.solve(&problem, gap, 0.02, FEW_STEPS);
-        last = Draft::new(bounded, (stations, &problem), &interior);
+        last = Draft::new(bounded, (gridpoints, &problem), &interior);
     }
     let mut best = faster(best, last);
     best.iterations = interior.iterations;

@@ -38,7 +38,7 @@ pub(crate) struct Motion {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct MotionReport {
     schema: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<String>,
@@ -73,7 +73,7 @@ impl Motion {
             let row = measure(case, robot.as_ref())?;
             cases.push(named(name, row));
         }
-        let report = Report {
+        let report = MotionReport {
             schema: 1,
             robot: robot.map(|robot| robot.name),
             cases,
@@ -150,7 +150,7 @@ fn named(name: &str, row: Measure) -> Case {
     }
 }
 
-fn table(report: &Report) -> io::Result<()> {
+fn table(report: &MotionReport) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let width = report.cases.iter().map(|case| case.name.chars().count());
     let width = width.max().unwrap_or(0).max(4);
@@ -202,7 +202,7 @@ fn table(report: &Report) -> io::Result<()> {
     Ok(())
 }
 
-fn bars(report: &Report) -> Vec<Bar> {
+fn bars(report: &MotionReport) -> Vec<Bar> {
     let bar = |case: &Case| Bar {
         name: case.name.clone(),
         value: case.motion_s,

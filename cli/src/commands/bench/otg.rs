@@ -20,15 +20,15 @@ pub(crate) struct Otg {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct OtgReport {
     schema: u32,
     seed: u64,
     count: u32,
-    rows: Vec<Row>,
+    rows: Vec<OtgLine>,
 }
 
 #[derive(Serialize)]
-struct Row {
+struct OtgLine {
     joints: usize,
     ends: &'static str,
     failed: usize,
@@ -45,7 +45,7 @@ impl Otg {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let Problems { seed, count, json } = self.problems;
         let rows = otg::bench(seed, count as usize);
-        let report = Report {
+        let report = OtgReport {
             schema: 1,
             seed,
             count,
@@ -64,8 +64,8 @@ impl Otg {
     }
 }
 
-fn row(row: &otg::Row) -> Row {
-    Row {
+fn row(row: &otg::OtgRow) -> OtgLine {
+    OtgLine {
         joints: row.joints,
         ends: match row.ends {
             Ends::Moving => "moving",
@@ -82,7 +82,7 @@ fn row(row: &otg::Row) -> Row {
     }
 }
 
-fn table(report: &Report) -> io::Result<()> {
+fn table(report: &OtgReport) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(
         out,

@@ -20,15 +20,15 @@ pub(crate) struct Timing {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct TimingReport {
     schema: u32,
     seed: u64,
     count: u32,
-    rows: Vec<Row>,
+    rows: Vec<TimingLine>,
 }
 
 #[derive(Serialize)]
-struct Row {
+struct TimingLine {
     joints: usize,
     waypoints: usize,
     failed: usize,
@@ -44,7 +44,7 @@ impl Timing {
     /// Measures and prints; a path without a certified time law fails.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let Problems { seed, count, json } = self.problems;
-        let report = Report {
+        let report = TimingReport {
             schema: 1,
             seed,
             count,
@@ -66,8 +66,8 @@ impl Timing {
     }
 }
 
-fn row(row: &timing::Row) -> Row {
-    Row {
+fn row(row: &timing::TimingRow) -> TimingLine {
+    TimingLine {
         joints: row.joints,
         waypoints: row.waypoints,
         failed: row.failed,
@@ -80,7 +80,7 @@ fn row(row: &timing::Row) -> Row {
     }
 }
 
-fn table(report: &Report) -> io::Result<()> {
+fn table(report: &TimingReport) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(
         out,

@@ -169,7 +169,7 @@ impl<const N: usize> Worker<'_, N> {
             return false;
         };
         self.work.clear();
-        self.feeder.renew();
+        self.sender.renew();
         self.controller.set_joints(self.remote.measured().setpoint);
         match jogging.next.filter(|(_, until)| Instant::now() < *until) {
             Some((request, until)) => {

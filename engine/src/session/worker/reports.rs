@@ -51,10 +51,10 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Stopped { .. } => self.say(Note::Stopped),
             Event::Aborted { aborts, .. } => {
-                let asked = aborts.wrapping_sub(self.age);
+                let asked = aborts.wrapping_sub(self.epoch);
                 let ours = asked <= self.jog_aborts;
                 self.jog_aborts = self.jog_aborts.saturating_sub(asked);
-                self.age = aborts;
+                self.epoch = aborts;
                 self.on_abort(ours);
             }
             Event::Faulted { fault, tick } => {
@@ -84,30 +84,30 @@ impl<const N: usize> Worker<'_, N> {
     /// was given before drops with the latter only.
     fn on_abort(&mut self, ends_jog: bool) {
         if ends_jog {
-            self.ends.shared.inbox().renew(self.age);
+            self.ends.shared.inbox().renew(self.epoch);
         }
         if !self.rest_from_jog() {
-            let dropped = self.drop_all(Some(self.age));
+            let dropped = self.drop_all(Some(self.epoch));
             self.say(Note::Aborted { dropped });
         } else if !ends_jog {
-            let dropped = self.ends.shared.inbox().drop_all(Some(self.age));
+            let dropped = self.ends.shared.inbox().drop_all(Some(self.epoch));
             self.say(Note::Aborted { dropped });
         }
     }
 
-    /// Forgets all that is planned or queued, but what was given at `age`, and begins again from
+    /// Forgets all that is planned or queued, but what was given at `epoch`, and begins again from
     /// where the arm is.
-    fn drop_all(&mut self, age: Option<u32>) -> usize {
+    fn drop_all(&mut self, epoch: Option<u32>) -> usize {
         let dropped = self.flight.len();
         self.work.clear();
         self.flight.clear();
         let dropped = dropped + {
             let mut inbox = self.ends.shared.inbox();
             inbox.set_flying(0);
-            inbox.drop_all(age)
+            inbox.drop_all(epoch)
         };
         self.jogging = None;
-        self.feeder.renew();
+        self.sender.renew();
         self.held = None;
         self.controller.abort();
         self.controller.set_joints(self.remote.measured().setpoint);
@@ -162,7 +162,7 @@ impl<const N: usize> Worker<'_, N> {
             tick: sample.tick,
             command: sample.command,
             path_time: sample.path_time,
-            path_rate: sample.path_rate,
+            time_scaling: sample.time_scaling,
             q: list(&sample.setpoint.position),
             dq: list(&sample.setpoint.velocity),
             ddq: list(&sample.setpoint.acceleration),

@@ -88,7 +88,7 @@ fn eliminate<S: Four, const B: usize>(
     for (j, column) in columns.iter_mut().enumerate() {
         for (i, done) in panel[..j].iter().enumerate() {
             let (factor, done) = (simd.splat(done[j - i]), &done[j - i..]);
-            for (to, from) in lanes(column).zip(done.chunks_exact(LANES)) {
+            for (to, from) in simd_chunks(column).zip(done.chunks_exact(LANES)) {
                 let product = simd.mul(factor, simd.load(from));
                 simd.store(simd.sub(simd.load(to), product), to);
             }
@@ -99,7 +99,7 @@ fn eliminate<S: Four, const B: usize>(
         }
         let inverse = 1.0 / pivot.sqrt();
         let factor = simd.splat(inverse);
-        for (to, copy) in lanes(column).zip(panel[j].chunks_exact_mut(LANES)) {
+        for (to, copy) in simd_chunks(column).zip(panel[j].chunks_exact_mut(LANES)) {
             simd.store(simd.mul(factor, simd.load(to)), to);
             simd.store(simd.load(to), copy);
         }
@@ -119,7 +119,7 @@ fn subtract<S: Four, const B: usize>(
     let (a, b, c, e) = (&a[d + 3..], &b[d + 2..], &c[d + 1..], &e[d..]);
     let factors = [a[0], b[0], c[0], e[0]].map(|x| simd.splat(x));
     let count = (B - SPARE - d).div_ceil(LANES);
-    for (q, to) in lanes(column).take(count).enumerate() {
+    for (q, to) in simd_chunks(column).take(count).enumerate() {
         let at = q * LANES;
         let mut value = simd.load(to);
         value = simd.sub(value, simd.mul(factors[0], simd.load(&a[at..])));
@@ -132,7 +132,7 @@ fn subtract<S: Four, const B: usize>(
 
 /// A column in groups of four.
 #[inline(always)]
-fn lanes<const B: usize>(column: &mut [f64; B]) -> std::slice::ChunksExactMut<'_, f64> {
+fn simd_chunks<const B: usize>(column: &mut [f64; B]) -> std::slice::ChunksExactMut<'_, f64> {
     column.chunks_exact_mut(LANES)
 }
 

@@ -306,7 +306,7 @@ impl Task<'_> {
         let mut result = Vec::with_capacity(point.control.len());
         for (k, c) in point.control.iter().enumerate() {
             let time = k as f64 - 1.5;
-            while leg < end && point.passes[leg - 1] <= time {
+            while leg < end && point.crossings[leg - 1] <= time {
                 leg += 1;
             }
             let foot = problem.nearest(&[c[0], c[1], c[2]], leg, 0);
@@ -350,9 +350,13 @@ fn anchors<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Vec<(usize
     let mut result = Vec::new();
     let mut last = 3;
     for leg in 1..problem.vertices.len() {
-        let since = if leg == 1 { 0.0 } else { point.passes[leg - 2] };
+        let since = if leg == 1 {
+            0.0
+        } else {
+            point.crossings[leg - 2]
+        };
         let until = point
-            .passes
+            .crossings
             .get(leg - 1)
             .copied()
             .unwrap_or(point.spans() as f64);

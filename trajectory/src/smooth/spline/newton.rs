@@ -315,9 +315,9 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// the direction of motion carries no curvature.
     fn balls(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room) {
         for (i, goal) in problem.inner().iter().enumerate() {
-            let (span, share) = point.locate(point.passes[i]);
+            let (span, share) = point.locate(point.crossings[i]);
             let w = weights(share);
-            let [p, v, a] = point.at(point.passes[i]);
+            let [p, v, a] = point.at(point.crossings[i]);
             let (mut gradient, mut hessian) = ([0.0; D], [[0.0; D]; D]);
             let mut damping = 0.0;
             for g in 0..Problem::<D>::GROUPS {

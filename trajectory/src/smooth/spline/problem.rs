@@ -45,7 +45,7 @@ pub(crate) struct Point<const D: usize> {
     pub(crate) control: Vec<[f64; D]>,
     pub(crate) z: f64,
     /// Time of the pass of each inner vertex, in knot intervals.
-    pub(crate) passes: Vec<f64>,
+    pub(crate) crossings: Vec<f64>,
 }
 
 /// Widened bounds: what the present iterate needs until it is feasible.
@@ -172,7 +172,7 @@ impl<const D: usize> Problem<D> {
         } else {
             0.0
         };
-        2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + point.passes.len() as f64)
+        2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + point.crossings.len() as f64)
     }
 }
 

@@ -39,9 +39,9 @@ pub(crate) fn project<const D: usize>(
     let end = point.spans() as f64;
     let scales = [0, 1].map(|g: usize| 1.0 / (problem.groups[g].radius * problem.groups[g].radius));
     let mut before = 0.0;
-    for i in 0..point.passes.len() {
+    for i in 0..point.crossings.len() {
         let goal = &problem.inner()[i];
-        let mut time = point.passes[i];
+        let mut time = point.crossings[i];
         for _ in 0..rounds {
             let [p, v, a] = point.at(time);
             let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
@@ -78,8 +78,8 @@ pub(crate) fn project<const D: usize>(
                 break;
             }
         }
-        point.passes[i] = time.max(before);
-        before = point.passes[i];
+        point.crossings[i] = time.max(before);
+        before = point.crossings[i];
     }
 }
 
@@ -90,7 +90,7 @@ pub(crate) fn miss<const D: usize>(
     i: usize,
     g: usize,
 ) -> f64 {
-    let [p, ..] = point.at(point.passes[i]);
+    let [p, ..] = point.at(point.crossings[i]);
     let (p, goal) = (part(&p, g), part(&problem.inner()[i], g));
     square(&[p[0] - goal[0], p[1] - goal[1], p[2] - goal[2]]).sqrt()
 }
@@ -121,7 +121,7 @@ impl Room {
     pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
         let mut room = Self {
             caps: [[f64::INFINITY; 3]; 2],
-            balls: [0, 1].map(|_| vec![f64::INFINITY; point.passes.len()]),
+            balls: [0, 1].map(|_| vec![f64::INFINITY; point.crossings.len()]),
             widths: [0, 1].map(|_| vec![f64::INFINITY; point.samples()]),
             legs: vec![0; point.samples()],
         };
@@ -144,7 +144,7 @@ impl Room {
         {
             tight &= self.tighten_caps(ratios, g);
             let radius = problem.groups[g].radius;
-            for i in 0..point.passes.len() {
+            for i in 0..point.crossings.len() {
                 let far = miss(problem, point, i, g);
                 self.balls[g][i] = narrowed(self.balls[g][i], far, radius, CLEAR);
                 tight &= self.balls[g][i] <= radius;
@@ -170,7 +170,7 @@ impl Room {
         let (mut tight, mut next) = (true, 0);
         for k in 0..point.samples() {
             let time = 0.5 * k as f64;
-            while next < point.passes.len() && point.passes[next] <= time {
+            while next < point.crossings.len() && point.crossings[next] <= time {
                 next += 1;
             }
             let wanted = next + 1;

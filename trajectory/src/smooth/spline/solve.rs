@@ -170,7 +170,7 @@ fn search<const D: usize>(
             }
         }
         problem.pin(&mut trial);
-        trial.passes.copy_from_slice(&point.passes);
+        trial.crossings.copy_from_slice(&point.crossings);
         project(problem, &mut trial, Some(room), 3);
         if let Some(there) = barrier.value(&trial, &slacks, &mut seen)
             && there < here - 0.01 * share * step.decrement

@@ -123,7 +123,7 @@ fn calm<const D: usize>(problem: &mut Problem<D>) {
         let point = Point {
             control,
             z: 1.0,
-            passes: Vec::new(),
+            crossings: Vec::new(),
         };
         let ratios = super::project::ratios(problem, &point);
         // The jerk of the start does not depend on the spacing.
@@ -307,7 +307,7 @@ fn place<const D: usize>(
     let mut point = Point {
         control,
         z: 1.0,
-        passes: Vec::with_capacity(ends.len()),
+        crossings: Vec::with_capacity(ends.len()),
     };
     let mut k = 0;
     for end in &ends[1..ends.len() - 1] {
@@ -321,7 +321,7 @@ fn place<const D: usize>(
             0.0
         };
         point
-            .passes
+            .crossings
             .push((k as f64 + share - 1.5).clamp(0.0, spans));
     }
     blend_in(problem, &mut point);
@@ -340,7 +340,7 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     for k in 1..knots {
         let time = k as f64 - 1.5;
         let mut leg = legs[k - 1];
-        while leg < problem.vertices.len() - 1 && point.passes[leg - 1] <= time {
+        while leg < problem.vertices.len() - 1 && point.crossings[leg - 1] <= time {
             leg += 1;
         }
         legs[k] = leg;

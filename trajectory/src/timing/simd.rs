@@ -12,12 +12,12 @@ pub(super) type Lane = [f64; LANE];
 
 /// A [`Lane`] in a register, with the build that computes on it.
 #[derive(Clone, Copy)]
-pub(super) struct Wave<S: Four> {
+pub(super) struct Packed<S: Four> {
     simd: S,
     x: S::F,
 }
 
-impl<S: Four> Wave<S> {
+impl<S: Four> Packed<S> {
     /// The same number for each cell.
     #[inline(always)]
     pub(super) fn splat(simd: S, x: f64) -> Self {
@@ -43,7 +43,7 @@ impl<S: Four> Wave<S> {
         Self::load(simd, &lane)
     }
 
-    /// Writes what [`Wave::some`] reads.
+    /// Writes what [`Packed::some`] reads.
     #[inline(always)]
     pub(super) fn put(self, all: &mut [f64], at: usize) {
         if all.len() >= LANE {
@@ -121,7 +121,7 @@ impl<S: Four> Wave<S> {
     }
 }
 
-impl<S: Four> Add for Wave<S> {
+impl<S: Four> Add for Packed<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -131,7 +131,7 @@ impl<S: Four> Add for Wave<S> {
     }
 }
 
-impl<S: Four> Sub for Wave<S> {
+impl<S: Four> Sub for Packed<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -141,7 +141,7 @@ impl<S: Four> Sub for Wave<S> {
     }
 }
 
-impl<S: Four> Mul for Wave<S> {
+impl<S: Four> Mul for Packed<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -151,7 +151,7 @@ impl<S: Four> Mul for Wave<S> {
     }
 }
 
-impl<S: Four> Mul<f64> for Wave<S> {
+impl<S: Four> Mul<f64> for Packed<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -160,7 +160,7 @@ impl<S: Four> Mul<f64> for Wave<S> {
     }
 }
 
-impl<S: Four> Div for Wave<S> {
+impl<S: Four> Div for Packed<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -170,7 +170,7 @@ impl<S: Four> Div for Wave<S> {
     }
 }
 
-impl<S: Four> AddAssign for Wave<S> {
+impl<S: Four> AddAssign for Packed<S> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
@@ -187,16 +187,16 @@ pub(super) fn groups(count: usize) -> impl Iterator<Item = usize> {
 
 /// The scalar product of two vectors in each cell.
 #[inline(always)]
-pub(super) fn dot<S: Four>(a: [Wave<S>; 3], b: [Wave<S>; 3]) -> Wave<S> {
+pub(super) fn dot<S: Four>(a: [Packed<S>; 3], b: [Packed<S>; 3]) -> Packed<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// `sum_i rows[i] * factors[i]` for rows that are vectors in each cell.
 #[inline(always)]
 pub(super) fn combine<S: Four, const M: usize>(
-    rows: [[Wave<S>; 3]; M],
-    factors: [Wave<S>; M],
-) -> [Wave<S>; 3] {
+    rows: [[Packed<S>; 3]; M],
+    factors: [Packed<S>; M],
+) -> [Packed<S>; 3] {
     let first = factors[0];
     let mut out = rows[0];
     for x in &mut out {

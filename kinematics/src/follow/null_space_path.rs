@@ -1,16 +1,16 @@
-//! The best course of the spare motion over a whole path.
+//! The best polynomial of the null-space motion over a whole path.
 //!
-//! A grid of path parameter and spare motion is filled by continuation; a shortest
+//! A grid of path parameter and null-space motion is filled by continuation; a shortest
 //! way through it weighs room to the limits, distance from singular poses and changes
-//! of the spare motion; polynomials through that way are the courses to try.
+//! of the null-space motion; polynomials through that way are the polynomials to try.
 
-use super::redundancy::{Course, Spare};
+use super::redundancy::{NullSpace, NullSpacePolynomial};
 use super::trace::{Task, smallest};
 use nalgebra::{SMatrix, SVector};
 
 /// Steps along the path.
 const LAYERS: usize = 32;
-/// Steps of the spare motion to either side.
+/// Steps of the null-space motion to either side.
 const SIDE: usize = 14;
 const WIDTH: usize = 2 * SIDE + 1;
 /// Size of such a step, rad.
@@ -33,8 +33,8 @@ type Layer<const N: usize> = Vec<Option<Cell<N>>>;
 pub(super) fn search<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-    still: &Spare<N>,
-) -> Vec<Course> {
+    still: &NullSpace<N>,
+) -> Vec<NullSpacePolynomial> {
     let layers = fill(task, start, still);
     let Some(way) = shortest(&layers) else {
         return Vec::new();
@@ -59,7 +59,7 @@ pub(super) fn search<const N: usize>(
 fn fill<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-    still: &Spare<N>,
+    still: &NullSpace<N>,
 ) -> Vec<Layer<N>> {
     let value = |column: usize| {
         let mut at = still.at(still.from);
@@ -164,7 +164,7 @@ fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
 
 /// Least-squares polynomial of a degree up to 5 through points `(progress, offset)`, with
 /// offset zero at the start, added to `base`.
-fn fit(points: &[(f64, f64)], base: f64, degree: usize) -> Option<Course> {
+fn fit(points: &[(f64, f64)], base: f64, degree: usize) -> Option<NullSpacePolynomial> {
     let mut normal = SMatrix::<f64, 5, 5>::identity();
     let mut right = SVector::<f64, 5>::zeros();
     for i in 0..degree {

@@ -1,19 +1,19 @@
 //! One joint between two velocities.
 
 use super::axis::velocity_windows;
-use super::side::{Bounds, End};
-use super::strand::{Course, Strand};
+use super::extremal::{Bounds, End};
+use super::profile::{BlendedProfile, Profile};
 
 /// The normalised velocity problem of one joint: from the velocity and acceleration of `start` to
 /// those of `end`, at whatever position.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pace {
+pub(crate) struct VelocityProblem {
     start: End,
     end: End,
     bounds: Bounds,
 }
 
-impl Pace {
+impl VelocityProblem {
     pub(crate) fn new(start: End, end: End, bounds: Bounds) -> Self {
         Self { start, end, bounds }
     }
@@ -48,25 +48,28 @@ impl Pace {
     /// # Source
     /// With ramps of jerk 1 the change of velocity is
     /// `c T - (c-a0)|c-a0|/2 - (c-af)|c-af|/2`, which grows with the held acceleration `c`.
-    pub(crate) fn course(&self, time: f64) -> Course {
-        let mut course = Course::default();
+    pub(crate) fn blended_profile(&self, time: f64) -> BlendedProfile {
+        let mut blended_profile = BlendedProfile::default();
         if !self.bounds.smooth {
             if time > 0.0 {
                 let times = [0.0, time, 0.0, 0.0, 0.0, 0.0, 0.0];
-                course.push(Strand::accelerations(times, self.change() / time, 0.0), 1.0);
+                blended_profile.push(
+                    Profile::accelerations(times, self.change() / time, 0.0),
+                    1.0,
+                );
             }
-            return course;
+            return blended_profile;
         }
         let (a0, af) = (self.start.acceleration, self.end.acceleration);
         let held = self.held(time);
         let (first, last) = ((held - a0).abs(), (held - af).abs());
         let times = [first, (time - first - last).max(0.0), last];
         let sign = |rising: bool| if rising { 1 } else { -1 };
-        course.push(
-            Strand::three(times, [sign(held >= a0), 0, sign(af >= held)]),
+        blended_profile.push(
+            Profile::three(times, [sign(held >= a0), 0, sign(af >= held)]),
             1.0,
         );
-        course
+        blended_profile
     }
 
     fn held(&self, time: f64) -> f64 {

@@ -6,7 +6,7 @@ use super::Boundary;
 /// goes like `w²` from an end at rest, as a motion with bounded jerk does. In `w` the law of a
 /// good motion is nearly constant, everywhere and also at the ends.
 #[derive(Clone, Debug)]
-pub(super) struct Warp {
+pub(super) struct Reparametrization {
     /// Width of a span.
     span: f64,
     /// Speed in each span: coefficients over the place in the span, 0 to 1.
@@ -27,8 +27,8 @@ fn closing(boundary: Boundary, end: f64, first: f64, span: f64) -> (f64, f64) {
     }
 }
 
-impl Warp {
-    /// A warp whose speed follows `samples`, `span` apart, and whose range is `0..=end`; the span
+impl Reparametrization {
+    /// A reparametrization whose speed follows `samples`, `span` apart, and whose range is `0..=end`; the span
     /// is adapted so that it fits. Three samples at least.
     pub(super) fn new(
         samples: &[f64],
@@ -36,18 +36,18 @@ impl Warp {
         end: f64,
         boundaries: (Boundary, Boundary),
     ) -> Self {
-        let mut warp = Self::of(samples, span, boundaries);
+        let mut reparametrization = Self::of(samples, span, boundaries);
         for _ in 0..8 {
-            let total = warp.end();
+            let total = reparametrization.end();
             if (total / end - 1.0).abs() < 1e-14 {
                 break;
             }
-            warp = Self::of(samples, warp.span * end / total, boundaries);
+            reparametrization = Self::of(samples, reparametrization.span * end / total, boundaries);
         }
-        warp
+        reparametrization
     }
 
-    /// The warp with exactly this span.
+    /// The reparametrization with exactly this span.
     fn of(samples: &[f64], span: f64, boundaries: (Boundary, Boundary)) -> Self {
         let count = samples.len();
         let mut d = Vec::with_capacity(count + 2);
@@ -86,7 +86,7 @@ impl Warp {
         self.span * self.speeds.len() as f64
     }
 
-    /// Whether the speed is positive between the ends, so that the warp can be inverted.
+    /// Whether the speed is positive between the ends, so that the reparametrization can be inverted.
     pub(super) fn ascends(&self) -> bool {
         let inside = |i: usize| {
             let [c0, c1, c2, c3] = self.speeds[i];
@@ -151,15 +151,16 @@ mod tests {
     #[test]
     fn meets_its_ends_and_inverts() {
         let samples: Vec<f64> = (0..=20).map(|i| 1.0 + (f64::from(i) * 0.3).sin()).collect();
-        let warp = Warp::new(&samples, 0.1, 3.0, (Boundary::Rest, Boundary::Rest));
-        assert!(warp.ascends());
-        let [u, du, ddu, _] = warp.at(0.0);
+        let reparametrization =
+            Reparametrization::new(&samples, 0.1, 3.0, (Boundary::Rest, Boundary::Rest));
+        assert!(reparametrization.ascends());
+        let [u, du, ddu, _] = reparametrization.at(0.0);
         assert_eq!([u, du], [0.0, 0.0]);
         assert!(ddu.abs() < 1e-12);
-        assert!((warp.at(warp.duration())[0] - 3.0).abs() < 1e-12);
+        assert!((reparametrization.at(reparametrization.duration())[0] - 3.0).abs() < 1e-12);
         for i in 1..30 {
             let u = 0.1 * f64::from(i);
-            assert!((warp.at(warp.inverse(u))[0] - u).abs() < 1e-12);
+            assert!((reparametrization.at(reparametrization.inverse(u))[0] - u).abs() < 1e-12);
         }
     }
 
@@ -169,9 +170,10 @@ mod tests {
             rate: 0.7,
             acceleration: -0.4,
         };
-        let warp = Warp::new(&[1.0; 12], 0.1, 2.0, (moving, Boundary::Rest));
-        let [u, du, ddu, _] = warp.at(0.0);
+        let reparametrization =
+            Reparametrization::new(&[1.0; 12], 0.1, 2.0, (moving, Boundary::Rest));
+        let [u, du, ddu, _] = reparametrization.at(0.0);
         assert!(u == 0.0 && (du - 0.7).abs() < 1e-12 && (ddu + 0.4).abs() < 1e-12);
-        assert!((warp.at(warp.duration())[0] - 2.0).abs() < 1e-12);
+        assert!((reparametrization.at(reparametrization.duration())[0] - 2.0).abs() < 1e-12);
     }
 }

@@ -215,14 +215,14 @@ impl<A: Arith> Pair<A> {
 /// Equation `x cos + y sin = d`. Where both coefficients vanish against `scale`, any
 /// angle will do. Misses of up to `slack` (relative, squared) count as rounding.
 #[derive(Clone, Copy)]
-pub(crate) struct Wave<A: Arith> {
+pub(crate) struct TrigEquation<A: Arith> {
     x: F4<A>,
     y: F4<A>,
     d: F4<A>,
     scale: F4<A>,
 }
 
-impl<A: Arith> Wave<A> {
+impl<A: Arith> TrigEquation<A> {
     /// Subproblem 4: the angle about `k` for which `h . turned(p) = d`.
     #[inline(always)]
     pub(crate) fn of(h: Vec4<A>, k: [f64; 3], p: Vec4<A>, d: F4<A>) -> Self {

@@ -30,10 +30,10 @@ pub(super) enum Work<const N: usize> {
     Tool(ToolOrder),
 }
 
-/// Work and the age it belongs to: an abort begins a new age and drops what is older.
+/// Work and the age it belongs to: an abort begins a new epoch and drops what is older.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item<const N: usize> {
-    pub(super) age: u32,
+    pub(super) epoch: u32,
     pub(super) work: Work<N>,
 }
 
@@ -44,13 +44,13 @@ pub struct Full;
 
 /// The planner's end. What is pushed is executed in order.
 #[derive(Debug)]
-pub struct Feeder<const N: usize> {
+pub struct SegmentSender<const N: usize> {
     pub(super) ring: Producer<Item<N>>,
     pub(super) shared: Arc<Shared<N>>,
-    pub(super) age: u32,
+    pub(super) epoch: u32,
 }
 
-impl<const N: usize> Feeder<N> {
+impl<const N: usize> SegmentSender<N> {
     /// Hands over a planned segment.
     ///
     /// # Errors
@@ -71,7 +71,7 @@ impl<const N: usize> Feeder<N> {
     /// dropped if it was not executed yet, what is pushed after it counts. Call it once the
     /// [`super::Event::Aborted`] or [`super::Event::Recovered`] has come.
     pub fn renew(&mut self) {
-        self.age = self.shared.age();
+        self.epoch = self.shared.epoch();
     }
 
     /// Tells that the planner has nothing more to hand over after `events` events, or, with
@@ -88,7 +88,7 @@ impl<const N: usize> Feeder<N> {
     fn hand_over(&mut self, work: Work<N>) -> Result<(), Full> {
         self.ring
             .push(Item {
-                age: self.age,
+                epoch: self.epoch,
                 work,
             })
             .map_err(|_| Full)

@@ -31,7 +31,7 @@ impl Point {
 
 /// Seven phases, each of constant jerk (order three) or constant acceleration (order two).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Strand {
+pub(crate) struct Profile {
     pub(crate) times: [f64; 7],
     /// Jerks are the signs; accelerations are `levels` of the signs.
     signs: [i8; 7],
@@ -39,7 +39,7 @@ pub(crate) struct Strand {
     levels: Option<(f64, f64)>,
 }
 
-impl Strand {
+impl Profile {
     /// Phases of jerk `sign` times (+1, 0, -1, 0, -1, 0, +1).
     pub(crate) fn jerks(times: [f64; 7], sign: f64) -> Self {
         let signs = if sign < 0.0 {
@@ -75,10 +75,10 @@ impl Strand {
 
     /// The first three phases with the given signs of the jerk.
     pub(crate) fn three(times: [f64; 3], signs: [i8; 3]) -> Self {
-        let mut strand = Self::default();
-        strand.times[..3].copy_from_slice(&times);
-        strand.signs[..3].copy_from_slice(&signs);
-        strand
+        let mut profile = Self::default();
+        profile.times[..3].copy_from_slice(&times);
+        profile.signs[..3].copy_from_slice(&signs);
+        profile
     }
 
     fn phase(&self, point: Point, sign: i8, time: f64) -> Point {
@@ -117,34 +117,34 @@ impl Strand {
     }
 }
 
-/// A joint's profile: the weighted sum of up to two strands of the same duration. Weights add up
+/// A joint's profile: the weighted sum of up to two profiles of the same duration. Weights add up
 /// to one, or to less where the rest is standing still.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Course {
-    strands: [Strand; 2],
+pub(crate) struct BlendedProfile {
+    profiles: [Profile; 2],
     weights: [f64; 2],
     count: usize,
 }
 
-impl Course {
-    pub(crate) fn push(&mut self, strand: Strand, weight: f64) {
-        if let Some(place) = self.strands.get_mut(self.count) {
-            *place = strand;
+impl BlendedProfile {
+    pub(crate) fn push(&mut self, profile: Profile, weight: f64) {
+        if let Some(place) = self.profiles.get_mut(self.count) {
+            *place = profile;
             self.weights[self.count] = weight;
             self.count += 1;
         }
     }
 
-    /// The strands with their weights.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = (&Strand, f64)> {
-        self.strands.iter().zip(self.weights).take(self.count)
+    /// The profiles with their weights.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (&Profile, f64)> {
+        self.profiles.iter().zip(self.weights).take(self.count)
     }
 
     /// The point at `time` after `start`.
     pub(crate) fn point(&self, start: Point, time: f64) -> Point {
         let mut sum = Point::default();
-        for (strand, weight) in self.parts() {
-            let point = strand.point(start, time);
+        for (profile, weight) in self.parts() {
+            let point = profile.point(start, time);
             sum.position += weight * point.position;
             sum.velocity += weight * point.velocity;
             sum.acceleration += weight * point.acceleration;

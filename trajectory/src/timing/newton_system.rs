@@ -1,41 +1,41 @@
 //! The Newton system of a law: what each row adds to it.
 
 use super::band::Band;
-use super::lanes::{LANE, Lane, Wave, dot};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
-use super::state::{Norm, Row, Spots, State, vector};
+use super::simd::{LANE, Lane, Packed, dot};
+use super::state::{ConstraintRow, Norm, Spots, State, vector};
 use crate::wide::{Four, Op};
 
 /// Gradient and curvature at a place, over `a`, `b`, `c` there.
 #[derive(Clone, Copy)]
-struct Share<S: Four> {
+struct NewtonBlock<S: Four> {
     simd: S,
-    aa: Wave<S>,
-    ab: Wave<S>,
-    ac: Wave<S>,
-    bb: Wave<S>,
-    bc: Wave<S>,
-    cc: Wave<S>,
-    ga: Wave<S>,
-    gb: Wave<S>,
-    gc: Wave<S>,
+    aa: Packed<S>,
+    ab: Packed<S>,
+    ac: Packed<S>,
+    bb: Packed<S>,
+    bc: Packed<S>,
+    cc: Packed<S>,
+    ga: Packed<S>,
+    gb: Packed<S>,
+    gc: Packed<S>,
 }
 
 /// Weight of a row's curvature and force of its gradient, for `g² <= 1` with centring `mu`.
 #[inline(always)]
-fn weigh<S: Four>(simd: S, row: &Row, mu: Wave<S>) -> (Wave<S>, Wave<S>) {
-    let g = Wave::load(simd, &row.g);
+fn weigh<S: Four>(simd: S, row: &ConstraintRow, mu: Packed<S>) -> (Packed<S>, Packed<S>) {
+    let g = Packed::load(simd, &row.g);
     let twice = g + g;
-    let pull = twice / (Wave::splat(simd, 1.0) - g * g);
-    let curve = Wave::splat(simd, 2.0) + twice * pull;
-    (Wave::load(simd, &row.multiplier) * curve, mu * pull)
+    let pull = twice / (Packed::splat(simd, 1.0) - g * g);
+    let curve = Packed::splat(simd, 2.0) + twice * pull;
+    (Packed::load(simd, &row.multiplier) * curve, mu * pull)
 }
 
-impl<S: Four> Share<S> {
+impl<S: Four> NewtonBlock<S> {
     #[inline(always)]
     fn zero(simd: S) -> Self {
-        let zero = Wave::splat(simd, 0.0);
+        let zero = Packed::splat(simd, 0.0);
         Self {
             simd,
             aa: zero,
@@ -52,7 +52,7 @@ impl<S: Four> Share<S> {
 
     /// The share as a function of the law `x` further to the left.
     #[inline(always)]
-    fn moved(&self, x: Wave<S>) -> Self {
+    fn moved(&self, x: Packed<S>) -> Self {
         let (y, twice) = (x * x, x + x);
         let (aa, ab, ac) = (self.aa, self.ab, self.ac);
         let ab2 = twice * aa + ab;
@@ -85,11 +85,11 @@ impl<S: Four> Share<S> {
 
     /// Adds acceleration rows `[p, q]` with centring `mu`.
     #[inline(always)]
-    fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[Row], mu: Wave<S>) {
+    fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[ConstraintRow], mu: Packed<S>) {
         for (line, row) in lines.iter().zip(rows) {
             let (p, q) = (
-                Wave::load(self.simd, &line[0]),
-                Wave::load(self.simd, &line[1]),
+                Packed::load(self.simd, &line[0]),
+                Packed::load(self.simd, &line[1]),
             );
             let (weight, force) = weigh(self.simd, row, mu);
             let (wp, wq) = (weight * p, weight * q);
@@ -103,7 +103,7 @@ impl<S: Four> Share<S> {
 
     /// Adds jerk rows `[x, y, z]` as if they were `|x a + y b + z c| <= 1`.
     #[inline(always)]
-    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[Row], mu: Wave<S>) {
+    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[ConstraintRow], mu: Packed<S>) {
         for (line, row) in lines.iter().zip(rows) {
             let [x, y, z] = vector(self.simd, line);
             let (weight, force) = weigh(self.simd, row, mu);
@@ -125,8 +125,8 @@ impl<S: Four> Share<S> {
     #[inline(always)]
     fn rooted(&self, spot: Spots<S>) -> Self {
         let (a, root) = (spot.a, spot.a.sqrt());
-        let half = Wave::splat(self.simd, 0.5) / a;
-        let row = [Wave::splat(self.simd, 1.5), spot.b * half, spot.c * half];
+        let half = Packed::splat(self.simd, 0.5) / a;
+        let row = [Packed::splat(self.simd, 1.5), spot.b * half, spot.c * half];
         let [x, y, z] = self.times(row);
         Self {
             simd: self.simd,
@@ -144,11 +144,11 @@ impl<S: Four> Share<S> {
 
     /// Adds a row bounded in norm, with the derivatives of its vector to `a`, `b`, `c`.
     #[inline(always)]
-    fn norm(&mut self, [ra, rb, rc]: [[Wave<S>; 3]; 3], row: &Norm, mu: Wave<S>) {
+    fn norm(&mut self, [ra, rb, rc]: [[Packed<S>; 3]; 3], row: &Norm, mu: Packed<S>) {
         let g = vector(self.simd, &row.g);
-        let twice = Wave::splat(self.simd, 2.0) / (Wave::splat(self.simd, 1.0) - dot(g, g));
+        let twice = Packed::splat(self.simd, 2.0) / (Packed::splat(self.simd, 1.0) - dot(g, g));
         let (ta, tb, tc) = (dot(g, ra), dot(g, rb), dot(g, rc));
-        let flat = Wave::load(self.simd, &row.multiplier) * 2.0;
+        let flat = Packed::load(self.simd, &row.multiplier) * 2.0;
         let (steep, force) = (flat * twice, mu * twice);
         self.aa += flat * dot(ra, ra) + steep * ta * ta;
         self.ab += flat * dot(ra, rb) + steep * ta * tb;
@@ -163,32 +163,32 @@ impl<S: Four> Share<S> {
 
     /// Adds the cap `cap a <= 1` and the time `weight / sqrt(a)`.
     #[inline(always)]
-    fn value(&mut self, value: &[Lane; 2], row: &Row, a: Wave<S>, mu: Wave<S>) {
+    fn value(&mut self, value: &[Lane; 2], row: &ConstraintRow, a: Packed<S>, mu: Packed<S>) {
         let (weight, cap) = (
-            Wave::load(self.simd, &value[0]),
-            Wave::load(self.simd, &value[1]),
+            Packed::load(self.simd, &value[0]),
+            Packed::load(self.simd, &value[1]),
         );
-        let g = Wave::load(self.simd, &row.g);
-        let pull = cap / (Wave::splat(self.simd, 1.0) - g);
+        let g = Packed::load(self.simd, &row.g);
+        let pull = cap / (Packed::splat(self.simd, 1.0) - g);
         let slope = weight / (a * a.sqrt());
-        self.aa += slope * 0.75 / a + Wave::load(self.simd, &row.multiplier) * pull * cap;
+        self.aa += slope * 0.75 / a + Packed::load(self.simd, &row.multiplier) * pull * cap;
         self.ga += mu * pull - slope * 0.5;
     }
 
     /// Adds a slot of values.
     #[inline(always)]
-    fn values(&mut self, slot: Values<'_>, mu: Wave<S>) {
+    fn values(&mut self, slot: Values<'_>, mu: Packed<S>) {
         let simd = self.simd;
         self.accelerations(slot.joints.0, slot.joints.1, mu);
         for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let still = [Wave::splat(simd, 0.0); 3];
+            let still = [Packed::splat(simd, 0.0); 3];
             self.norm([vector(simd, q), vector(simd, p), still], norm, mu);
         }
     }
 
     /// The share of a jerk slot.
     #[inline(always)]
-    fn of_jerks(slot: Jerks<'_>, spot: Spots<S>, mu: Wave<S>) -> Self {
+    fn of_jerks(slot: Jerks<'_>, spot: Spots<S>, mu: Packed<S>) -> Self {
         let simd = spot.a.simd();
         let mut share = Self::zero(simd);
         share.jerks(slot.joints.0, slot.joints.1, mu);
@@ -203,9 +203,9 @@ impl<S: Four> Share<S> {
     /// unknowns of the cell, three of the right side.
     #[inline(always)]
     fn entries(&self, basis: &Basis) -> [Lane; 9] {
-        let lane = |x: &Lane| Wave::load(self.simd, x);
+        let lane = |x: &Lane| Packed::load(self.simd, x);
         let (left, right, inverse) = (lane(&basis.left), lane(&basis.right), lane(&basis.inverse));
-        let zero = Wave::splat(self.simd, 0.0);
+        let zero = Packed::splat(self.simd, 0.0);
         let a = [lane(&basis.first), lane(&basis.second), zero];
         let b = [zero - left, left, zero];
         let c = [
@@ -235,7 +235,7 @@ impl<S: Four> Share<S> {
 
     /// The curvature times a column.
     #[inline(always)]
-    fn times(&self, column: [Wave<S>; 3]) -> [Wave<S>; 3] {
+    fn times(&self, column: [Packed<S>; 3]) -> [Packed<S>; 3] {
         [
             dot([self.aa, self.ab, self.ac], column),
             dot([self.ab, self.bb, self.bc], column),
@@ -245,7 +245,7 @@ impl<S: Four> Share<S> {
 }
 
 /// Fills the Newton system of the law `x` for the centring `mu`.
-pub(super) struct Assemble<'a> {
+pub(super) struct AssembleNewton<'a> {
     pub problem: &'a Problem,
     pub x: &'a [f64],
     pub state: &'a mut State,
@@ -254,21 +254,21 @@ pub(super) struct Assemble<'a> {
     pub step: &'a mut [f64],
 }
 
-impl Op for Assemble<'_> {
+impl Op for AssembleNewton<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) {
         self.matrix.fill([0.0; 3]);
         self.step.fill(0.0);
-        let mu = Wave::splat(simd, self.mu);
+        let mu = Packed::splat(simd, self.mu);
         let (mut lines, blocks) = Lines::all(self.problem, self.state);
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
-            let width = Wave::load(simd, &basis.width);
+            let width = Packed::load(simd, &basis.width);
             let half = width * 0.5;
             let middle = left.moved(half);
-            let (mut total, mut inner) = (Share::zero(simd), Share::zero(simd));
+            let (mut total, mut inner) = (NewtonBlock::zero(simd), NewtonBlock::zero(simd));
             total.value(&value[0], &cap[0], left.a, mu);
             inner.value(&value[1], &cap[1], middle.a, mu);
             total.values(lines.values(), mu);
@@ -276,12 +276,12 @@ impl Op for Assemble<'_> {
             for share in self.problem.jerk_shares(i) {
                 let slot = lines.jerks();
                 if *share == 0.0 {
-                    total.add(&Share::of_jerks(slot, left, mu));
+                    total.add(&NewtonBlock::of_jerks(slot, left, mu));
                 } else if *share == 0.5 {
-                    inner.add(&Share::of_jerks(slot, middle, mu));
+                    inner.add(&NewtonBlock::of_jerks(slot, middle, mu));
                 } else {
                     let x = width * *share;
-                    total.add(&Share::of_jerks(slot, left.moved(x), mu).moved(x));
+                    total.add(&NewtonBlock::of_jerks(slot, left.moved(x), mu).moved(x));
                 }
             }
             total.add(&inner.moved(half));
@@ -355,7 +355,7 @@ mod tests {
         });
         let mut matrix = vec![[0.0; 3]; x.len()];
         let mut step = vec![0.0; x.len()];
-        Wide::detect().run(Assemble {
+        Wide::detect().run(AssembleNewton {
             problem: &problem,
             x: &x,
             state: &mut state,

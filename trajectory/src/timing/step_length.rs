@@ -1,14 +1,14 @@
 //! How far a Newton step may go.
 
-use super::lanes::{LANE, Lane, Wave, combine, dot};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::Problem;
-use super::state::{Norm, Row, Spots, State, vector};
+use super::simd::{LANE, Lane, Packed, combine, dot};
+use super::state::{ConstraintRow, Norm, Spots, State, vector};
 use crate::wide::{Four, Op};
 
 /// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stride {
+pub(super) struct StepLength {
     pub primal: f64,
     pub dual: f64,
 }
@@ -17,19 +17,19 @@ pub(super) struct Stride {
 #[derive(Clone, Copy)]
 struct Strides<S: Four> {
     simd: S,
-    mu: Wave<S>,
-    primal: Wave<S>,
-    dual: Wave<S>,
+    mu: Packed<S>,
+    primal: Packed<S>,
+    dual: Packed<S>,
 }
 
 impl<S: Four> Strides<S> {
     /// Takes in a row that changes by `d`, and writes the step of its multiplier.
     #[inline(always)]
-    fn row(&mut self, row: &mut Row, d: Wave<S>) {
-        let one = Wave::splat(self.simd, 1.0);
+    fn row(&mut self, row: &mut ConstraintRow, d: Packed<S>) {
+        let one = Packed::splat(self.simd, 1.0);
         let (g, m) = (
-            Wave::load(self.simd, &row.g),
-            Wave::load(self.simd, &row.multiplier),
+            Packed::load(self.simd, &row.g),
+            Packed::load(self.simd, &row.multiplier),
         );
         let gd = g * d;
         let slack = one - g * g;
@@ -44,10 +44,10 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a row bounded in norm that changes by `d`.
     #[inline(always)]
-    fn norm(&mut self, row: &mut Norm, d: [Wave<S>; 3]) {
-        let one = Wave::splat(self.simd, 1.0);
+    fn norm(&mut self, row: &mut Norm, d: [Packed<S>; 3]) {
+        let one = Packed::splat(self.simd, 1.0);
         let g = vector(self.simd, &row.g);
-        let m = Wave::load(self.simd, &row.multiplier);
+        let m = Packed::load(self.simd, &row.multiplier);
         let slack = one - dot(g, g);
         let (half, square) = (dot(g, d), dot(d, d));
         let inverse = slack.inverse();
@@ -61,12 +61,12 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a cap of `a`, which changes by `da`.
     #[inline(always)]
-    fn value(&mut self, cap: &Lane, row: &mut Row, (a, da): (Wave<S>, Wave<S>)) {
-        let one = Wave::splat(self.simd, 1.0);
-        let d = Wave::load(self.simd, cap) * da;
-        let m = Wave::load(self.simd, &row.multiplier);
-        let inverse = (one - Wave::load(self.simd, &row.g)).inverse();
-        let fall = Wave::splat(self.simd, 0.0) - da / a;
+    fn value(&mut self, cap: &Lane, row: &mut ConstraintRow, (a, da): (Packed<S>, Packed<S>)) {
+        let one = Packed::splat(self.simd, 1.0);
+        let d = Packed::load(self.simd, cap) * da;
+        let m = Packed::load(self.simd, &row.multiplier);
+        let inverse = (one - Packed::load(self.simd, &row.g)).inverse();
+        let fall = Packed::splat(self.simd, 0.0) - da / a;
         self.primal = (d * inverse).max(fall).max(self.primal);
         let new = (self.mu + m * d) * inverse;
         (new - m).store(&mut row.change);
@@ -78,7 +78,10 @@ impl<S: Four> Strides<S> {
     fn values(&mut self, slot: Values<'_>, d: Spots<S>) {
         let simd = self.simd;
         for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
-            self.row(row, Wave::load(simd, p) * d.b + Wave::load(simd, q) * d.a);
+            self.row(
+                row,
+                Packed::load(simd, p) * d.b + Packed::load(simd, q) * d.a,
+            );
         }
         for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
             let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
@@ -97,9 +100,9 @@ impl<S: Four> Strides<S> {
         let c = root * (d.c + half * at.c);
         for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
             let (x, y, z) = (
-                Wave::load(simd, x),
-                Wave::load(simd, y),
-                Wave::load(simd, z),
+                Packed::load(simd, x),
+                Packed::load(simd, y),
+                Packed::load(simd, z),
             );
             self.row(row, x * a + y * b + z * c);
         }
@@ -121,14 +124,14 @@ pub(super) struct Measure<'a> {
 }
 
 impl Op for Measure<'_> {
-    type Output = Stride;
+    type Output = StepLength;
 
     #[inline(always)]
-    fn run<S: Four>(self, simd: S) -> Stride {
-        let least = Wave::splat(simd, 1e-9);
-        let mut strides = Strides {
+    fn run<S: Four>(self, simd: S) -> StepLength {
+        let least = Packed::splat(simd, 1e-9);
+        let mut step_lengths = Strides {
             simd,
-            mu: Wave::splat(simd, self.mu),
+            mu: Packed::splat(simd, self.mu),
             primal: least,
             dual: least,
         };
@@ -136,21 +139,21 @@ impl Op for Measure<'_> {
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let change = Spots::left(simd, basis, &self.step[LANE * i..]);
-            let width = Wave::load(simd, &basis.width);
+            let width = Packed::load(simd, &basis.width);
             let half = width * 0.5;
             let (middle, further) = (left.moved(half), change.moved(half));
-            strides.value(&value[0][1], &mut cap[0], (left.a, change.a));
-            strides.value(&value[1][1], &mut cap[1], (middle.a, further.a));
-            strides.values(lines.values(), change);
-            strides.values(lines.values(), further);
+            step_lengths.value(&value[0][1], &mut cap[0], (left.a, change.a));
+            step_lengths.value(&value[1][1], &mut cap[1], (middle.a, further.a));
+            step_lengths.values(lines.values(), change);
+            step_lengths.values(lines.values(), further);
             for share in self.problem.jerk_shares(i) {
                 let x = width * *share;
-                strides.jerks(lines.jerks(), left.moved(x), change.moved(x));
+                step_lengths.jerks(lines.jerks(), left.moved(x), change.moved(x));
             }
         }
-        Stride {
-            primal: strides.primal.largest(),
-            dual: strides.dual.largest(),
+        StepLength {
+            primal: step_lengths.primal.largest(),
+            dual: step_lengths.dual.largest(),
         }
     }
 }

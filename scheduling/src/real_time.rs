@@ -5,7 +5,7 @@ use std::io::Write;
 
 /// What a thread with deadlines asks for. All of it is optional: what is refused is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Urgency {
+pub struct RealTimeRequest {
     /// `SCHED_FIFO` priority, 1 to 98; 0 does not ask.
     pub priority: i32,
     /// The processor to stay on.
@@ -16,7 +16,7 @@ pub struct Urgency {
     pub low_latency: bool,
 }
 
-impl Default for Urgency {
+impl Default for RealTimeRequest {
     fn default() -> Self {
         Self {
             priority: 60,
@@ -44,7 +44,7 @@ impl Granted {
 }
 
 /// Asks for the calling thread.
-pub fn urge(wish: Urgency) -> Granted {
+pub fn request_real_time(wish: RealTimeRequest) -> Granted {
     let mut granted = Granted::default();
     if wish.lock_memory && !lock_memory() {
         granted

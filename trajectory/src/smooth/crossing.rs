@@ -17,7 +17,7 @@ pub const RESOLUTION: f64 = 1e-12;
 /// pass before, and from there on farther away, is passed at that moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Pass {
+pub struct Crossing {
     /// Index of the pose in the list; the start is 0, so the first is 1.
     pub index: usize,
     /// Distance of the controlled point at its closest approach, m.
@@ -32,7 +32,7 @@ pub struct Pass {
     pub time: f64,
 }
 
-impl Pass {
+impl Crossing {
     /// True when the pose is passed within both tolerances.
     #[must_use]
     pub fn holds(&self) -> bool {
@@ -42,11 +42,11 @@ impl Pass {
 }
 
 /// The passes of all intermediate poses, in order.
-pub(crate) fn passes(
+pub(crate) fn crossings(
     spans: &[Span],
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
-) -> Vec<Pass> {
+) -> Vec<Crossing> {
     let inner = poses
         .get(1..poses.len().saturating_sub(1))
         .unwrap_or_default();
@@ -68,7 +68,7 @@ pub(crate) fn passes(
         // Not before the pass before by the last digit.
         time = time.max(since.1);
         let (deviation, angle) = apart(spans, &poses[0], (at, time), pose);
-        result.push(Pass {
+        result.push(Crossing {
             index: i + 1,
             deviation,
             tolerance: options.tolerance,
@@ -154,7 +154,7 @@ fn turned(
 pub(crate) fn settled(
     spans: &[Span],
     poses: &[Isometry3<f64>],
-    passes: &[Pass],
+    crossings: &[Crossing],
     options: &SmoothOptions,
 ) -> bool {
     let Some(goal) = poses.last() else {
@@ -165,15 +165,15 @@ pub(crate) fn settled(
         (next.saturating_sub(1), time)
     };
     let mut since = moment(0.0);
-    for (pass, pose) in passes.iter().zip(&poses[1..]) {
+    for (crossing, pose) in crossings.iter().zip(&poses[1..]) {
         let at_end = (pose.translation.vector - goal.translation.vector).norm();
         if at_end > RESOLUTION
-            && at_end <= pass.deviation + 1e3 * RESOLUTION
+            && at_end <= crossing.deviation + 1e3 * RESOLUTION
             && approach(spans, since, pose, options.tolerance).is_none()
         {
             return false;
         }
-        since = moment(pass.time);
+        since = moment(crossing.time);
     }
     approach(spans, since, goal, options.tolerance).is_none()
 }

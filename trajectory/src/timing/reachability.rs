@@ -17,7 +17,7 @@ pub(super) const ASIDE: f64 = 1e-9;
 
 /// The fastest law without jerk limits, and what it tells of the time scale.
 #[derive(Clone, Debug)]
-pub(super) struct Survey {
+pub(super) struct ReachabilityPass {
     /// Path parameters.
     pub at: Vec<f64>,
     /// Rates `du/dt` there.
@@ -47,7 +47,7 @@ pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f
     d.component_div(limit).amax()
 }
 
-impl Survey {
+impl ReachabilityPass {
     /// Surveys `path`.
     ///
     /// # Errors
@@ -326,7 +326,7 @@ fn ramp<const N: usize>(
     ramp
 }
 
-impl Survey {
+impl ReachabilityPass {
     /// Duration of the law (s).
     pub(super) fn duration(&self) -> f64 {
         self.times.last().copied().unwrap_or(0.0)

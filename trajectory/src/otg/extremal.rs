@@ -3,7 +3,7 @@
 /// One direction of the normalised problem of one joint: how far can it get in a given time?
 ///
 /// Unit of jerk 1 (order three) or unit of acceleration 1 (order two). The other direction is the
-/// same problem with every sign turned, see [`Side::new`].
+/// same problem with every sign turned, see [`ExtremalFamily::new`].
 ///
 /// The profile that gets farthest rises to an acceleration `high`, falls through zero to `low` and
 /// rises to the target's. Follow the line of jerk +1 through the start back to where its
@@ -15,7 +15,7 @@
 /// Pontryagin's principle for the triple integrator with bounds on acceleration and velocity; the
 /// virtual states at zero acceleration are this project's own derivation.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Side {
+pub(crate) struct ExtremalFamily {
     /// Velocity of the virtual start and of the virtual end.
     start: f64,
     end: f64,
@@ -81,7 +81,7 @@ impl End {
     }
 }
 
-/// The profile of one [`Side`] for one time.
+/// The profile of one [`ExtremalFamily`] for one time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extremal {
     /// Highest and lowest acceleration of the two pulses.
@@ -113,7 +113,7 @@ pub(crate) fn pulse(change: f64, bound: f64) -> (f64, f64) {
     }
 }
 
-impl Side {
+impl ExtremalFamily {
     /// The direction of increasing position. For the other one, mirror all three arguments.
     pub(crate) fn new(start: End, end: End, bounds: Bounds) -> Self {
         let (v0, a0) = (start.velocity, start.acceleration);

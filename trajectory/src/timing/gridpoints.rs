@@ -3,23 +3,23 @@
 use nalgebra::{SVector, Vector3};
 
 use super::grid::{Bounded, Grid};
-use super::survey::ASIDE;
+use super::reachability::ASIDE;
 use crate::{Path, PathPoint, ToolPoint};
 
 /// The joints at one place of the law's parameter.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Station<const N: usize> {
+pub(super) struct Gridpoint<const N: usize> {
     /// Positions (rad).
     pub position: SVector<f64, N>,
     /// Derivatives 1 to 3 to the parameter of the law.
     pub joint: [SVector<f64, N>; 3],
     /// The path parameter and its derivatives to that of the law.
-    pub warp: [f64; 4],
+    pub reparametrization: [f64; 4],
 }
 
 /// Derivatives 1 to 3 of the controlled point to the parameter of the law, there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ToolStation {
+pub(super) struct ToolGridpoint {
     /// Its position.
     pub linear: [Vector3<f64>; 3],
     /// Angular velocity and its derivatives.
@@ -27,17 +27,17 @@ pub(super) struct ToolStation {
 }
 
 /// Joints and tool at one place.
-pub(super) type Place<const N: usize> = (Station<N>, ToolStation);
+pub(super) type Place<const N: usize> = (Gridpoint<N>, ToolGridpoint);
 
 /// The path at all nodes and middles of a grid.
 #[derive(Clone, Debug)]
-pub(super) struct Stations<'a, const N: usize> {
+pub(super) struct Gridpoints<'a, const N: usize> {
     /// The grid.
     pub grid: &'a Grid,
     /// Left end and middle of each cell.
-    joints: Vec<[Station<N>; 2]>,
+    joints: Vec<[Gridpoint<N>; 2]>,
     /// The tool there; nowhere if nothing limits it.
-    tools: Vec<[ToolStation; 2]>,
+    tools: Vec<[ToolGridpoint; 2]>,
     /// Nodes on knots as seen from before, and the last.
     before: Vec<Place<N>>,
     /// For each cell whose right end is such a node, its index.
@@ -56,12 +56,12 @@ fn chain<const D: usize>(
     ]
 }
 
-impl ToolStation {
-    /// The derivatives of `point` to a parameter to which `u` has the derivatives `warp`.
-    pub(super) fn new(point: &ToolPoint, warp: [f64; 4]) -> Self {
+impl ToolGridpoint {
+    /// The derivatives of `point` to a parameter to which `u` has the derivatives `reparametrization`.
+    pub(super) fn new(point: &ToolPoint, reparametrization: [f64; 4]) -> Self {
         Self {
-            linear: chain(point.linear, warp),
-            angular: chain(point.angular, warp),
+            linear: chain(point.linear, reparametrization),
+            angular: chain(point.angular, reparametrization),
         }
     }
 
@@ -75,13 +75,13 @@ impl ToolStation {
     }
 }
 
-impl<'a, const N: usize> Stations<'a, N> {
+impl<'a, const N: usize> Gridpoints<'a, N> {
     /// Looks at the path at the places of `grid`.
     pub(super) fn new<P: Path<N>>(bounded: Bounded<'_, P, N>, grid: &'a Grid) -> Self {
         let (path, nodes) = (bounded.path, &grid.nodes);
         let count = nodes.len() - 1;
         let limited = bounded.tool.limited();
-        let mut stations = Self {
+        let mut gridpoints = Self {
             grid,
             joints: Vec::with_capacity(count),
             tools: Vec::with_capacity(if limited { count } else { 0 }),
@@ -94,31 +94,31 @@ impl<'a, const N: usize> Stations<'a, N> {
             let left = grid.place(path, nodes[k], side);
             let middle = nodes[k] + 0.5 * (nodes[k + 1] - nodes[k]);
             let middle = grid.place(path, middle, 0.0);
-            stations.joints.push([left.0, middle.0]);
+            gridpoints.joints.push([left.0, middle.0]);
             if limited {
-                stations.tools.push([left.1, middle.1]);
+                gridpoints.tools.push([left.1, middle.1]);
             }
-            let end = grid.knot[k + 1].then_some(stations.before.len());
+            let end = grid.knot[k + 1].then_some(gridpoints.before.len());
             if end.is_some() {
-                stations.before.push(grid.place(path, nodes[k + 1], -1.0));
+                gridpoints.before.push(grid.place(path, nodes[k + 1], -1.0));
             }
-            stations.ends.push(end);
+            gridpoints.ends.push(end);
         }
-        stations
+        gridpoints
     }
 
     /// The joints at the left end of cell `k`.
-    pub(super) fn left(&self, k: usize) -> &Station<N> {
+    pub(super) fn left(&self, k: usize) -> &Gridpoint<N> {
         &self.joints[k][0]
     }
 
     /// The joints in the middle of cell `k`.
-    pub(super) fn middle(&self, k: usize) -> &Station<N> {
+    pub(super) fn middle(&self, k: usize) -> &Gridpoint<N> {
         &self.joints[k][1]
     }
 
     /// The joints at the right end of cell `k`, seen from within.
-    pub(super) fn right(&self, k: usize) -> &Station<N> {
+    pub(super) fn right(&self, k: usize) -> &Gridpoint<N> {
         match self.ends[k] {
             Some(i) => &self.before[i].0,
             None => self.left(k + 1),
@@ -126,13 +126,13 @@ impl<'a, const N: usize> Stations<'a, N> {
     }
 
     /// The tool at the left end and in the middle of cell `k`.
-    pub(super) fn tools(&self, k: usize) -> [ToolStation; 2] {
+    pub(super) fn tools(&self, k: usize) -> [ToolGridpoint; 2] {
         let tools = self.tools.get(k).copied();
-        tools.unwrap_or_else(|| [ToolStation::free(); 2])
+        tools.unwrap_or_else(|| [ToolGridpoint::free(); 2])
     }
 
     /// The tool at the right end of cell `k`, seen from within.
-    pub(super) fn tool_right(&self, k: usize) -> ToolStation {
+    pub(super) fn tool_right(&self, k: usize) -> ToolGridpoint {
         match self.ends[k] {
             Some(i) => self.before[i].1,
             None => self.tools(k + 1)[0],
@@ -143,21 +143,24 @@ impl<'a, const N: usize> Stations<'a, N> {
 impl Grid {
     /// The path at `w`; its third derivatives seen from the side: -1 before, 0 at, 1 after.
     pub(super) fn place<const N: usize>(&self, path: &impl Path<N>, w: f64, side: f64) -> Place<N> {
-        let warp = self.warp.at(w);
+        let reparametrization = self.reparametrization.at(w);
         let end = path.end();
-        let mut point: PathPoint<N> = path.at(warp[0].clamp(0.0, end));
+        let mut point: PathPoint<N> = path.at(reparametrization[0].clamp(0.0, end));
         if side != 0.0 {
-            let aside = path.at((warp[0] + side * ASIDE * end).clamp(0.0, end));
+            let aside = path.at((reparametrization[0] + side * ASIDE * end).clamp(0.0, end));
             point.joint.q[3] = aside.joint.q[3];
             point.tool.linear[2] = aside.tool.linear[2];
             point.tool.angular[2] = aside.tool.angular[2];
         }
         let [position, q1, q2, q3] = point.joint.q;
-        let station = Station {
+        let gridpoint = Gridpoint {
             position,
-            joint: chain([q1, q2, q3], warp),
-            warp,
+            joint: chain([q1, q2, q3], reparametrization),
+            reparametrization,
         };
-        (station, ToolStation::new(&point.tool, warp))
+        (
+            gridpoint,
+            ToolGridpoint::new(&point.tool, reparametrization),
+        )
     }
 }
