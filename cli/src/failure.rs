@@ -83,6 +83,19 @@ impl From<IpcError> for Failure {
     }
 }
 
+/// The live view.
+impl From<view::ViewError> for Failure {
+    fn from(error: view::ViewError) -> Self {
+        let exit = match error {
+            view::ViewError::Port { .. } => Exit::Usage,
+            view::ViewError::Ipc(_) | view::ViewError::Refused(_) => Exit::NoPeer,
+            view::ViewError::Robot(_) | view::ViewError::Recording(_) => Exit::Unreadable,
+            _ => Exit::Internal,
+        };
+        Self::new(exit, error)
+    }
+}
+
 /// Recordings.
 impl From<recorder::RecorderError> for Failure {
     fn from(error: recorder::RecorderError) -> Self {

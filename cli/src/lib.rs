@@ -41,6 +41,8 @@ mod samples;
 mod signals;
 mod simulation;
 mod table;
+mod view_process;
+mod viewing;
 mod world_file;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -71,7 +71,8 @@ pub struct Host<D> {
     /// Where the last fault was recorded, in words.
     recorded: Option<String>,
     samples: Vec<RunSample>,
-    _driver: D,
+    /// What ends with the engine: its driver, a view.
+    pub company: D,
 }
 
 impl<D> Host<D> {
@@ -104,7 +105,7 @@ impl<D> Host<D> {
             flight: None,
             recorded: None,
             samples: Vec::new(),
-            _driver: driver,
+            company: driver,
         })
     }
 
@@ -257,6 +258,7 @@ impl<D> Host<D> {
             flight,
             recorded,
             default_length,
+            rate_hz,
             ..
         } = self;
         channels.requests.serve(|request| {
@@ -271,6 +273,7 @@ impl<D> Host<D> {
                     "status": status,
                     "last_note": *count,
                     "program": texts.program(),
+                    "period_ns": (1e9 / *rate_hz).round(),
                 })),
                 Verb::Text { of, from } => texts.part(&of, from),
                 Verb::Notes { since } => later(notes, since),
@@ -396,7 +399,12 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
     let space = match space {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
-        other => return Answer::refuse(format!("a jog is in joint or tool space, not {other:?}")),
+        "workstation" => JogSpace::Workstation,
+        other => {
+            return Answer::refuse(format!(
+                "a jog is in joint, tool or workstation space, not {other:?}"
+            ));
+        }
     };
     let timeout = Duration::from_millis(timeout_ms);
     match session.jog(Jog {

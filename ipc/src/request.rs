@@ -42,10 +42,10 @@ pub enum Verb {
     Recover,
     /// Move by hand; stops when no further request comes in time.
     Jog {
-        /// `joint` or `tool`.
+        /// `joint`, `tool` or `workstation`.
         space: String,
         /// Speeds as shares of the largest, -1..=1: one a joint, or x, y, z, rx, ry, rz of the
-        /// tool's own axes; all 0 stops.
+        /// tool's own axes or of the workstation's; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,

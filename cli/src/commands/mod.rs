@@ -31,6 +31,7 @@ mod shutdown;
 mod status;
 mod stop;
 mod verify;
+mod view;
 mod world;
 
 use clap::Subcommand;
@@ -72,6 +73,7 @@ pub(crate) enum Command {
     Status(status::Status),
     Stop(stop::Stop),
     Verify(verify::Verify),
+    View(view::View),
 }
 
 impl Command {
@@ -92,7 +94,7 @@ impl Command {
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),
-            Self::Plan(command) => command.run(),
+            Self::Plan(command) => command.run(printer),
             Self::Record(command) => command.run(printer),
             Self::Recover(command) => command.run(),
             Self::Replay(command) => command.run(printer),
@@ -108,6 +110,7 @@ impl Command {
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
             Self::Verify(command) => command.run(),
+            Self::View(command) => command.run(printer),
         }
     }
 }

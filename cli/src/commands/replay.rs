@@ -11,21 +11,24 @@ use ipc::{Clock, Domain};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use recorder::Sample;
+use view::Source;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::Host;
+use crate::host_options::{Company, Host};
 use crate::output;
 use crate::printer::Printer;
 use crate::program::ProgramFile;
 use crate::recorded_program::RecordedFile;
 use crate::simulation::{Kind, Simulation};
+use crate::viewing;
 
 /// How long an execution in lock-step may say nothing.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Look at a recording, or execute its programs again and compare
+/// Look at a recording in the browser, or execute its programs again and compare
 ///
+/// Serves the page of `canter view` with the recording and time controls, and prints its address.
 /// With --check every program of the recording is planned and executed again, in lock-step with a
 /// simulated arm that starts where the recorded one did, and every setpoint is compared bit by bit:
 /// equal with the same build, and the first difference is named otherwise. Periods under an override,
@@ -38,6 +41,15 @@ pub(crate) struct Replay {
     /// Execute the recorded programs again and compare
     #[arg(long)]
     check: bool,
+    /// Say what the recording has, and serve no page
+    #[arg(long, conflicts_with = "check")]
+    info: bool,
+    /// Show the recording in the browser: so it is without --check and --info
+    #[arg(long, conflicts_with_all = ["check", "info"])]
+    view: bool,
+    /// Port of the page on 127.0.0.1 [default: 8230, or a free one where that is taken]
+    #[arg(long, value_name = "PORT")]
+    port: Option<u16>,
 }
 
 impl Replay {
@@ -48,7 +60,11 @@ impl Replay {
             return check(&recorded);
         }
         summary(printer, &recorded);
-        Ok(Exit::Done)
+        if self.info {
+            return Ok(Exit::Done);
+        }
+        let source = Source::Recording(Box::new(recorded.content));
+        viewing::serve(printer, source, self.port, || false)
     }
 }
 
@@ -148,7 +164,11 @@ fn execute(
     config.clock = Clock::LockStep;
     config.record = true;
     config.default_length = program.default_length();
-    let mut host: Host = engine::host::Host::start(channels, robot, &config, Some(simulation))
+    let company = Company {
+        _driver: Some(simulation),
+        view: None,
+    };
+    let mut host = Host::start(channels, robot, &config, company)
         .map_err(|error| Failure::new(Exit::NoPeer, error))?;
     let ids = host
         .session
