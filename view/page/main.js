@@ -242,4 +242,4 @@ drawRamp(get('legend'));
 requestAnimationFrame(frame);
 
 // What tests look at.
-window.__view = { samples, stage, plots, pendant, program, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
+window.__view = { act, samples, stage, plots, pendant, program, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
