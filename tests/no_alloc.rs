@@ -1,5 +1,5 @@
-//! The fence round the real-time path: in 100 000 periods of step, check and send there is no
-//! call of the heap and no voluntary wait.
+//! The real-time path allocates nothing and does not wait: in 100 000 periods of step, check and
+//! send there is no call of the allocator and no voluntary context switch.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![allow(unsafe_code, reason = "an allocator is unsafe by its nature")]

@@ -1,10 +1,11 @@
-//! Kinematics beside `k` and `rs-opw-kinematics`: forward kinematics with Jacobian,
-//! all branches, cold inverse kinematics, servo ticks. A 1 kHz loop has 1000 us for all.
-//! It needs no engine: `cargo bench -p benches --no-default-features --bench kinematics`.
+//! Kinematics compared with `k` and `rs-opw-kinematics`: forward kinematics with Jacobian, all
+//! branches, inverse kinematics without a seed, servo ticks. A 1 kHz loop has 1000 us for
+//! everything. It needs no servo: `cargo bench -p benches --no-default-features --bench
+//! kinematics`.
 //!
-//! Every answer of ours is checked by forward kinematics. The poses and our times go
-//! to `target/kinematics-bench/`, where `benches/peers/kinematics_peers.py` takes them.
-//! Inputs are taken in small lots, of which the fastest of several passes counts.
+//! Every result of Canter is checked by forward kinematics. The poses and Canter's times are
+//! written to `target/kinematics-bench/`, where `benches/peers/kinematics_peers.py` reads them.
+//! Inputs are divided into small lots; the fastest of several passes over a lot counts.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

@@ -1,6 +1,6 @@
-//! Smooth motion through pose lists: motion time beside exact stop and beside
-//! an IPOPT optimum. Budget: 2 ms for 3 poses, 5 ms for 5, 2.5 ms per pose in
-//! windows, 2 % of the motion time.
+//! Smooth motion through pose lists: motion time compared with exact stop and with an IPOPT
+//! optimum. Budget: 2 ms for 3 poses, 5 ms for 5, 2.5 ms per pose in windows, 2 % of the motion
+//! time.
 //!
 //! The reference is the minimum time found by IPOPT for piecewise constant
 //! jerk in a tube of the tolerance, same limits (500 mm/s, 5000 mm/s2,

@@ -1,13 +1,13 @@
-//! State-to-state planning beside Ruckig (C++, through its own crate) and rsruckig, on the random
-//! states of Ruckig's benchmark. Budget: half of Ruckig's time, 0.7 of it from rest to rest.
+//! State-to-state planning compared with Ruckig (C++, through its crate) and rsruckig, on the
+//! random states of Ruckig's benchmark. Budget: half of Ruckig's time, 0.7 of it from rest to rest.
 //!
-//! Every input is planned by all three in the same run, in blocks that take turns; a time is the
-//! least of all passes for that input, without the cost of reading the clock. Ruckig's crate copies
-//! the input into C++ vectors on each call; what that costs is measured with an input that is
-//! refused at once and taken off Ruckig's times.
+//! All three plan every input in the same run, in alternating blocks. A time is the least of all
+//! passes for that input, without the cost of reading the clock. Ruckig's crate copies the input
+//! into C++ vectors on each call; this cost is measured with an input that is refused at once, and
+//! subtracted from Ruckig's times.
 //!
-//! `cargo bench -p benches --no-default-features --bench otg [-- --compare COUNT]`; the latter
-//! compares durations alone, over as many inputs of each of the five cases.
+//! `cargo bench -p benches --no-default-features --bench otg [-- --compare COUNT]`; with
+//! `--compare` it compares only durations, for COUNT inputs of each of the five cases.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

@@ -1,8 +1,8 @@
-//! The servo loop beside its peers. A 1 kHz period has 1 ms for all of it; the goals are a wake-up
-//! like cyclictest's, a setpoint that arrives like a bare message, and 2 % of a core.
+//! The servo loop compared with its peers. A 1 kHz period has 1 ms for everything. The goals: a
+//! wake-up delay like cyclictest's, a setpoint as fast as a plain message, and 2 % of a core.
 //!
-//! Each peer is measured in the same run, in turns with ours. Last come lines
-//! `ratio <name> <ours/peer>`.
+//! Each peer is measured in the same run, alternating with Canter. The last lines are `ratio <name>
+//! <ours/peer>`.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(
     clippy::unwrap_used,

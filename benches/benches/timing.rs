@@ -1,4 +1,4 @@
-//! Path timing beside copp on the same paths: 7 joints, 11 waypoints, 2 rad/s, 10 rad/s²,
+//! Path timing compared with copp on the same paths: 7 joints, 11 waypoints, 2 rad/s, 10 rad/s²,
 //! 100 rad/s³. Budget: a law of 200 cells in less than a millisecond.
 //!
 //! `cargo bench -p benches --no-default-features --bench timing [-- PATHS]`; each time is the least

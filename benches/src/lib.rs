@@ -1,1 +1,1 @@
-//! Benchmarks beside named peers.
+//! Benchmarks of Canter compared with other libraries.

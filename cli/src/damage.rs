@@ -1,5 +1,5 @@
-//! Damaged shared memory is an answer, not a signal: a process that trips over it says where, and
-//! what repairs it.
+//! If damaged shared memory crashes the process, it says which directory is damaged and what
+//! repairs it.
 
 use std::os::fd::AsFd;
 use std::sync::OnceLock;

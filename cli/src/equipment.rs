@@ -1,4 +1,4 @@
-//! What a world says about the tools of an arm, as the engine needs it.
+//! Converts the end effectors of a world into those of a robot.
 
 use nalgebra::Isometry3;
 use plan::world::{Class, Model, pointing_down};

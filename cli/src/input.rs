@@ -1,4 +1,4 @@
-//! Files as users name them: regular files of a sensible size, or standard input.
+//! Reads files that users name: regular files of a limited size, or standard input.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

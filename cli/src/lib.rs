@@ -1,15 +1,14 @@
-//! The `canter` command line: the outermost layer, where files, terminals, signals and exit
-//! codes live.
+//! The `canter` command line: the outermost layer, with files, terminals, signals and exit codes.
 //!
-//! It parses arguments, calls the libraries and says what they answered. The answer of a command
-//! goes to standard output, all else (progress, findings of a program that is about to move,
-//! logs) to standard error, so that `canter ... | other` sees the answer only.
+//! It parses arguments, calls the libraries and prints their results. The result of a command goes
+//! to standard output, everything else (progress, findings of a program that is about to move,
+//! logs) to standard error, so that `canter ... | other` reads only the result.
 //!
-//! It never plans, converts units or decides about motion: whatever a second program would want
-//! to do as well belongs to a library crate.
+//! It never plans, converts units or decides about motion: what another program may need too is in
+//! a library crate.
 //!
-//! It is a library with one function so that the system tests run the same code as a process of
-//! their own; the binary `canter` is three lines.
+//! It is a library with one function, so that the system tests can run the same code in their own
+//! binary; the binary `canter` only calls it.
 
 mod client;
 mod commands;

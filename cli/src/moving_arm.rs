@@ -1,4 +1,4 @@
-//! The running engine as a plan uses it: a few commands at a time, with an operator who may stop.
+//! The running engine for executing plans: a few commands at a time; the operator may stop it.
 
 use std::io::{self, IsTerminal};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! A file that is written, whose errors say its name.
+//! An output file whose errors contain its name.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -1,4 +1,4 @@
-//! PDDL plans as users name them.
+//! Reads PDDL plans that users name.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What a plan that was run has to say, in the same shape for both kinds of plans.
+//! The report of a run of a plan, in the same form for both kinds of plans.
 
 use std::io::{self, Write};
 

@@ -1,4 +1,4 @@
-//! Worlds as users name them: a database, or a workstation file.
+//! Opens worlds that users name: a database, or a workstation file.
 
 use std::path::{Path, PathBuf};
 

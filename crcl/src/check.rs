@@ -1,4 +1,4 @@
-//! Faults of a whole program that its commands show in their order, without a robot.
+//! Checks the order of a program's commands, without a robot.
 
 use std::ops::Range;
 

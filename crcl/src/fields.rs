@@ -1,4 +1,4 @@
-//! Takes JSON values apart without losing where they lie in the source.
+//! Reads the fields of JSON values and keeps their place in the source.
 
 use std::borrow::Cow;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! One fault or doubt about a program, and the list that collects them.
+//! One error or warning about a program, and the list of them.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Cuts the text of a program into tokens; skips space and comments.
+//! Divides the text of a program into tokens; skips spaces and comments.
 
 use std::ops::Range;
 

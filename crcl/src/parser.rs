@@ -1,4 +1,4 @@
-//! Builds the calls of a program out of tokens, whatever they mean, and recovers from faults.
+//! Builds the calls of a program from tokens, without their meaning, and recovers from errors.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Where the controlled point is to be and how it is turned.
+//! A pose of the controlled point, as a program gives it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! A program as it was read: commands with their places in the source.
+//! A program as read: commands with their places in the source.
 
 use std::ops::Range;
 

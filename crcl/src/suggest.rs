@@ -1,4 +1,4 @@
-//! Finds the name that was probably meant.
+//! Finds the known name that is most similar to an unknown one.
 
 /// Longer names than this are never a misspelt one of ours.
 const LONGEST: usize = 48;

@@ -1,4 +1,4 @@
-//! Programs in each style of writing that is in use: they are read, or every fault is found.
+//! Programs in each style that is in use: they are read, or every error is found.
 #![allow(missing_docs, reason = "a test")]
 
 use crcl::{ReadOptions, Reading, code, json, text};

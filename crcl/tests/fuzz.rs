@@ -1,5 +1,5 @@
-//! Whatever the bytes, the readers answer: no panic, and no command is made of nothing.
-//! `CANTER_FUZZ_CASES` asks for more than the usual number of inputs.
+//! The readers return a result for any bytes: no panic, and no command that is not in the text.
+//! `CANTER_FUZZ_CASES` sets the number of inputs.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -1,5 +1,5 @@
-//! The arm of a robot as a plan needs it: planned by the engine, and moved by a driver if there is
-//! one.
+//! The arm of a robot for executing plans: moves are planned here, and executed by a driver if
+//! there is one.
 
 use crcl::LengthUnit;
 use nalgebra::{Isometry3, SVector};

@@ -1,7 +1,7 @@
 //! The control thread: stop, pause, resume, override, abort and recover from other processes.
 //!
-//! It does nothing else. It neither plans nor prints nor serves anything that takes time, so that
-//! an order reaches the real-time thread whatever the others do.
+//! It does nothing else: it does not plan, print or serve anything that takes time. So an order
+//! reaches the real-time thread whatever the other threads do.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

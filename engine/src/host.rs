@@ -1,4 +1,4 @@
-//! A session that serves clients: other processes that command, watch or stop the arm.
+//! A session that serves clients: other processes that command, monitor or stop the arm.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};

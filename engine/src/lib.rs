@@ -1,12 +1,12 @@
 //! A running arm: the queue of commands, the session that plans them ahead of the servo thread,
 //! and the host that serves clients.
 //!
-//! A command leaves the [`queue`] and is planned by the planner's thread of the [`session`], which
-//! hands the pieces to the servo thread. The [`host`] answers the requests of other processes.
-//! [`arm_motion`] lets a kitting plan move an arm. [`doctor`] looks at what all this needs of the machine.
+//! The planner's thread of the [`session`] takes a command from the [`queue`], plans it and sends
+//! the pieces to the servo thread. The [`host`] answers the requests of other processes. With
+//! [`arm_motion`] a kitting plan moves an arm. [`doctor`] checks the machine.
 //!
-//! This crate never plans by itself, never names iceoryx2, prints nothing and reads no environment
-//! variable.
+//! This crate has no planning of its own, never names iceoryx2, prints nothing and reads no
+//! environment variable.
 #![forbid(unsafe_code)]
 
 pub mod arm_motion;

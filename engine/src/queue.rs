@@ -1,4 +1,4 @@
-//! The bounded queue between who gives commands and the planner.
+//! The bounded queue between clients and the planner.
 
 use std::collections::VecDeque;
 

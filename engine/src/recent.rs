@@ -1,4 +1,4 @@
-//! A map that remembers what was used lately.
+//! A map that keeps the most recently used entries.
 
 use std::collections::HashMap;
 use std::hash::Hash;

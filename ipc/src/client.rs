@@ -1,4 +1,4 @@
-//! An operator's end of the client channel.
+//! The client's end of the client channel.
 
 use core::fmt::Debug;
 use std::thread::sleep;
@@ -19,7 +19,7 @@ const WORD: Duration = Duration::from_secs(3);
 /// A request that waits for its answer.
 type Pending = PendingResponse<Shared, [u8], (), [u8], ()>;
 
-/// An operator's end of the client channel.
+/// The client's end of the client channel.
 #[derive(Debug)]
 pub struct Client {
     arm: Arm,

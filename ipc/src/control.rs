@@ -1,8 +1,8 @@
-//! Requests that act on the motion under way, on a channel of their own.
+//! Requests that act on the current motion, on a separate channel.
 //!
-//! They are small messages of fixed size, so that the thread that obeys them reads no text and
-//! needs no memory; and they are apart from the requests of [`crate::Client`], so that nobody who
-//! asks for something else stands before them.
+//! They are small messages of fixed size, so the thread that executes them reads no text and
+//! allocates no memory. They are separate from the requests of [`crate::Client`], so no other
+//! request delays them.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};

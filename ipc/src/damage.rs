@@ -1,4 +1,4 @@
-//! Looks at segments from outside: every one begins with the version of iceoryx2.
+//! Checks segments from outside: each begins with the version of iceoryx2.
 
 use std::fs::File;
 use std::io::Read;

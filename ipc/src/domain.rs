@@ -1,4 +1,4 @@
-//! The place in shared memory where the processes of one user find each other.
+//! The directory in which the processes of one user find each other.
 
 use std::ffi::OsString;
 use std::fs::{self, DirBuilder, Metadata};

@@ -1,4 +1,4 @@
-//! What can go wrong at the process border.
+//! Errors of the communication between processes.
 
 use thiserror::Error;
 

@@ -1,17 +1,18 @@
-//! The process border: messages and channels over iceoryx2.
+//! Messages and channels between processes, over iceoryx2.
 //!
-//! - [`Setpoint`] goes from the engine to the driver once in every period, [`State`] comes back.
-//!   Both are plain numbers of fixed size: any bytes are a value, and [`Setpoint::check`] and
-//!   [`State::check`] say whether the value makes sense before anyone uses it.
+//! - The engine sends a [`Setpoint`] to the driver once per period, the driver sends a [`State`]
+//!   back. Both are plain numbers of fixed size: any bytes are a value. [`Setpoint::check`] and
+//!   [`State::check`] check the value before it is used.
 //! - [`Hello`] and [`HelloAck`] are the handshake that opens a session.
 //! - [`EngineLink`] is the engine's end, [`DriverLink`] the driver's end.
-//! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine and its
-//!   report back; [`ControlClient`] and [`ControlServer`] those that act on the motion under way.
-//! - [`Observer`] sees the cyclic messages of an arm and takes part in nothing.
+//! - [`Client`] and [`ClientServer`] carry requests of operators to a running engine, and its
+//!   answers; [`ControlClient`] and [`ControlServer`] carry the requests that act on the current
+//!   motion.
+//! - [`Observer`] only reads the cyclic messages of an arm.
 //!
-//! This crate never knows a robot, never plans, never waits on a lock, and shows no iceoryx2 type
-//! in a signature. Nobody else names iceoryx2. Everything of a [`Domain`] belongs to one user and is
-//! readable by that user only.
+//! This crate knows no robot, never plans, never waits on a lock, and has no iceoryx2 type in a
+//! public signature. No other crate uses iceoryx2. Everything of a [`Domain`] belongs to one user,
+//! and only that user can read it.
 
 mod arm;
 mod client;

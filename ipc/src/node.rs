@@ -1,4 +1,4 @@
-//! This process among the others: configuration, services, left-overs of dead processes.
+//! The iceoryx2 node of this process: configuration, services, left-overs of dead processes.
 
 use core::fmt::Debug;
 

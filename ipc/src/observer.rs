@@ -1,4 +1,4 @@
-//! A look at an arm from outside: what the engine publishes and what the driver answers.
+//! Reads the messages of an arm from outside: setpoints of the engine and states of the driver.
 
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::Node;

@@ -1,4 +1,4 @@
-//! A bare exchange over iceoryx2, to see what the transport itself costs.
+//! A plain message exchange over iceoryx2, to measure the transport itself.
 
 use core::hint::black_box;
 

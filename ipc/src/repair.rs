@@ -1,5 +1,5 @@
-//! Makes a domain usable again whose segments are damaged, from outside: by files alone, without
-//! reading what may be broken.
+//! Repairs a domain with damaged segments from outside: it deletes files, and does not read their
+//! content.
 
 use std::fs;
 use std::io;

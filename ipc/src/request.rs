@@ -1,4 +1,4 @@
-//! What an operator asks of a running engine, and what it answers.
+//! Requests of an operator to a running engine, and the answers.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
-//! Room in shared memory: looked at before it is used, and kept for as long as it is needed.
+//! Free space in shared memory: checked before it is used, and reserved.
 //!
-//! A segment in `/dev/shm` has a size, but no memory until somebody writes to it. When the file
-//! system is full by then, the writer is killed with SIGBUS. So we look at the room before we make
-//! segments, and give each its memory before we use it.
+//! A segment in `/dev/shm` has a size, but no memory until a process writes to it. If the file
+//! system is full then, the writer is killed with SIGBUS. So the free space is checked before
+//! segments are made, and each segment gets its memory before it is used.
 
 use std::fs::{self, OpenOptions};
 use std::os::unix::fs::MetadataExt;

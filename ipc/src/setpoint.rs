@@ -1,4 +1,4 @@
-//! The setpoint: engine to driver, once in every period.
+//! The setpoint: from engine to driver, once per period.
 
 use iceoryx2::prelude::ZeroCopySend;
 

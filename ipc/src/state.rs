@@ -1,4 +1,4 @@
-//! The state: driver to engine, once in every period.
+//! The state: from driver to engine, once per period.
 
 use iceoryx2::prelude::ZeroCopySend;
 

@@ -1,4 +1,4 @@
-//! The engine's report to everybody.
+//! The engine's status report for any process.
 
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;

@@ -1,8 +1,9 @@
-//! Whether a request was taken or withdrawn: one of the two, whatever the order of events.
+//! Decides whether a request was taken or withdrawn: exactly one of the two, whatever the order of
+//! events.
 //!
-//! A request travels through a channel where it may wait for longer than its sender does. So its
-//! sender makes a file first, the ticket. Who removes the file has decided: the engine, which
-//! takes the request, or the sender, which withdraws it. Removing a file succeeds exactly once.
+//! A request may wait in its channel for longer than its sender waits. So the sender first makes a
+//! file, the ticket. The process that removes the file decides: the engine takes the request, or
+//! the sender withdraws it. A file can be removed only once.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
 use std::io;

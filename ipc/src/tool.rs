@@ -1,4 +1,4 @@
-//! The tool channel: what the engine asks of a gripper or tool changer, and what comes back.
+//! Orders of the engine to a gripper or tool changer, and their status.
 
 use iceoryx2::prelude::ZeroCopySend;
 

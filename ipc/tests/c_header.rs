@@ -1,6 +1,6 @@
 //! The messages for drivers in other languages: `drivers/c/canter_driver.h` is generated from the
-//! Rust types (`UPDATE_EXPECT=1` rewrites it), and a C compiler and Python agree with every size
-//! and offset.
+//! Rust types (`UPDATE_EXPECT=1` rewrites it), and a C compiler and Python agree on every size and
+//! offset.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use core::fmt::Write as _;

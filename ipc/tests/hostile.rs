@@ -1,4 +1,4 @@
-//! Nothing that is read from shared memory is believed.
+//! Everything that is read from shared memory is checked.
 
 use ipc::{Clock, Hello, HelloAck, MAX_JOINTS, MessageError, Setpoint, State, Verdict};
 use proptest::prelude::*;

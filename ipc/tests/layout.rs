@@ -1,4 +1,4 @@
-//! The byte layout of the messages is a promise to drivers in other languages.
+//! The byte layout of the messages must not change: drivers in other languages rely on it.
 
 use core::mem::{align_of, offset_of, size_of};
 

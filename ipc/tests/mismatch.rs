@@ -1,5 +1,4 @@
-//! Another process made the services with messages of another layout: refused in words that say
-//! what to do.
+//! Another process made the services with messages of another layout: the error says what to do.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::io::{BufRead, BufReader, Write};

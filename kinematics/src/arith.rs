@@ -1,10 +1,9 @@
-//! Arithmetic in two builds: wide (AVX2 and FMA) where the processor has it,
-//! plain elsewhere. The choice is made once, when a chain is built.
+//! Arithmetic in two builds: SIMD (AVX2 and FMA) if the processor has it, plain otherwise. The
+//! build is chosen once, when a chain is made.
 //!
-//! The same generic code is compiled twice. Both builds differ only in the
-//! rounding of fused multiply-adds; see [`crate::Chain::plain`] for the bound.
-//! Everything that a dispatched function calls must be inlined into it, or it
-//! falls back to the plain instruction set.
+//! The same generic code is compiled twice. Both builds differ only in the rounding of fused
+//! multiply-adds; see [`crate::Chain::plain`] for the bound. Everything that a dispatched function
+//! calls must be inlined into it; otherwise it uses the plain instruction set.
 
 use crate::four::Four;
 use crate::wide::F4;
@@ -19,7 +18,7 @@ pub(crate) trait Arith: Four {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
 
-/// Fused multiply-add and wide registers, with the proof that the processor has them.
+/// Fused multiply-add and SIMD registers, with the proof that the processor has them.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fused(pub(crate) pulp::x86::V3);
@@ -51,7 +50,7 @@ pub(crate) trait Op {
     fn run<A: Arith>(self, arith: A) -> Self::Output;
 }
 
-/// Which build to use: proof that the processor can, or the plain one.
+/// Which build to use: SIMD, with the proof that the processor has it, or plain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Build {
     Plain,
@@ -91,13 +90,13 @@ impl Build {
     }
 }
 
-/// The plain build of a computation, compiled once however often it is called.
+/// The plain build of a computation; not inlined, so it is compiled once.
 #[inline(never)]
 fn plain<O: Op>(op: O) -> O::Output {
     op.run(Plain)
 }
 
-/// Adapter for `pulp`, which compiles `call` for the wide instruction set.
+/// Adapter for `pulp`, which compiles `call` with SIMD instructions.
 #[cfg(target_arch = "x86_64")]
 struct Wide<O>(O, pulp::x86::V3);
 
@@ -111,7 +110,7 @@ impl<O: Op> pulp::NullaryFnOnce for Wide<O> {
     }
 }
 
-/// Four numbers that one wide register holds; the fourth of a direction is zero.
+/// Four numbers in one SIMD register; the fourth of a direction is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 pub(crate) struct V4(pub(crate) [f64; 4]);
@@ -173,7 +172,7 @@ pub(crate) fn sin_cos_of<A: Arith>(angles: F4<A>) -> (F4<A>, F4<A>) {
     (F4::new(a, far.0), F4::new(a, far.1))
 }
 
-/// Sine and cosine of angles for which the reduction has not enough figures.
+/// Sine and cosine of angles that are too large for the reduction.
 #[cold]
 fn far_sin_cos_of(angles: [f64; 4]) -> ([f64; 4], [f64; 4]) {
     (angles.map(f64::sin), angles.map(f64::cos))

@@ -14,10 +14,9 @@ fn cross<A: Arith>(a: F4<A>, b: F4<A>) -> F4<A> {
 
 /// A serial arm of `N` joints as flat, immutable data.
 ///
-/// Joint `i` turns about (or slides along) the z axis of its own frame. The frame
-/// that poses are given in is the base of the URDF, unless [`Chain::with_base`]
-/// put another before it; the last frame is the flange, unless
-/// [`Chain::with_tool`] put a tool behind it.
+/// Joint `i` turns about (or slides along) the z axis of its own frame. Poses are given in the base
+/// frame of the URDF, or in the frame set by [`Chain::with_base`]. The last frame is the flange, or
+/// the tool set by [`Chain::with_tool`].
 ///
 /// ```
 /// # let text = r#"<robot name="swing"><link name="base"/><link name="arm"/>
@@ -64,7 +63,7 @@ impl<const N: usize> Chain<N> {
         })
     }
 
-    /// Folds base and tool into the links.
+    /// Includes base and tool in the links.
     fn fold(&mut self) {
         let (base, tool) = (&self.reference_from_base, &self.flange_from_tool);
         self.links = self.bare.between(base, tool);
@@ -78,7 +77,7 @@ impl<const N: usize> Chain<N> {
         self
     }
 
-    /// The same arm standing in a workstation: poses become those of the workstation.
+    /// The same arm with its base in a workstation: poses are then in the workstation frame.
     #[must_use]
     pub fn with_base(mut self, workstation_from_base: &Isometry3<f64>) -> Self {
         self.reference_from_base = *workstation_from_base;
@@ -86,8 +85,8 @@ impl<const N: usize> Chain<N> {
         self
     }
 
-    /// The same arm computed without wide instructions, as on a processor that
-    /// has none. Poses agree with the wide build within 1e-14 times the reach.
+    /// The same arm, computed without SIMD instructions, as on a processor that has none. Poses
+    /// agree with those of the SIMD build within 1e-14 times the reach.
     #[must_use]
     pub fn plain(mut self) -> Self {
         self.build = Build::Plain;
@@ -106,9 +105,10 @@ impl<const N: usize> Chain<N> {
         &self.reference_from_base
     }
 
-    /// A ball that holds every position of the tool, whatever the joints do: its middle, in the
-    /// frame that poses are given in, and its radius (m). It is larger than what the arm reaches,
-    /// and costs a few additions; infinite where a sliding joint has no limits.
+    /// A ball that contains every position of the tool at all joint positions: its centre, in the
+    /// frame that poses are given in, and its radius (m). It is larger than the reach of the arm,
+    /// and takes a few additions to compute. The radius is infinite if a sliding joint has no
+    /// limits.
     #[must_use]
     pub fn reach_ball(&self) -> (Point3<f64>, f64) {
         let stroke = |i: usize| {
@@ -140,14 +140,14 @@ impl<const N: usize> Chain<N> {
         &self.prismatic
     }
 
-    /// Whether `q` (rad, m) is inside the limits, give or take `slack`.
+    /// Whether `q` (rad, m) is inside the limits widened by `slack`.
     #[must_use]
     pub fn within_limits(&self, q: &SVector<f64, N>, slack: f64) -> bool {
         (0..N).all(|i| q[i] >= self.lower[i] - slack && q[i] <= self.upper[i] + slack)
     }
 
-    /// Distance (m) from the place of joint `joint`, once it has slid, to that of the next, or from
-    /// the last to the tool.
+    /// Distance (m) from joint `joint` to the next joint, or from the last joint to the tool,
+    /// without the travel of a sliding joint.
     pub(crate) fn beyond(&self, joint: usize) -> f64 {
         self.links.beyond(joint)
     }
@@ -193,8 +193,8 @@ impl<const N: usize> Chain<N> {
         for i in 0..N {
             let (mut dv, mut dw) = (Vector3::zeros(), Vector3::zeros());
             for k in 0..N {
-                // A joint nearer the base carries column i along; one nearer the tip moves
-                // the point that column i acts on.
+                // A joint nearer the base moves column i; a joint nearer the tip moves the point
+                // that column i acts on.
                 if k <= i {
                     dv += angular(k).cross(&linear(i)) * dq[k];
                     dw += angular(k).cross(&angular(i)) * dq[k];
@@ -223,7 +223,7 @@ impl<const N: usize> Chain<N> {
         Some((lines.collect(), reached.end.frame().isometry()))
     }
 
-    /// Where the joints at `q` bring the links.
+    /// Positions of the links with the joints at `q`.
     #[inline(always)]
     pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
         self.links.reach(a, q)
@@ -262,7 +262,7 @@ impl<const N: usize> Chain<N> {
     }
 }
 
-/// Forward kinematics as a dispatched computation.
+/// Forward kinematics, compiled for both builds.
 struct Forward<'a, const N: usize> {
     chain: &'a Chain<N>,
     q: &'a SVector<f64, N>,
@@ -277,7 +277,7 @@ impl<const N: usize> Op for Forward<'_, N> {
     }
 }
 
-/// Forward kinematics and Jacobian as a dispatched computation.
+/// Forward kinematics and Jacobian, compiled for both builds.
 struct Jacobian<'a, const N: usize> {
     chain: &'a Chain<N>,
     q: &'a SVector<f64, N>,

@@ -1,11 +1,11 @@
-//! One continuous joint path for a whole path of the tool.
+//! The continuous joint path for a whole path of the tool.
 //!
-//! The joints start where the arm stands and follow by continuity, so the path
-//! stays on one branch; at each point the three derivatives of the joints to the
-//! path parameter are exact solutions of the differentiated kinematics. Between
-//! two points the polynomial of degree seven through both keeps the tool within
+//! The joints start at the arm's position and change continuously, so the path stays on one branch.
+//! At each point the three derivatives of the joints with respect to the path parameter are exact
+//! solutions of the differentiated kinematics. Between two points the polynomial of degree seven
+//! through both keeps the tool within
 //! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
-//! as near a singular pose, where joints turn fast over a short way.
+//! for example near a singular pose, where joints turn fast over a short distance.
 
 mod differential;
 mod error;
@@ -49,8 +49,8 @@ pub struct FollowOptions {
     pub accuracy: f64,
     /// Most points, those that are added included.
     pub most_points: usize,
-    /// Whether the null-space motion of an arm with more than six joints rests at both ends: so
-    /// where the parameter is a time and the tool itself rests there.
+    /// Whether the null-space motion of an arm with more than six joints is at rest at both ends.
+    /// Set it if the parameter is time and the tool is at rest there.
     pub still_ends: bool,
 }
 
@@ -66,14 +66,14 @@ impl Default for FollowOptions {
 
 /// Joint path of a tool path.
 ///
-/// `tool` is the path of the tool, `grid` the rising parameters at which points are
-/// wanted (first and last are the ends; knots of the path belong in it), `start`
-/// where the arm stands: `tool(grid[0])` must be its pose there. Returned are the
-/// grid's points and those added between.
+/// `tool` is the path of the tool. `grid` has the parameters, in rising order, at which points are
+/// wanted: the first and last are the ends; knots of the path must be among them. `start` is the
+/// joint position of the arm; `tool(grid[0])` must be its pose there. Returns the points of the
+/// grid and those added between them.
 ///
-/// Arms with more than six joints choose their null-space motion over the whole path:
-/// still if that keeps them well inside their limits, else along the smooth polynomial
-/// that stays farthest from limits and singular poses.
+/// For arms with more than six joints, the null-space motion is chosen over the whole path: none if
+/// that stays well inside the limits, otherwise the smooth polynomial that stays farthest from
+/// limits and singular poses.
 ///
 /// # Errors
 /// [`FollowError`]: where, which joint, why, and by how much.

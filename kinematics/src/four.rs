@@ -1,12 +1,12 @@
-//! What each build of the arithmetic does with four numbers.
+//! Operations on four numbers, in each build of the arithmetic.
 
 use crate::arith::{Fused, Plain};
 
-/// What a build does with four numbers at once.
+/// Operations of a build on four numbers at once.
 pub(crate) trait Four: Copy {
     /// Four numbers.
     type F: Copy;
-    /// Four answers, yes or no.
+    /// Four booleans.
     type B: Copy;
 
     fn pack(self, x: [f64; 4]) -> Self::F;
@@ -31,18 +31,18 @@ pub(crate) trait Four: Copy {
     fn next(self, x: Self::F) -> Self::F;
     /// The first three of four vectors as rows: first numbers, second, third.
     fn transposed(self, columns: [Self::F; 4]) -> [Self::F; 3];
-    /// `x <= y`; no where either is not a number.
+    /// `x <= y`; false if either is NaN.
     fn le(self, x: Self::F, y: Self::F) -> Self::B;
     fn select(self, mask: Self::B, yes: Self::F, no: Self::F) -> Self::F;
     fn both(self, x: Self::B, y: Self::B) -> Self::B;
     fn either(self, x: Self::B, y: Self::B) -> Self::B;
-    /// Whether the bit is set that is `BELOW` places below the sign.
+    /// Whether the bit is set that is `BELOW` places below the sign bit.
     fn bit<const BELOW: i32>(self, x: Self::F) -> Self::B;
-    /// Bit `i` is answer `i`.
+    /// Bit `i` is boolean `i`.
     fn bits(self, x: Self::B) -> u8;
 }
 
-/// A build without wide registers works lane by lane.
+/// A build without SIMD registers computes one lane after the other.
 macro_rules! lane_by_lane {
     ($build:ty, $fma:expr) => {
         impl Four for $build {

@@ -1,4 +1,4 @@
-//! A frame as numbers: the columns of its rotation and its origin.
+//! A coordinate frame: the columns of its rotation and its origin.
 
 use crate::arith::{Arith, Plain, V4};
 use crate::wide::F4;
@@ -27,7 +27,7 @@ impl Frame {
         }
     }
 
-    /// The frame that this one is seen from, as this one sees it.
+    /// The inverse: the outer frame, expressed in this one.
     pub(crate) fn inverse(&self) -> Self {
         let [x, y, z, p] = [self.x.0, self.y.0, self.z.0, self.p.0];
         let along = |v: [f64; 4]| -(v[0] * p[0] + v[1] * p[1] + v[2] * p[2]);
@@ -61,9 +61,9 @@ impl Frame {
         UnitQuaternion::new_unchecked(Quaternion::new(real * scale, i, j, k))
     }
 
-    /// The same for a turn by more than 120 degrees: half a turn about one of the axes brings
-    /// the largest number into the place of the real one, where nothing cancels. It is done
-    /// by signs and places instead of branches.
+    /// The same for a rotation by more than 120 degrees. Half a turn about one of the axes makes
+    /// the real part the largest of the four numbers, so that nothing cancels. It is done by
+    /// changing signs and places, without branches.
     #[inline(always)]
     fn far_rotation(&self) -> UnitQuaternion<f64> {
         let [[xx, xy, xz, _], [yx, yy, yz, _], [zx, zy, zz, _]] = [self.x.0, self.y.0, self.z.0];
@@ -85,8 +85,8 @@ impl Frame {
     }
 }
 
-/// No turn, and half a turn about z, y and x: the signs that it gives a frame's axes, and
-/// those that taking it back gives the numbers of a quaternion.
+/// No rotation, and half a turn about z, y and x: the signs that it gives to a frame's axes, and
+/// the signs that its inverse gives to the numbers of a quaternion.
 const HALF_TURNS: [([f64; 3], [f64; 4]); 4] = [
     ([1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]),
     ([-1.0, -1.0, 1.0], [1.0, -1.0, 1.0, -1.0]),
@@ -102,14 +102,14 @@ impl Mul for Frame {
     }
 }
 
-/// A turn by its sine and cosine.
+/// Sine and cosine of an angle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
     pub(crate) sin: f64,
     pub(crate) cos: f64,
 }
 
-/// A frame on its way along a chain, in registers.
+/// A frame that is moved along a chain, in registers.
 #[derive(Clone, Copy)]
 pub(crate) struct Moving<A: Arith> {
     pub(crate) x: F4<A>,
@@ -153,7 +153,7 @@ impl<A: Arith> Moving<A> {
     pub(crate) fn turned(self, about_z: Turn, about_x: Turn) -> Self {
         let number = |x: f64| F4::splat(self.p.build(), x);
         let Self { x, y, z, p } = self;
-        // What is known late comes last into every sum.
+        // Values that are computed last are added last.
         let (sin, cos) = (number(about_z.sin), number(about_z.cos));
         let back = y.taken_from(cos, x * sin);
         let x = y.fma(sin, x * cos);
@@ -193,13 +193,13 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    /// The quaternion of a turn, found by way of its frame.
+    /// The quaternion of a rotation, computed through its frame.
     fn found(turn: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         let pose = Isometry3::from_parts(Translation3::identity(), *turn);
         Frame::from_isometry(&pose).isometry().rotation
     }
 
-    /// Turns about all axes come back as the quaternions that nalgebra finds.
+    /// Rotations about all axes give the same quaternions as nalgebra.
     #[test]
     fn quaternion_agrees_with_nalgebra() {
         for i in 0..20_000 {

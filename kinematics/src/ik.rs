@@ -29,11 +29,11 @@ use nalgebra::{Isometry3, Point3, SMatrix, SVector};
 use numeric::{Descent, SolverResult, Stop};
 use std::f64::consts::PI;
 
-/// Restarts before a goal counts as not reached.
+/// Restarts before a goal is reported as not reached.
 const RESTARTS: u32 = 1500;
-/// Restarts after which a position that is out of reach by itself ends the search.
+/// Restarts after which the search ends if the position alone is out of reach.
 const PATIENCE: u32 = 40;
-/// Restarts before a position by itself counts as out of reach.
+/// Restarts before a position alone is reported as out of reach.
 const PLACES: u32 = 120;
 /// Values of the free parameter that are tried before a closed form gives up.
 const SWEEP: u32 = 360;
@@ -42,7 +42,7 @@ const SEARCH: u32 = 120;
 
 /// Solves inverse kinematics for one arm with its base and tool.
 ///
-/// Every answer is a pure function of the question: no clock, no random numbers, no heap.
+/// Every result is a pure function of the arguments: no clock, no random numbers, no heap.
 ///
 /// ```
 /// # let text = include_str!("../../robots/irb120/robot.urdf");
@@ -125,8 +125,8 @@ impl<const N: usize> Solver<N> {
         self.closed.as_ref().is_some_and(Closed::exact)
     }
 
-    /// One solution: for arms with a closed form the branch nearest to the middle of
-    /// the joint ranges.
+    /// One solution: for arms with a closed form, the branch nearest to the middle of the joint
+    /// ranges.
     ///
     /// # Errors
     /// [`IkReport`]: what is in the way, and the nearest pose that was found.
@@ -134,9 +134,9 @@ impl<const N: usize> Solver<N> {
         self.nearest(pose, &numeric::restart(&self.chain, 0))
     }
 
-    /// The solution nearest to `seed` (rad, m), with the turns of its joints chosen
-    /// nearest too. Arms with seven joints keep their free parameter (see
-    /// [`Solver::parameter`]) where they can, and else the nearest that works.
+    /// The solution nearest to `seed` (rad, m); whole turns of its joints are also chosen nearest
+    /// to it. For arms with seven joints, the free parameter (see [`Solver::parameter`]) stays as
+    /// it is if possible; otherwise it is the nearest value that gives a solution.
     ///
     /// # Errors
     /// [`IkReport`]: what is in the way, and the nearest pose that was found.
@@ -168,9 +168,9 @@ impl<const N: usize> Solver<N> {
         self.reach(&Goal::Pose(*pose), seed)
     }
 
-    /// All branches of a pose inside the limits, at most [`MOST_BRANCHES`], each with
-    /// its turns nearest to the middle of the joint ranges. Where the pose is singular
-    /// two branches may be the same joint position.
+    /// All branches of a pose inside the limits, at most [`MOST_BRANCHES`], each with its whole
+    /// turns nearest to the middle of the joint ranges. If the pose is singular, two branches may
+    /// be the same joint position.
     ///
     /// Arms with seven joints have one free parameter; the branches are those at the
     /// parameter of the middle of the joint ranges, see [`Solver::solve_all_at`].
@@ -184,8 +184,8 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    /// All branches at one value (rad) of the free parameter, turns and free joints of
-    /// singular poses nearest to `seed`. For arms without a free parameter that is all.
+    /// All branches at one value (rad) of the free parameter; whole turns, and the free joints of
+    /// singular poses, nearest to `seed`. For arms without a free parameter, all branches.
     #[must_use]
     pub fn solve_all_at(
         &self,
@@ -199,8 +199,8 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    /// The free parameter of a seven-joint arm at `q`, rad: its swivel (spherical
-    /// shoulder and wrist), or the joint that its closed form takes as given.
+    /// The free parameter of a seven-joint arm at `q`, rad: its swivel angle (spherical shoulder
+    /// and wrist), or the joint that its closed form takes as given.
     #[must_use]
     pub fn parameter(&self, q: &SVector<f64, N>) -> f64 {
         self.closed
@@ -208,9 +208,9 @@ impl<const N: usize> Solver<N> {
             .map_or(0.0, |closed| closed.parameter(q))
     }
 
-    /// Values (rad) of the free parameter, `count` of them evenly over its range: what to
-    /// ask [`Solver::solve_all_at`] for to see every way of a seven-joint arm to reach a
-    /// pose. One value where there is no free parameter.
+    /// `count` values (rad) of the free parameter, evenly spaced over its range. With
+    /// [`Solver::solve_all_at`] they give every way in which a seven-joint arm reaches a pose. One
+    /// value if there is no free parameter.
     #[must_use]
     pub fn parameters(&self, count: usize) -> Vec<f64> {
         match &self.closed {
@@ -228,8 +228,8 @@ impl<const N: usize> Solver<N> {
         low + (high - low) * fraction
     }
 
-    /// The nearest solution over the whole range of the free parameter, looked at closely:
-    /// near the edge of reach few values work.
+    /// The nearest solution over the whole range of the free parameter, on a fine grid: near the
+    /// edge of the reach only few values have a solution.
     #[cold]
     fn sweep(
         &self,
@@ -284,7 +284,8 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    /// Follows a goal that moved a little since `seed`: no restarts, a bounded number of steps.
+    /// Follows a goal that moved a little from the pose at `seed`: no restarts, a bounded number of
+    /// steps.
     ///
     /// # Errors
     /// [`IkReport`] as for [`Solver::reach`], with [`IkFailure::Singular`] where the
@@ -336,8 +337,8 @@ impl<const N: usize> Solver<N> {
         })
     }
 
-    /// One restart. Every first of two walks through the limits, which gets it past
-    /// corners that they form; where it ends outside it goes on from the nearest corner.
+    /// One restart. Every second one may leave the limits during the search, which avoids local
+    /// minima at corners of the limits; if it ends outside, it continues from the nearest corner.
     fn restarted(&self, target: &Target, index: u32) -> SolverResult<N> {
         let seed = numeric::restart(&self.chain, index);
         let limits = index % 2 == 1;
@@ -352,7 +353,8 @@ impl<const N: usize> Solver<N> {
         if !limits {
             result.q = turns::nearest(&self.chain, &result.q, &seed);
             if !self.chain.within_limits(&result.q, 0.0) {
-                // Near the goal, but outside: from the nearest corner it may be reached.
+                // Near the goal, but outside the limits: the goal may be reached from the nearest
+                // corner.
                 result = self.descend(target, &self.clamped(&result.q), self.stop);
             }
         }
@@ -434,7 +436,7 @@ impl<const N: usize> Solver<N> {
         best.map(|(_, solution)| solution)
     }
 
-    /// Whether the closed form finds its way back from a thousand joint positions.
+    /// Whether the closed form finds a thousand joint positions again from their poses.
     fn closed_form_holds(&self) -> bool {
         let Some(closed) = &self.closed else {
             return false;
@@ -469,7 +471,7 @@ impl<const N: usize> Solver<N> {
         if !finite {
             return self.report_with(best, IkFailure::NotFinite);
         }
-        // A failed search for the position alone settles that it is the distance.
+        // If the search for the position alone fails, the distance is the reason.
         let place = self.best_place(point, &best.q);
         if !place.reached {
             return self.report_with(
@@ -507,7 +509,7 @@ impl<const N: usize> Solver<N> {
         )
     }
 
-    /// Whether at least the position of a goal can be reached.
+    /// Whether the position of a goal can be reached, with any orientation.
     fn place_reached(&self, goal: &Goal, seed: &SVector<f64, N>) -> bool {
         let point = match goal {
             Goal::Pose(pose) => pose.translation.vector.into(),
@@ -516,7 +518,7 @@ impl<const N: usize> Solver<N> {
         self.best_place(point, seed).reached
     }
 
-    /// The nearest that the tool comes to a position, turned as it likes.
+    /// The nearest that the tool comes to a position, with any orientation.
     fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
         let target = Goal::Position(point).target();
         let mut best = self.descend(&target, seed, self.stop);
@@ -573,7 +575,7 @@ impl<const N: usize> Solver<N> {
     }
 }
 
-/// Distance of a landing from its goal, lengths in units of [`LENGTH`].
+/// Distance of a solver result from its goal, lengths in units of [`LENGTH`].
 fn score<const N: usize>(result: &SolverResult<N>) -> f64 {
     (result.position / LENGTH).hypot(result.rotation)
 }

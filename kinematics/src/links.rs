@@ -1,10 +1,10 @@
-//! The links of a serial arm, as frames on its axes: z along each axis, and x square to it
-//! and to the one before, so that each link is one turn about x and a shift in the plane.
+//! The links of a serial arm, as frames on its axes: z along each axis, x perpendicular to it and
+//! to the axis before. So each link is one rotation about x and a shift in the plane.
 //!
 //! # Source
-//! J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based
-//! on matrices", J. Appl. Mech. 22, 1955; here each origin is the point of its axis that is
-//! nearest to the origin before it, so that nothing grows large where axes are nearly parallel.
+//! J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on
+//! matrices", J. Appl. Mech. 22, 1955; here each origin is the point of its axis that is nearest to
+//! the origin before it, so that no number becomes large if axes are nearly parallel.
 
 use crate::arith::{Arith, V4, sin_cos_of};
 use crate::frame::{Frame, Moving, Turn};
@@ -19,15 +19,16 @@ pub(crate) struct ScrewAxis {
     pub(crate) p: [f64; 3],
 }
 
-/// The links of an arm of `N` joints. From the frame of a joint, turned about its z axis,
-/// to that of the next it is a turn about x and then a shift along the new x and y axis.
+/// The links of an arm of `N` joints. The step from the frame of a joint, turned about its z axis,
+/// to the frame of the next joint is a rotation about x and then a shift along the new x and y
+/// axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Links<const N: usize> {
     /// The first joint's frame.
     first: Frame,
     /// Angle from x axis to x axis with all joints at zero, rad.
     zero: [f64; N],
-    /// Turn and shift (m) beyond each joint; none beyond the last.
+    /// Rotation and shift (m) after each joint; none after the last.
     turn: [Turn; N],
     shift: [[f64; 2]; N],
     /// The end in the frame of the last joint.
@@ -37,7 +38,7 @@ pub(crate) struct Links<const N: usize> {
     all_turn: bool,
 }
 
-/// Position and axis of every joint, and the end, on the way along the links.
+/// Position and axis of every joint, and the end of the arm.
 pub(crate) struct Reached<A: Arith, const N: usize> {
     pub(crate) points: [F4<A>; N],
     pub(crate) axes: [F4<A>; N],
@@ -45,8 +46,8 @@ pub(crate) struct Reached<A: Arith, const N: usize> {
 }
 
 impl<const N: usize> Links<N> {
-    /// A ball that holds every position of the end: its middle and its radius (m). `stroke` says
-    /// how far a sliding joint goes from zero at most.
+    /// A ball that contains every position of the end: its centre and its radius (m). `stroke`
+    /// gives the largest distance of a sliding joint from zero.
     pub(crate) fn ball(&self, stroke: impl Fn(usize) -> f64) -> ([f64; 3], f64) {
         let shifts = self.shift.iter().map(|[x, y]| x.hypot(*y));
         let strokes = (0..N).map(|i| (1.0 - self.turns[i]) * stroke(i));
@@ -75,7 +76,7 @@ impl<const N: usize> Links<N> {
         links
     }
 
-    /// The links between turning joints on axes, and the frame of the last joint as that of
+    /// The links between turning joints on given axes; the frame of the last joint is also that of
     /// the end.
     fn along(lines: &[ScrewAxis; N]) -> Self {
         let z = lines.map(|line| Vector3::from(line.h));
@@ -116,7 +117,7 @@ impl<const N: usize> Links<N> {
         }
     }
 
-    /// The same links between other ends: standing in a workstation and carrying a tool.
+    /// The same links with another base and another tool.
     pub(crate) fn between(&self, base: &Isometry3<f64>, tool: &Isometry3<f64>) -> Self {
         Self {
             first: Frame::from_isometry(base) * self.first,
@@ -146,13 +147,13 @@ impl<const N: usize> Links<N> {
         (x * x + y * y + z * z).sqrt()
     }
 
-    /// Goes along the links with the joints at `q` (rad, m).
+    /// Computes the positions along the links with the joints at `q` (rad, m).
     #[inline(always)]
     pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
         let mut frame = Moving::of(a, &self.first);
         let (mut points, mut axes) = ([frame.p; N], [frame.z; N]);
         for group in (0..N).step_by(4) {
-            // The last four overlap those before, so that there always are four.
+            // The last four overlap those before, so there are always four.
             let first = group.min(N - N.min(4));
             let (at, zero) = (four(a, &q.data.0[0], first), four(a, &self.zero, first));
             let angles = at.fma(four(a, &self.turns, first), zero);
@@ -174,7 +175,7 @@ impl<const N: usize> Links<N> {
     }
 }
 
-/// Four numbers of `N` from one on; of fewer than four all, and zeros.
+/// Four of `N` numbers, starting at one of them; filled with zeros if `N` is below four.
 #[inline(always)]
 fn four<A: Arith, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<A> {
     let (mut four, count) = ([0.0; 4], N.min(4));
@@ -182,14 +183,14 @@ fn four<A: Arith, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<
     F4::new(a, four)
 }
 
-/// The direction square to two axes about which the first turns into the second; along the
-/// way between them where they are parallel.
+/// The direction perpendicular to two axes, about which the first turns into the second; if they
+/// are parallel, the direction from one to the other.
 pub(crate) fn normal(from: &Vector3<f64>, to: &Vector3<f64>, way: &Vector3<f64>) -> Vector3<f64> {
     let across_from = |v: &Vector3<f64>| v - from * from.dot(v);
     let cross = from.cross(to);
     if cross.norm() > PARALLEL {
-        // The product of nearly parallel axes has few figures; again square to the first,
-        // it is square to both.
+        // The product of nearly parallel axes has few correct digits; made perpendicular to the
+        // first again, it is perpendicular to both.
         return across_from(&cross.normalize()).normalize();
     }
     let side = across_from(way);
@@ -199,7 +200,7 @@ pub(crate) fn normal(from: &Vector3<f64>, to: &Vector3<f64>, way: &Vector3<f64>)
     Vector3::from(across((*from).into()))
 }
 
-/// Sine below which two axes are parallel to rounding.
+/// Sine of the angle below which two axes count as parallel.
 const PARALLEL: f64 = 1e-14;
 
 /// The point of an axis that is nearest to `point`.

@@ -1,17 +1,17 @@
-//! How well an arm can move where it stands.
+//! How well an arm can move at a joint position.
 
 use crate::chain::Chain;
 use crate::ik::LENGTH;
 use nalgebra::{SMatrix, SVector};
 
-/// How well an arm can move at one joint position. Lengths count in units of
-/// 0.3 m, so that translations and rotations compare.
+/// How well an arm can move at one joint position. Lengths are in units of 0.3 m, so that
+/// translations and rotations can be compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dexterity {
     /// Product of the singular values.
     pub manipulability: f64,
-    /// Smallest singular value: tool motion for one unit of joint motion in the
-    /// direction that the arm does worst; zero where it is singular.
+    /// Smallest singular value: tool motion per unit of joint motion in the worst direction; zero
+    /// where the arm is singular.
     pub smallest: f64,
     /// Largest over smallest singular value; infinite where the arm is singular.
     pub condition: f64,

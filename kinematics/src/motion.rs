@@ -1,14 +1,14 @@
-//! What moving joints make of the tool: its derivatives to time, and bounds of those over a
-//! stretch of time.
+//! The tool's motion when the joints move: its time derivatives, and bounds of these over an
+//! interval of time.
 
 use nalgebra::{Isometry3, SVector, Vector3};
 
 use crate::Chain;
 
-/// Pose of the tool and its derivatives to time, in the frame that poses are given in.
+/// Pose of the tool and its time derivatives, in the frame that poses are given in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
-    /// Where the tool is.
+    /// Pose of the tool.
     pub pose: Isometry3<f64>,
     /// Velocity, acceleration and jerk of its origin (m/s, m/s², m/s³).
     pub linear: [Vector3<f64>; 3],
@@ -16,26 +16,26 @@ pub struct ToolMotion {
     pub angular: [Vector3<f64>; 3],
 }
 
-/// Bounds of Taylor coefficients of the tool's motion over a stretch of time of length `h`, each
-/// for every moment of the stretch as the place of expansion.
+/// Bounds of the Taylor coefficients of the tool's motion over an interval of time of length `h`,
+/// for an expansion at any time of the interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolGrowth {
-    /// Of the position: the norm of derivative `k`, times `h^k / k!` (m). The first is no bound of
-    /// the position but of what the links reach.
+    /// Of the position: the norm of derivative `k`, times `h^k / k!` (m). The first bounds the
+    /// length of the arm, not the position.
     pub linear: [f64; 9],
     /// Of the angular velocity: the norm of its derivative `k`, times `h^(k+1) / k!` (rad).
     pub angular: [f64; 8],
 }
 
 impl<const N: usize> Chain<N> {
-    /// Pose of the tool and its derivatives to time, from the joints and theirs: position,
-    /// velocity, acceleration and jerk (rad, rad/s, ...; metres for a joint that slides).
+    /// Pose of the tool and its time derivatives, from position, velocity, acceleration and jerk of
+    /// the joints (rad, rad/s, ...; metres for a joint that slides).
     ///
     /// # Source
     /// H. Bruyninckx and J. De Schutter, "Symbolic differentiation of the velocity mapping for a
     /// serial kinematic chain", Mech. Mach. Theory 31(2), 1996: a column of the Jacobian turns with
-    /// its link, and its lever grows by what the joints beyond it do. Here once more for the second
-    /// derivative, with sums over the joints beyond.
+    /// its link, and its lever changes with the joints after it. Applied here again for the second
+    /// derivative, with sums over the joints after it.
     #[must_use]
     pub fn motion(&self, [q, dq, ddq, dddq]: &[SVector<f64, N>; 4]) -> ToolMotion {
         let (pose, jacobian) = self.jacobian(q);
@@ -59,7 +59,7 @@ impl<const N: usize> Chain<N> {
             angular[0] += axis * dq[i];
             (turning[i], axes[i]) = ([angular[0], angular[1]], [axis, first]);
         }
-        // What the joints beyond the one at hand give the tool.
+        // What the joints after the current one contribute to the tool.
         let mut linear = [zero; 3];
         for i in (0..N).rev() {
             let (lever, [axis, axis_change]) = (column(i, 0), axes[i]);
@@ -80,10 +80,10 @@ impl<const N: usize> Chain<N> {
         }
     }
 
-    /// Bounds of the Taylor coefficients of the tool's motion over a stretch of time of length
+    /// Bounds of the Taylor coefficients of the tool's motion over an interval of time of length
     /// `h`, from those of the joints: `joints[k]` bounds the magnitude of derivative `k` of each
-    /// joint at every moment of the stretch, times `h^k / k!` (rad; metres for a joint that
-    /// slides). The joints are polynomials of degree five at most.
+    /// joint at every time of the interval, times `h^k / k!` (rad; metres for a joint that slides).
+    /// The joints are polynomials of degree five at most.
     ///
     /// Every link turns with the joints before it, so that coefficient `k` of its direction is at
     /// most coefficient `k` of `exp(sum of the angles)`, with bounds in place of coefficients.
@@ -98,7 +98,7 @@ impl<const N: usize> Chain<N> {
             linear: [0.0; 9],
             angular: [0.0; 8],
         };
-        // Of the sum of the angles so far, and of what they turn.
+        // Coefficients of the sum of the angles so far, and of the directions that they turn.
         let (mut angle, mut turned) = ([0.0; 9], [0.0; 9]);
         turned[0] = 1.0;
         for i in 0..N {

@@ -1,4 +1,4 @@
-//! How far an arm reaches, for people and messages.
+//! How far an arm reaches, for display and messages.
 
 use crate::chain::Chain;
 use crate::ik::restart;
@@ -8,17 +8,17 @@ use nalgebra::{Point3, SVector, Vector3};
 /// Reach of an arm, sampled evenly over its joint ranges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachMap {
-    /// Largest distance of the tool from axis 1's foot, the origin of the map, m.
+    /// Largest distance of the tool from the origin of the map, m.
     pub farthest: f64,
     /// Smallest such distance, m.
     pub nearest: f64,
-    /// Corner of the box round all tool positions, lowest coordinates, m.
+    /// Corner of the box around all tool positions, lowest coordinates, m.
     pub low: Point3<f64>,
     /// Opposite corner, m.
     pub high: Point3<f64>,
-    /// Middle value of the smallest singular value over the samples.
+    /// Median of the smallest singular value over the samples.
     pub typical_smallest: f64,
-    /// Share of samples (0 to 1) in each shell of equal thickness from distance 0 to
+    /// Fraction of samples (0 to 1) in each shell of equal thickness from distance 0 to
     /// [`ReachMap::farthest`].
     pub shells: [f64; 10],
 }

@@ -1,8 +1,8 @@
 //! From URDF text to the joints of one serial arm.
 //!
-//! The text is checked element by element first, so that every fault is named
-//! with its place; what passes goes through the loader of the crate `k`, reduced
-//! to the joints between root and tip. This is the only file that knows `k`.
+//! The text is checked element by element first, so that every error names the element and its
+//! place. Then the joints between root and tip are loaded with the crate `k`. This is the only file
+//! that uses `k`.
 //!
 //! URDF 1.2 attributes `acceleration`, `deceleration` and `jerk` of `<limit>` are
 //! read. Joints off the chain (gripper fingers, mimic joints) are ignored.
@@ -53,7 +53,8 @@ pub struct JointInfo {
     pub jerk: Option<f64>,
 }
 
-/// A serial arm read from a URDF: joints from root to tip with fixed ones folded in.
+/// A serial arm read from a URDF: the movable joints from root to tip; fixed joints are included in
+/// the frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// Name of the robot.
@@ -64,8 +65,8 @@ pub struct Model {
     pub tip_link: String,
     /// The movable joints, root first.
     pub joints: Vec<JointInfo>,
-    /// Pose of each joint in the frame of the joint before it (of the base for
-    /// the first) when that one stands at zero.
+    /// Pose of each joint in the frame of the joint before it (of the base for the first) when that
+    /// joint is at zero.
     pub frames: Vec<Isometry3<f64>>,
     /// Axis of each joint in its own frame.
     pub axes: Vec<Unit<Vector3<f64>>>,
@@ -163,7 +164,7 @@ impl Model {
     }
 }
 
-/// A URDF of nothing but the joints of the chain, numbers at full precision.
+/// A URDF with only the joints of the chain, numbers at full precision.
 struct Skeleton(String);
 
 impl Skeleton {

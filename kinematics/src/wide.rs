@@ -1,7 +1,7 @@
-//! Four numbers side by side, in each build of the arithmetic.
+//! Four numbers at once, in each build of the arithmetic.
 //!
-//! [`F4`] reads as mathematics and is one wide register in the wide build. It carries
-//! the proof of the build with it, so that no operation can be called elsewhere.
+//! [`F4`] has the usual operators and is one register in the SIMD build. It contains the proof of
+//! the build, so that its operations cannot be used on another processor.
 
 use crate::four::Four;
 use std::ops::{Add, BitAnd, BitXor, Div, Mul, Neg, Sub};
@@ -13,7 +13,7 @@ pub(crate) struct F4<A: Four> {
     v: A::F,
 }
 
-/// Four answers, yes or no.
+/// Four booleans.
 #[derive(Clone, Copy)]
 pub(crate) struct B4<A: Four> {
     a: A,
@@ -39,7 +39,7 @@ impl<A: Four> F4<A> {
         Self::new(a, [x; 4])
     }
 
-    /// The proof of the build that these numbers are in.
+    /// The proof of the build of these numbers.
     #[inline(always)]
     pub(crate) fn build(self) -> A {
         self.a
@@ -104,7 +104,7 @@ impl<A: Four> F4<A> {
         self.with(self.a.next(self.v))
     }
 
-    /// Whether the bit is set that is `BELOW` places below the sign.
+    /// Whether the bit is set that is `BELOW` places below the sign bit.
     #[inline(always)]
     pub(crate) fn bit<const BELOW: i32>(self) -> B4<A> {
         let a = self.a;
@@ -125,13 +125,13 @@ impl<A: Four> F4<A> {
 }
 
 impl<A: Four> B4<A> {
-    /// `yes` where so, else `no`.
+    /// `yes` where true, otherwise `no`.
     #[inline(always)]
     pub(crate) fn select(self, yes: F4<A>, no: F4<A>) -> F4<A> {
         yes.with(self.a.select(self.v, yes.v, no.v))
     }
 
-    /// Bit `i` is answer `i`.
+    /// Bit `i` is boolean `i`.
     #[inline(always)]
     pub(crate) fn bits(self) -> u8 {
         self.a.bits(self.v)

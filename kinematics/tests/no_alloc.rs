@@ -1,4 +1,4 @@
-//! Kinematics never touches the heap: counted by an allocator that counts.
+//! Kinematics does not use the heap; the allocator of this test counts the calls.
 #![allow(clippy::unwrap_used, reason = "a test may fail this way")]
 #![allow(unsafe_code, reason = "a counting allocator has to be one")]
 

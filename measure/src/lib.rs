@@ -1,10 +1,11 @@
-//! What `canter bench` and the benches measure: problems from a seed, their planning times and how
-//! good the motions are.
+//! Measurements for `canter bench` and the benchmarks: random problems from a seed, their planning
+//! times and the quality of the motions.
 //!
-//! [`otg`] plans random state-to-state problems, [`timing`] times random paths, [`smooth`] plans
-//! lists of poses in pure tool space, and a [`Trial`] plans one for a robot.
+//! [`otg`] plans random state-to-state problems, [`timing`] computes time laws of random paths,
+//! [`smooth`] plans lists of poses for a tool without an arm, and a [`Trial`] plans a list for a
+//! robot.
 //!
-//! This crate never decides anything: it calls what the library crates show to everybody.
+//! This crate only calls the public functions of the library crates.
 #![forbid(unsafe_code)]
 
 pub mod otg;

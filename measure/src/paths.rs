@@ -1,4 +1,4 @@
-//! Random paths for benches and tests, the same for the same seed.
+//! Random paths for benchmarks and tests, the same for the same seed.
 
 use nalgebra::SVector;
 use trajectory::{JointLimits, SplinePath};

@@ -7,7 +7,6 @@
 
 use std::time::Instant;
 
-use kinematics::Solver;
 use nalgebra::{Isometry3, SVector, Translation3, Vector3};
 use planner::motion::{PlannedMove, Planner};
 use planner::robot::{Robot, RobotError, vector};
@@ -85,7 +84,7 @@ impl Trial {
         };
         let mut reason = "the first pose is out of reach".to_owned();
         let mut planning = 0.0;
-        for start in starts(&planner, first, &home) {
+        for start in planner.postures(first, &home).into_iter().take(STARTS) {
             let clock = Instant::now();
             let planned = planner.plan(&motion, &start);
             planning = clock.elapsed().as_secs_f64();
@@ -146,21 +145,6 @@ impl Trial {
             ..Measure::unplanned(self.poses.len(), reason)
         }
     }
-}
-
-/// Configurations that hold the flange at `pose`, the nearest to `home` first.
-fn starts<const N: usize>(
-    planner: &Planner<N>,
-    pose: &Isometry3<f64>,
-    home: &SVector<f64, N>,
-) -> Vec<SVector<f64, N>> {
-    let solver = Solver::new(*planner.chain());
-    let mut starts: Vec<_> = solver.solve_all(pose).iter().map(|b| b.q).collect();
-    starts.extend(solver.nearest(pose, home).map(|solution| solution.q));
-    starts.sort_by(|a, b| (a - home).norm().total_cmp(&(b - home).norm()));
-    starts.dedup_by(|a, b| (*a - *b).amax() < 1e-6);
-    starts.truncate(STARTS);
-    starts
 }
 
 #[cfg(test)]

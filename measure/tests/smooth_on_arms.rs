@@ -1,4 +1,4 @@
-//! The motion suite laid before real arms, under their joint limits.
+//! The motion suite planned for shipped arms, under their joint limits.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 #[path = "../../trajectory/tests/suite/mod.rs"]

@@ -1,4 +1,5 @@
-//! Makes many kits with a simulated arm and prints what a kit costs at the start and at the end.
+//! Makes many kits with a simulated arm and prints the computing time per kit at the start and at
+//! the end.
 //!
 //! `cargo run --release -p plan --example many_kits -- 1000`
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example")]

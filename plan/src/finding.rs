@@ -1,4 +1,4 @@
-//! What the readers and checkers of plans find: code, message, place.
+//! Findings of the readers and checkers of plans: code, message, place.
 
 use std::ops::Range;
 

@@ -11,12 +11,14 @@
 //!
 //! - [`world`]: what is where. [`world::Model`] is plain data; only [`world::Writer`] writes.
 //! - [`kitting`]: the kitting process plan language.
-//! - [`run`]: executing kitting plans, with [`run::Motion`] and [`run::Factotum`] as seams.
+//! - [`run`]: executing kitting plans; [`run::Motion`] and [`run::Factotum`] are the interfaces to
+//!   arm and factotum.
 //! - [`pddl`]: PDDL plans, domains and problems, and the table of actions.
 //! - [`interp`]: the five-function interface by which a controller pulls a plan.
 //!
 //! This crate never moves an arm itself, has no threads and no shared memory, knows no robot, and
-//! never writes to the database outside a controller. Inside, lengths are metres and angles radians.
+//! writes to the database only through a controller. Inside the crate, lengths are in metres and
+//! angles in radians.
 
 pub mod error;
 pub mod finding;

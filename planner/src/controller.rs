@@ -1,4 +1,4 @@
-//! One arm on its way through a program: modes, planner and the pose reached so far.
+//! The state of one arm during a program: modes, planner and the joints reached so far.
 
 use std::any::Any;
 

@@ -1,4 +1,4 @@
-//! From a joint count known at run time to one known at compile time.
+//! Calls generic code with a joint count that is known only at run time.
 
 /// Runs the body with the constant `N` equal to the first argument, 1 to 8.
 ///

@@ -1,4 +1,4 @@
-//! The dry run: a whole program through the same planner, without an arm.
+//! The dry run: plans a whole program with the same planner, without an arm.
 
 use crcl::{LengthUnit, Program};
 use kinematics::Chain;

@@ -1,4 +1,4 @@
-//! What an arm can carry: end effectors, their grippers, the changer that holds them.
+//! End effectors of an arm, their grippers, and the tool changer.
 
 use nalgebra::Isometry3;
 

@@ -1,9 +1,9 @@
-//! From a canonical command to a trajectory that is certified to keep all limits.
+//! Plans, for a canonical command, a trajectory that is certified to keep all limits.
 //!
-//! A command loses its modes in [`modal`] and is planned whole in [`motion`]. The [`controller`]
-//! holds both together and knows where the arm is after each command; the [`dry_run`] and a real
-//! run both stand on it. [`way`] plans the commands of a plan, which leave the way open. [`recorded`]
-//! judges a recorded motion by the program that was to be done.
+//! [`modal`] applies the modes to a command, [`motion`] plans it as a whole. The [`controller`]
+//! uses both and knows where the arm is after each command; the [`dry_run`] and a real run both use
+//! it. [`way`] plans the commands of a plan, which leave the way open. [`recorded`] checks a
+//! recorded motion against its program.
 //!
 //! This crate is a pure function of robot, program and start: it never starts a thread, reads a
 //! clock, touches shared memory, prints, or reads an environment variable. Only [`robot`] reads

@@ -1,6 +1,5 @@
-//! The robot: a folder with `robot.urdf` (shape, joint limits) and `robot.toml`
-//! (what a URDF cannot say: acceleration and jerk, tool limits, where it stands,
-//! what it carries, its home position).
+//! The robot: a folder with `robot.urdf` (shape, joint limits) and `robot.toml` (what a URDF does
+//! not have: acceleration and jerk, tool limits, pose of the base, end effectors, home position).
 //!
 //! Robots that come with Canter are part of the binary; [`load`] finds them by
 //! name, and any other by its folder.

@@ -1,5 +1,5 @@
-//! The way of a move that a plan leaves open: how a command of a plan is made so that the arm keeps
-//! above the workstation and can go it at all.
+//! Chooses the path of a move that a kitting plan leaves open, so that the arm stays above the
+//! workstation and the path is possible.
 
 use crcl::{Command, Pose};
 

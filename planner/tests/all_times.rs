@@ -1,4 +1,4 @@
-//! Certificates of random moves on shipped robots, held against dense samples.
+//! Certificates of random moves on shipped robots, compared with dense samples.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,

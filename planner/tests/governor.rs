@@ -1,5 +1,5 @@
-//! Whatever the operator asks and whenever: a program of a real robot keeps its joint limits, its
-//! tool stays on the planned path, and what the certificate promised of tolerances holds.
+//! Whatever the operator asks at any time: a program of a shipped robot keeps its joint limits, its
+//! tool stays on the planned path, and the tolerances of the certificate hold.
 //!
 //! `CANTER_CASES` sets the number of random sequences; the long run is 10 000.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]

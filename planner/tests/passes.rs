@@ -1,4 +1,4 @@
-//! How smooth moves pass their poses, held against the motion itself.
+//! The reported passes of smooth moves, compared with the motion itself.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};

@@ -1,4 +1,4 @@
-//! Moves to where the arm is already.
+//! Moves to where the arm already is.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use crcl::{Command, LengthUnit, Pose};

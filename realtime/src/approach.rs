@@ -1,4 +1,4 @@
-//! How one number reaches another with bounded rate and bounded rate of rate.
+//! Moves a number to a target with bounded first and second derivative.
 
 /// How fast a number may change.
 #[derive(Clone, Copy, Debug, PartialEq)]

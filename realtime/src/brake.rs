@@ -1,4 +1,4 @@
-//! A stop of each joint by itself: the last resort, when the path cannot be followed any more.
+//! Stops each joint independently: used only when the path cannot be followed any more.
 
 use nalgebra::SVector;
 

@@ -1,10 +1,10 @@
-//! The planned motion that the cycle has at hand.
+//! The planned motion that the cycle has received.
 
 use nalgebra::SVector;
 
 use crate::{Piece, Sample, Segment};
 
-/// What became of a segment that was pushed.
+/// Result of pushing a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pushed {
     /// It is in the buffer.
@@ -118,8 +118,8 @@ impl<const N: usize, const B: usize> Buffer<N, B> {
         self.ends > 0
     }
 
-    /// The place `by` (s) after `from`, not beyond the end of the command or of the buffer; says
-    /// also whether the place is the end of what is in the buffer without being the command's.
+    /// The place `by` (s) after `from`, not beyond the end of the command or of the buffer. Also
+    /// says whether that place is the end of the buffer but not of the command.
     pub(crate) fn advance(&self, from: Cursor, by: f64) -> (Cursor, bool) {
         let mut at = Cursor {
             index: from.index,

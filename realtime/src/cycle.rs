@@ -8,16 +8,16 @@ use crate::governor::{Aim, Governor, Outlook, StopCategory, scale};
 use crate::guard::{Trip, check};
 use crate::{Limits, Sample, Segment};
 
-/// What the operator or a fault wants of the motion.
+/// What the operator or a fault demands of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Demand {
-    /// Go along the path with this share of the planned speed, 0..=1.
+    /// Move along the path at this fraction of the planned speed, 0..=1.
     Run(f64),
     /// Stop on the path and wait.
     Stop(StopCategory),
 }
 
-/// What one period gave.
+/// The result of one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<const N: usize> {
     /// The setpoint.
@@ -50,14 +50,14 @@ enum Mode {
     Brake,
 }
 
-/// Planned time that must be at hand before a command starts whose end is not (s).
+/// Planned time that must be in the buffer before a command starts whose end is not in it (s).
 const START_HORIZON: f64 = 1.0;
 
-/// Below this much planned time at hand the path factor falls in proportion (s).
+/// With less planned time than this in the buffer, the path factor falls in proportion (s).
 const LOW_HORIZON: f64 = 0.5;
 
-/// The motion of an arm of `N` joints, one setpoint a period, with room for `B` planned segments.
-/// It lives in the real-time thread; nothing it does allocates, waits or fails.
+/// The motion of an arm of `N` joints, one setpoint per period, with room for `B` planned segments.
+/// It is used in the real-time thread: it does not allocate, wait or fail.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -225,7 +225,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         }
     }
 
-    /// Starts the next command if there is one and it may.
+    /// Starts the next command, if there is one and it may start.
     fn start(&mut self, demand: Demand) -> Option<u32> {
         let Demand::Run(share) = demand else {
             return None;
@@ -281,7 +281,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         (scale(&segment.piece.sample(at.offset), pace), None)
     }
 
-    /// What the path factor shall become.
+    /// The target of the path factor.
     fn aim(&self, demand: Demand) -> Aim {
         let (target, category) = match demand {
             Demand::Run(share) if share.is_finite() => {

@@ -1,12 +1,12 @@
 //! The one mechanism for pause, resume, override, stop and starvation: the speed along the path.
 //!
-//! The path factor `l` is how much planned time passes in a second, `r` its rate, `u` the rate of
-//! the rate, constant within a period. With `q', q'', q'''` the derivatives of the plan to planned
-//! time, a joint's velocity is `q' l`, its acceleration `q'' l² + q' r` and its jerk
-//! `q''' l³ + 3 q'' l r + q' u`. The plan keeps the limits at `l = 1`, so any constant `l <= 1`
-//! keeps them too: that is the safe state. Each period the governor takes the strongest `u`
+//! The path factor `l` is planned time per time (time scaling), `r` its derivative, `u` the
+//! derivative of `r`, constant within a period. With `q', q'', q'''` the derivatives of the plan
+//! with respect to planned time, a joint's velocity is `q' l`, its acceleration `q'' l² + q' r` and
+//! its jerk `q''' l³ + 3 q'' l r + q' u`. The plan keeps the limits at `l = 1`, so any constant `l
+//! <= 1` keeps them too: that is the safe state. Each period the governor takes the strongest `u`
 //! towards its target for which a simulation shows that `r` can be brought back to zero within all
-//! limits; where none passes, it goes on with the ramp that was shown to be safe a period before.
+//! limits; if none passes, it continues the ramp that was shown to be safe a period before.
 //!
 //! # Source
 //! The scheme is a reference governor with a verified fallback: E. Gilbert, I. Kolmanovsky,
@@ -23,8 +23,8 @@ use crate::{Limits, Sample};
 /// How hard the path factor is changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopCategory {
-    /// For pause, resume, override: a full stop takes about a third of a second where the joints
-    /// can.
+    /// For pause, resume, override: a full stop takes about a third of a second if the joint limits
+    /// allow it.
     Gentle,
     /// For stops: as fast as the joints can.
     Fast,
@@ -57,13 +57,13 @@ const LOOK_AHEAD: f64 = 0.064;
 /// How many samples of a ramp are simulated at most.
 const SAMPLES: f64 = 64.0;
 
-/// Shares of the wanted change that are tried, strongest first.
+/// Fractions of the wanted change that are tried, strongest first.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.15];
 
 /// The path factor with its rate, and the ramp to rate zero that was shown to be safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Governor {
-    /// Planned seconds a second, 0..=1.
+    /// Planned seconds per second, 0..=1.
     pub(crate) factor: f64,
     /// Its rate (1/s).
     pub(crate) rate: f64,
@@ -87,7 +87,7 @@ pub(crate) struct Outlook<'a, const N: usize, const B: usize> {
     pub(crate) limits: &'a Limits<N>,
 }
 
-/// A way on: the rate after this period, and how many periods the ramp to zero takes from there.
+/// A candidate: the rate after this period, and how many periods the ramp to zero takes from there.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     rate: f64,
@@ -142,7 +142,7 @@ impl Governor {
         passed.max(0.0)
     }
 
-    /// The strongest candidate that the simulation passes, else the ramp that was passed before.
+    /// The strongest candidate that passes the simulation, otherwise the ramp that passed before.
     fn choose<const N: usize, const B: usize>(
         &self,
         outlook: &Outlook<'_, N, B>,
@@ -177,8 +177,8 @@ impl Governor {
         }
     }
 
-    /// Bounds of the rate and its rate that leave the joints within acceleration and jerk, as far
-    /// as can be said from this place alone.
+    /// Bounds of the rate and its derivative that keep the joints within acceleration and jerk,
+    /// computed at this place alone.
     fn bounds<const N: usize, const B: usize>(
         &self,
         outlook: &Outlook<'_, N, B>,
@@ -266,14 +266,15 @@ fn ramp_is_safe<const N: usize, const B: usize>(
     keeps(outlook, at, pace)
 }
 
-/// Whether the joints keep velocity, acceleration and jerk at a place with a pace. A joint whose
-/// plan alone is at the limit may stay there.
+/// Whether the joints keep velocity, acceleration and jerk at a place with a given state of the
+/// path factor. A joint that the plan itself has at its limit may stay there.
 fn keeps<const N: usize, const B: usize>(
     outlook: &Outlook<'_, N, B>,
     at: Cursor,
     pace: ScalingState,
 ) -> bool {
-    // The limits hold between the samples of a simulation too; there, jerk has its peaks.
+    // The limits must hold between the samples of a simulation too; the peaks of the jerk are
+    // there.
     const MARGIN: f64 = 0.97;
     let Some(plan) = outlook.buffer.sample(at) else {
         return false;
@@ -299,7 +300,7 @@ fn keeps<const N: usize, const B: usize>(
     })
 }
 
-/// A plan's sample as motion in time, for a path factor with its rate and the rate of that.
+/// A sample of the plan as motion in time, for a path factor with its first and second derivative.
 pub(crate) fn scale<const N: usize>(plan: &Sample<N>, [l, r, u]: [f64; 3]) -> Sample<N> {
     Sample {
         position: plan.position,

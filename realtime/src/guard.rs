@@ -1,11 +1,11 @@
-//! The last check before a setpoint leaves, and the check of what came back.
+//! The last check of each setpoint before it is published, and the check of the measured state.
 
 use nalgebra::SVector;
 
 use crate::piece::of;
 use crate::{Limits, Sample};
 
-/// What a trip is about.
+/// The quantity whose limit was broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// A number that is not finite.
@@ -63,10 +63,10 @@ pub struct Trip {
     pub limit: f64,
 }
 
-/// Room for rounding, as a share of a limit.
+/// Tolerance for rounding, as a fraction of a limit.
 const ROUNDING: f64 = 1e-3;
 
-/// Room for rounding of positions (rad).
+/// Tolerance for rounding of positions (rad).
 const POSITION_ROUNDING: f64 = 1e-6;
 
 /// What is wrong with going from the setpoint `previous` to `next` within `period` (s): numbers

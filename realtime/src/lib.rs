@@ -1,13 +1,13 @@
-//! What runs once in every control period: no heap, no lock, no failure.
+//! The computation of every control period: no heap, no lock, no failure.
 //!
-//! A [`Piece`] is one polynomial piece of a joint motion, a [`Segment`] is a piece on its way from
-//! the planner to the cycle, a [`Sample`] is what a motion says at one instant. A [`Cycle`] turns
-//! segments into one setpoint a period: it evaluates the piece, scales time along the path for
+//! A [`Piece`] is one polynomial piece of a joint motion, a [`Segment`] is a piece that the planner
+//! sends to the cycle, a [`Sample`] is the value of a motion at one time. A [`Cycle`] turns
+//! segments into one setpoint per period: it evaluates the piece, scales time along the path for
 //! pause, resume, override, stop and starvation, and checks each setpoint against the one before
-//! ([`check`]). [`brake`] is the last resort when there is no path any more.
+//! ([`check`]). [`brake`] stops the joints when the path cannot be followed any more.
 //!
-//! This crate never allocates, locks, logs, reads a clock, does input or output, returns a
-//! `Result` or loops without a bound. A bad moment is a value.
+//! This crate never allocates, locks, logs, reads a clock, does input or output, returns a `Result`
+//! or loops without a bound. What goes wrong is returned as a value.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(

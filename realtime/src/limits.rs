@@ -1,4 +1,4 @@
-//! What the joints may do, whatever anyone asks.
+//! Limits of the joints.
 
 use nalgebra::SVector;
 

@@ -29,7 +29,7 @@ impl<const N: usize> Sample<N> {
     }
 }
 
-/// The value of one joint; not a number where there is no such joint.
+/// The value of one joint; NaN if there is no such joint.
 pub(crate) fn of<const N: usize>(values: &SVector<f64, N>, joint: usize) -> f64 {
     values.get(joint).copied().unwrap_or(f64::NAN)
 }
@@ -127,8 +127,8 @@ impl<const N: usize> Piece<N> {
         }
     }
 
-    /// What the piece says at `t` (s from its start). The polynomial is evaluated as it is, also
-    /// outside of `0..=duration`.
+    /// The sample at `t` (s from the start of the piece). The polynomial is evaluated as it is,
+    /// also outside of `0..=duration`.
     pub fn sample(&self, t: f64) -> Sample<N> {
         let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
         Sample {
@@ -140,7 +140,7 @@ impl<const N: usize> Piece<N> {
     }
 }
 
-/// A piece on its way from the planner to the cycle, over a wait-free ring.
+/// A piece that the planner sends to the cycle, through a wait-free ring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment<const N: usize> {
     /// The motion.

@@ -1,4 +1,4 @@
-//! Laws of the path factor: whatever the operator asks and whenever, every setpoint keeps the
+//! Properties of the path factor: whatever the operator asks at any time, every setpoint keeps the
 //! joint limits and lies on the planned path.
 #![allow(
     clippy::unwrap_used,

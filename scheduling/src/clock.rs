@@ -1,4 +1,4 @@
-//! The clock of the messages, and sleeping by it.
+//! The clock that times in messages use, and sleeping until a time of it.
 
 /// The time of `CLOCK_MONOTONIC` (ns): the clock of every time in a message. It never jumps.
 pub fn now_ns() -> u64 {

@@ -1,8 +1,8 @@
-//! What a process with deadlines asks of the operating system: the clock of the messages, and
-//! real-time scheduling of its threads.
+//! Services of the operating system for processes with deadlines: the clock that times in messages
+//! use, and real-time scheduling of threads.
 //!
-//! Engine, drivers and tests stand on it alike, so it depends on nothing of ours. This crate never
-//! knows a robot, a message or a period.
+//! Engine, drivers and tests use it, so it depends on no other crate of Canter. This crate knows no
+//! robot, no message and no period.
 
 mod clock;
 mod real_time;

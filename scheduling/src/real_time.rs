@@ -1,4 +1,4 @@
-//! What a thread with deadlines asks of the operating system.
+//! Real-time scheduling of a thread with deadlines.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! What the real-time thread needs to know, and why it may not start.
+//! Configuration of the real-time thread, and why it cannot start.
 
 use core::time::Duration;
 

@@ -1,6 +1,6 @@
-//! What an operator may ask while the arm moves.
+//! Requests of an operator while the arm moves.
 
-/// What an operator may ask while the arm moves. It acts in the next period.
+/// A request of an operator while the arm moves. It acts in the next period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
     /// Stop on the path and wait for [`Control::Resume`].

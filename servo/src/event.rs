@@ -1,4 +1,4 @@
-//! What the real-time thread reports.
+//! Events that the real-time thread reports.
 
 use core::fmt;
 

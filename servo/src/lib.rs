@@ -1,14 +1,14 @@
 //! The real-time thread and its link to the driver.
 //!
 //! [`Executor::start`] opens a session with the driver and starts the thread. Beside the
-//! [`Executor`] itself there are three ends, each for one thread of the engine: a [`SegmentSender`] for
-//! the planner (segments and tool orders, in order), a [`Remote`] for anyone (pause, override,
-//! stop, where the arm is; [`Steering`] is the part of it that knows no joints), and a [`Monitor`]
-//! for reports (events, samples).
+//! [`Executor`] there are three handles: a [`SegmentSender`] for the planner (segments and tool
+//! orders, in order), a [`Remote`] for any thread (pause, override, stop, position of the arm;
+//! [`Steering`] is its part that does not depend on the number of joints), and a [`Monitor`] for
+//! reports (events, samples).
 //!
-//! The thread never plans and never waits for any of them: what it gets comes through wait-free
-//! rings and atomics. When the planner is late, the arm stops on the path; when the driver is
-//! silent, the arm is stopped on the path and the fault latches until [`Remote::recover`].
+//! The thread never plans and never waits for any of them: it receives everything through wait-free
+//! rings and atomics. If the planner is late, the arm stops on the path. If the driver sends no
+//! states, the arm stops on the path and the fault latches until [`Remote::recover`].
 #![forbid(unsafe_code)]
 #![deny(
     clippy::indexing_slicing,

@@ -1,4 +1,4 @@
-//! What the real-time thread reports, for its reader.
+//! Reads what the real-time thread reports.
 
 use rtrb::Consumer;
 

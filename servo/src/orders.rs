@@ -1,8 +1,8 @@
-//! What is asked of the real-time thread, and what it has made of it: atomics only.
+//! Orders to the real-time thread and its progress, in atomics only.
 //!
-//! An order is one store. It passes through no thread that plans, prints or serves, it needs no
-//! lock, and the real-time thread sees it in its next period. Orders are numbered, so that who
-//! gave one can see when it acts: [`Steering::progress`].
+//! An order is one atomic operation. It goes through no thread that plans, prints or serves, it
+//! needs no lock, and the real-time thread reads it in its next period. Orders are numbered, so
+//! that the thread that gave one can see when it acts: [`Steering::progress`].
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
 use std::sync::Arc;

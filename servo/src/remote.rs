@@ -1,4 +1,4 @@
-//! Everybody's grip on the real-time thread: atomics that it reads and writes each period.
+//! Control and status of the real-time thread: atomics that it reads and writes in each period.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! The way of planned work to the real-time thread.
+//! Sends planned segments and tool orders to the real-time thread.
 
 use std::sync::Arc;
 

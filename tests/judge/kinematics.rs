@@ -1,4 +1,5 @@
-//! State of the tool from states of the joints, by `k`'s frames and the recursion over the links.
+//! State of the tool from states of the joints, with the frames of `k` and the recursion over the
+//! links.
 
 use k::nalgebra::{Isometry3, Vector3};
 

@@ -1,4 +1,4 @@
-//! The laws that a planned program is judged by, from its samples alone.
+//! The rules that a planned program is checked against, from its samples alone.
 
 use k::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use planner::dry_run::{Plan, PlanSample, PlannedCommand};

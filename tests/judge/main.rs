@@ -1,5 +1,5 @@
-//! A judge of planned programs: random programs on every shipped robot, judged from samples, URDF
-//! and robot.toml alone, with `k` and arithmetic of its own.
+//! Checks random planned programs on every shipped robot, from samples, URDF and robot.toml alone,
+//! with `k` and its own arithmetic.
 //!
 //! `CANTER_JUDGE_PROGRAMS` sets the number of programs per robot, `CANTER_JUDGE_SEED` the first
 //! seed.

@@ -1,4 +1,4 @@
-//! Random programs for an arm, with what they mean in SI units.
+//! Random programs for an arm, with their meaning in SI units.
 
 use crcl::{AngleUnit, Command, LengthUnit, Pose};
 use k::nalgebra::{Isometry3, UnitQuaternion, Vector3};

@@ -48,20 +48,6 @@ impl Tally {
         self.at_most(law, if holds { 0.0 } else { 1.0 }, 0.5);
     }
 
-    /// Takes in what another one counted.
-    pub(crate) fn merge(&mut self, other: Tally) {
-        for (law, counts) in other.laws {
-            let entry = self.laws.entry(law).or_default();
-            entry.judged += counts.judged;
-            entry.broken += counts.broken;
-            entry.worst = entry.worst.max(counts.worst);
-        }
-        self.faults.extend(other.faults);
-        self.programs += other.programs;
-        self.moves += other.moves;
-        self.refused += other.refused;
-    }
-
     /// How many laws were broken.
     pub(crate) fn broken(&self) -> usize {
         self.laws.values().filter(|law| law.broken > 0).count()

@@ -1,4 +1,5 @@
-//! The simulated driver keeps every clause of the protocol; the kit sees a driver that does not.
+//! The simulated driver follows every clause of the protocol; the conformance test detects a driver
+//! that does not.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;

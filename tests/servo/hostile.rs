@@ -1,5 +1,5 @@
-//! Drivers that lie, as real processes: the engine latches a fault and brings the arm to rest; what
-//! it publishes keeps every limit. An engine and a driver that do not fit say so.
+//! Drivers that send wrong states, as real processes: the engine latches a fault and stops the arm;
+//! its setpoints keep every limit. An engine and a driver that do not match report it.
 
 use std::thread;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! In step with the driver: as fast as both can, and the same every time.
+//! Lock-step: as fast as both sides can, with the same result every time.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;

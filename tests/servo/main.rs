@@ -1,4 +1,4 @@
-//! The servo loop from outside: engine, shared memory and driver together.
+//! Tests of the servo loop as a whole: engine, shared memory and driver.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 

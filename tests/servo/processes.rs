@@ -1,7 +1,7 @@
-//! Faults done to real processes: what the driver received is the witness.
+//! Faults of real processes, checked by what the driver received.
 //!
-//! Each test starts an engine and a driver as processes of their own, does something to one of
-//! them, and reads the driver's log: no setpoint ever breaks a limit of a joint, whatever dies.
+//! Each test starts an engine and a driver as separate processes, kills or stops one of them, and
+//! reads the driver's log: no setpoint ever breaks a limit of a joint.
 
 use std::thread;
 use std::time::{Duration, Instant};

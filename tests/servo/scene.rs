@@ -1,4 +1,4 @@
-//! An engine and a driver as processes of their own, and what the driver received.
+//! An engine and a driver as separate processes, and what the driver received.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
-//! The real-time thread's work on a virtual clock, with an ideal driver: what happens when is
-//! exact.
+//! The work of the real-time thread on a virtual clock, with an ideal driver: all times are exact.
 
 mod orders;
 

@@ -1,4 +1,4 @@
-//! By the clock, with the driver in a thread of the same process.
+//! Tests by the wall clock, with the driver in a thread of the same process.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;

@@ -1,9 +1,9 @@
-//! Tests of foreign files: programs, plans and workstations of NIST.
+//! Tests with files from outside the repository: programs, plans and workstations of NIST.
 //!
-//! They lie in a folder beside the repository, `../shared`, which a clone does not have. Where it is
-//! missing these tests are reported as ignored; every law that they test is also tested on files of
-//! the repository. A test harness of its own (`libtest-mimic`) is needed because an ordinary test
-//! cannot become ignored when it runs.
+//! The files are in a folder beside the repository, `../shared`, which a clone does not have. If it
+//! is missing, these tests are reported as ignored; every property that they test is also tested on
+//! files of the repository. The separate test harness (`libtest-mimic`) is needed because an
+//! ordinary test cannot become ignored at run time.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(dead_code, reason = "helpers that the other tests use")]

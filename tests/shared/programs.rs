@@ -1,4 +1,4 @@
-//! NIST's own program files parse, or give the diagnostic that their fault deserves.
+//! NIST's program files parse, or give the finding that fits their error.
 
 use crcl::{ReadOptions, Reading, code, text};
 

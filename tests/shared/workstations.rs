@@ -1,4 +1,4 @@
-//! NIST's workstations, as the kitting viewer has them.
+//! NIST's workstations, from the kitting viewer.
 
 use plan::finding::Severity;
 use plan::world::{Model, check, export_json, export_toml, import_json, import_nist, import_toml};

@@ -1,4 +1,4 @@
-//! An arm as an oracle sees it: the shipped files read anew, forward kinematics by `k`.
+//! An arm for oracle tests: the shipped files read independently, forward kinematics by `k`.
 
 use std::fs;
 

@@ -1,4 +1,5 @@
-//! A domain of its own for each test process, so that no test sees another Canter of this user.
+//! A separate domain for each test process, so that no test sees another Canter process of this
+//! user.
 
 use std::fs;
 use std::path::{Path, PathBuf};

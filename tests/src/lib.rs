@@ -1,7 +1,7 @@
 //! Fixtures of the system tests; the tests themselves are in `suite/`.
 //!
-//! A test here sees Canter from outside: whole programs, real processes, the repository's own
-//! rules. The laws of one crate are tested in that crate.
+//! These tests use Canter from outside: whole programs, real processes, rules of the repository.
+//! Properties of one crate are tested in that crate.
 
 pub mod arm;
 pub mod domain;

@@ -1,8 +1,8 @@
-//! Re-checks a recorded motion against its program, from the recorded samples alone: forward
-//! kinematics by `k`, finite differences, an own reading of the modes of the language.
+//! Checks a recorded motion against its program, from the recorded samples alone: forward
+//! kinematics by `k`, finite differences, an independent reading of the modes of the language.
 //!
-//! Nothing of the engine, the planner or the kinematics of Canter is used, so a fault there cannot
-//! hide itself here.
+//! Nothing of the engine, the planner or the kinematics of Canter is used, so an error there cannot
+//! hide itself.
 
 use crcl::{Command, Pose};
 use k::nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -1,4 +1,4 @@
-//! What a robot was told, judged in every period at the driver's output.
+//! Checks what the driver sends to the robot, in every period.
 
 use std::fmt::Write as _;
 use std::fs::File;

@@ -1,8 +1,8 @@
 //! How long a stop takes, measured from outside by an observer of the setpoints.
 //!
-//! A measurement and not a test: it takes long, wants the machine for itself and asserts only that
-//! every stop acts. `cargo test -p system-tests --release --test stops -- --ignored --nocapture`
-//! prints a table; `CANTER_STOPS` says how many stops of each kind, 20 if it is not set.
+//! A measurement and not a test: it takes long, needs an idle machine and asserts only that every
+//! stop acts. `cargo test -p system-tests --release --test stops -- --ignored --nocapture` prints a
+//! table; `CANTER_STOPS` says how many stops of each kind, 20 if it is not set.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 

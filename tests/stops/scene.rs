@@ -1,4 +1,4 @@
-//! An engine with something to do, and what makes its life hard.
+//! An engine that moves an arm, and the load beside it (a busy planner, a full pipe, busy clients).
 
 use std::io::Write;
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};

@@ -1,4 +1,4 @@
-//! Who sees all setpoints of an arm, and says when it became slower.
+//! Reads all setpoints of an arm and finds when it became slower.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};

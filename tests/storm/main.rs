@@ -1,6 +1,6 @@
-//! A storm: random stalls and kills of engine and driver in motion, as real processes, judged at the
-//! driver's output. `STORM=1000 ARMS=8 cargo test --test storm -- --ignored --nocapture` for the
-//! long one; `SEED` begins it elsewhere.
+//! Random stalls and kills of engine and driver in motion, as real processes, checked at the
+//! driver's output. The long run: `STORM=1000 ARMS=8 cargo test --test storm -- --ignored
+//! --nocapture`; `SEED` sets the seed.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod peer;

@@ -1,4 +1,4 @@
-//! An engine or a driver as a process of its own.
+//! An engine or a driver as a separate process.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};

@@ -1,4 +1,4 @@
-//! One arm in the storm.
+//! One arm in the test of random stalls and kills.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,4 +1,5 @@
-//! The arrows between the crates point down only, and some crates of others stay in one place.
+//! Crates depend on each other only as listed here, and some external crates are used in one place
+//! only.
 
 use std::fs;
 

@@ -1,7 +1,7 @@
-//! Bad inputs: each gives its own clear message and exit code, and moves nothing.
+//! Wrong inputs: each gives its own clear message and exit code, and moves nothing.
 //!
-//! The inputs and what is said about them are in `tests/data/bad_inputs`; `UPDATE_EXPECT=1` rewrites
-//! what is said. Inputs that are long or no text are made here.
+//! The inputs and the expected messages are in `tests/data/bad_inputs`; `UPDATE_EXPECT=1` rewrites
+//! the messages. Inputs that are long or not text are made here.
 
 use expect_test::expect_file;
 use system_tests::repository::{files, root};

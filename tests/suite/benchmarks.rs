@@ -1,4 +1,4 @@
-//! `canter bench` and `canter verify` as a user meets them.
+//! `canter bench` and `canter verify` as a user runs them.
 
 use serde_json::Value;
 

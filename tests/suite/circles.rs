@@ -1,5 +1,5 @@
-//! Inside a crate, modules stand on each other without circles: whoever reads one need not have
-//! read the other first.
+//! Modules of one crate do not depend on each other in circles, so each can be read after those it
+//! uses.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,4 @@
-//! The command line as a user meets it: what it answers, where, and with which exit code.
+//! The command line as a user runs it: what it prints, to which stream, and with which exit code.
 
 use crate::canter::{canter, canter_reading};
 

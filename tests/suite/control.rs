@@ -1,5 +1,5 @@
-//! Who stops the arm waits for nobody: not for the planner, not for a reader of the output, not
-//! for a note that has passed.
+//! Stopping the arm waits neither for the planner, nor for a reader of the output, nor for a note
+//! that has passed.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};

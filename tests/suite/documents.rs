@@ -1,4 +1,4 @@
-//! What the documents for users show is true.
+//! The examples in the documents for users are correct.
 
 use system_tests::repository::root;
 

@@ -1,4 +1,4 @@
-//! Every row of `docs/faults.md` is a test that exists.
+//! Every row of `docs/faults.md` names a test that exists.
 
 use system_tests::repository::root;
 

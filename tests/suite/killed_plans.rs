@@ -1,4 +1,4 @@
-//! Runs of plans that end by `kill -9` or by Ctrl-C, and go on with `--resume`.
+//! Runs of plans that end by `kill -9` or by Ctrl-C, and are continued with `--resume`.
 //!
 //! `CANTER_KILLS` sets how many dry runs are killed, `CANTER_KILLS_MOVING` how many with the
 //! simulated driver in lock-step.

@@ -1,5 +1,5 @@
-//! Kits that are made by the command as a user gives it, held against the design: in the world as
-//! the run leaves it, and with what the simulated driver measured.
+//! Kits that a user's command makes, compared with the design: in the world after the run, and by
+//! what the simulated driver measured.
 //!
 //! `CANTER_PLAN_ROBOTS` names other arms than ur5e.
 

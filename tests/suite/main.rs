@@ -15,6 +15,7 @@ mod drivers;
 mod faults;
 mod killed_plans;
 mod kitting_end_to_end;
+mod operators;
 mod plan_costs;
 mod planned_motions;
 mod planned_once;

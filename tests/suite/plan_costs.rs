@@ -1,4 +1,4 @@
-//! The cost of choosing orders, and of a kit, measured with the real command.
+//! The computing time of choosing orders, and of a kit, measured with the real command.
 //!
 //! `CANTER_LAYOUTS` sets the number of layouts, `CANTER_KITS` that of kits.
 

@@ -1,4 +1,4 @@
-//! What `canter plan` writes, checked anew from its CSV: every example on every robot.
+//! The output of `canter plan`, checked independently from its CSV: every example on every robot.
 
 use crcl::Command;
 use system_tests::arm::Arm;

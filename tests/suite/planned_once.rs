@@ -1,4 +1,4 @@
-//! A program from a file is planned once: what was planned is what is executed.
+//! A program from a file is planned once, and executed as planned.
 
 use std::fmt::Write;
 

@@ -1,6 +1,6 @@
-//! A program through the whole chain: queue, planner, real-time thread, shared memory, driver.
-//! The driver runs in a thread of this process here; its own process is the business of the
-//! tests of the command line.
+//! A program through the whole chain: queue, planner, real-time thread, shared memory, driver. Here
+//! the driver runs in a thread of this process; the tests of the command line have it in a separate
+//! process.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

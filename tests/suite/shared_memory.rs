@@ -1,4 +1,4 @@
-//! What happens to shared memory, and to those who wait for each other in it: real processes.
+//! Faults of shared memory, and requests that come late or get no answer, with real processes.
 
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};

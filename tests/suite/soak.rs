@@ -1,7 +1,7 @@
-//! Soak test: programs in a loop by the clock; no limit is exceeded, memory does not grow.
+//! Soak test: programs in a loop by the wall clock; no limit is exceeded, memory does not grow.
 //!
-//! `CANTER_SOAK_S` is the length (s, as it is given 600), `CANTER_SOAK_BIN` the `canter` to try,
-//! such as the one of a release build.
+//! `CANTER_SOAK_S` sets the length (s, 600 by default), `CANTER_SOAK_BIN` the `canter` to test, for
+//! example that of a release build.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};

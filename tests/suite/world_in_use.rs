@@ -1,4 +1,4 @@
-//! A world that is in use: one writer, told by name, and a file that is taken away.
+//! A world that is in use: a second writer is refused, and a lost file ends the run.
 
 use std::fs::File;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Which limit decides the speed when.
+//! Which limit is active at which time.
 
 use crate::timing::{ActiveSpan, Limit};
 

@@ -1,4 +1,4 @@
-//! Why no trajectory could be made.
+//! Why a trajectory could not be planned.
 
 use thiserror::Error;
 

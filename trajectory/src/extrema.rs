@@ -1,4 +1,4 @@
-//! Exact peaks of a motion: extrema of its polynomials, not samples.
+//! Exact largest values of a motion: extrema of its polynomials, not samples.
 
 use nalgebra::SVector;
 use realtime::Piece;

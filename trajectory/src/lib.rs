@@ -1,10 +1,10 @@
 //! State-to-state moves, smooth paths through tolerance balls, path timing.
 //!
-//! Every engine ends in a [`Trajectory`]: quintic pieces in time, which the control cycle
+//! Every planner here returns a [`Trajectory`]: quintic pieces in time, which the control cycle
 //! evaluates as they are.
 //!
 //! This crate never reads a file, a clock or a robot description, and never calls inverse
-//! kinematics: geometry comes in as [`ToolCurve`] and [`Path`].
+//! kinematics: the caller gives the geometry as [`ToolCurve`] or [`Path`].
 #![forbid(unsafe_code)]
 
 mod active;

@@ -1,4 +1,4 @@
-//! What joints and tool may do.
+//! Limits of joints and tool.
 
 use nalgebra::SVector;
 

@@ -1,4 +1,4 @@
-//! A straight line of the controlled point, turned in step.
+//! A straight line of the controlled point; the tool turns in proportion to the distance.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 

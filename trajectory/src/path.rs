@@ -1,4 +1,4 @@
-//! The seam between geometry, kinematics and timing: curves over a path parameter `u`.
+//! The interface between geometry, kinematics and timing: curves over a path parameter `u`.
 
 use nalgebra::{Isometry3, SVector, Vector3};
 

@@ -1,6 +1,6 @@
-//! Four numbers at once: inner loops compiled twice, for wide registers where
-//! the processor has them and for every processor. Both builds give the same
-//! bits, since neither fuses multiplications and additions.
+//! Four numbers at once: inner loops are compiled twice, with SIMD instructions for processors that
+//! have them and for every processor. Both builds give the same bits, since neither fuses
+//! multiplications and additions.
 
 /// Numbers in an [`Four::F`].
 pub(crate) const LANES: usize = 4;

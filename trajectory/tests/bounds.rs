@@ -1,4 +1,4 @@
-//! Bounds of a motion for all times, held against dense samples.
+//! Bounds of a motion for all times, compared with dense samples.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3, vector};

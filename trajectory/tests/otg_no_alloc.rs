@@ -1,4 +1,5 @@
-//! State-to-state planning and sampling never touch the heap: counted by an allocator that counts.
+//! State-to-state planning and sampling do not use the heap; the allocator of this test counts the
+//! calls.
 #![allow(unsafe_code, reason = "a counting allocator has to be one")]
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -1,8 +1,7 @@
-//! Laws of smooth motions, checked by sampling alone: no code of the
-//! certificate is used here.
+//! Properties of smooth motions, checked by sampling alone: no code of the certificate is used
+//! here.
 //!
-//! `SMOOTH_LISTS=10000 cargo test -p trajectory --release --test smooth`
-//! makes the long run.
+//! `SMOOTH_LISTS=10000 cargo test -p trajectory --release --test smooth` is the long run.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 

@@ -1,4 +1,4 @@
-//! Laws of the motion suite.
+//! Properties of the motions of the motion suite.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod suite;

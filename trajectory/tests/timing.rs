@@ -1,4 +1,4 @@
-//! Laws of path timing.
+//! Properties of path timing.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use nalgebra::{Isometry3, SVector};

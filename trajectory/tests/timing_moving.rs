@@ -1,4 +1,4 @@
-//! Laws of path timing from a moving start.
+//! Properties of path timing from a start in motion.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use measure::RandomPaths;

@@ -1,4 +1,4 @@
-//! Laws of path timing with tool limits, free ends and awkward paths.
+//! Properties of path timing with tool limits, free ends and difficult paths.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};

@@ -1,5 +1,5 @@
-//! A planned motion as a picture: joint quantities as parts of their limits over time, and the
-//! way of the tool from above and from the side.
+//! Plots a planned motion: joint quantities relative to their limits over time, and the path of the
+//! tool from above and from the side.
 
 mod bars;
 mod scale;

@@ -1,4 +1,4 @@
-//! From quantities to pixels, and round numbers for the marks of an axis.
+//! Converts quantities to pixels, and finds round numbers for the marks of an axis.
 
 /// A linear map from a range of a quantity to a range of pixels; either may be reversed.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The left side: a ribbon of commands above four strips over time.
+//! The left side: a bar of commands above four plots over time.
 
 use super::scale::{Scale, marks};
 use super::svg::{Anchor, Svg};

@@ -1,4 +1,4 @@
-//! The right side: the way of the tool from above and from the side, to one scale.
+//! The right side: the path of the tool from above and from the side, at the same scale.
 
 use super::scale::{Scale, marks};
 use super::svg::{Anchor, Svg};

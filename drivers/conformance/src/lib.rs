@@ -1,7 +1,7 @@
-//! Plays the engine against any driver and says, clause by clause, whether it keeps the protocol
-//! of `docs/driver-protocol.md`.
+//! Plays the engine against any driver and reports, clause by clause, whether it follows the
+//! protocol of `docs/driver-protocol.md`.
 //!
-//! The joints move by a few hundredths of a rad; keep clear of a real arm all the same.
+//! The joints move by a few hundredths of a rad; keep away from a real arm nevertheless.
 
 use core::time::Duration;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! A driver for a robot of your own: fill in the places marked HERE. Run it, then let Canter drive:
+//! A driver for your own robot: fill in the places marked HERE. Start it, then run a program:
 //!     cargo run --release -p driver-kit --example template -- cell/arm
 //!     canter run PROGRAM --robot ur5e --driver external --arm cell/arm
 use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, asked_to_end, run};

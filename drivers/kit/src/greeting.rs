@@ -1,4 +1,4 @@
-//! How a session is opened, or refused.
+//! Opens or refuses a session.
 
 use ipc::{
     Clock, DriverState, FaultCode, Hello, HelloAck, MAX_TOOLS, Setpoint, Verdict, bytes_of, text_of,

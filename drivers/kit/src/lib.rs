@@ -1,14 +1,15 @@
-//! All that a driver does but move the robot: handshake, sessions, checks of setpoints, watchdog,
-//! stop, latch, periods by the clock or in lock-step, as `docs/driver-protocol.md` has it.
+//! Everything a driver needs except the robot itself: handshake, sessions, checks of setpoints,
+//! watchdog, stop, latch, periods by the clock or in lock-step, as in `docs/driver-protocol.md`.
 //!
 //! Implement [`Robot`] for your arm and call [`run`]: `examples/template.rs` is a driver in less
-//! than 60 lines. [`Driver`] is the protocol without a clock and without a channel: times go in,
-//! messages come out, the same every time.
+//! than 60 lines. [`Driver`] is the protocol without a clock and without a channel: it gets times
+//! and messages and returns messages, and is deterministic.
 //!
-//! A driver owns the watchdog: without a setpoint it goes on for a while as it was going, then
-//! stops by itself within acceleration and jerk limits, then latches. Only a new session leads on.
-//! What the robot follows never leaves range, speed, acceleration and jerk limits of a joint,
-//! whatever comes and whoever stalls; setpoints within them are followed as they are.
+//! The driver has the watchdog: without setpoints it continues the motion for a while, then stops
+//! within acceleration and jerk limits, then latches. Only a new session clears the latch. The
+//! reference that the robot follows always keeps range, speed, acceleration and jerk limits of each
+//! joint, whatever is received and whichever process stalls; setpoints within the limits are
+//! followed as they are.
 //!
 //! This crate never plans, and knows no kinematics.
 

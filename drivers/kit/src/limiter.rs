@@ -1,17 +1,17 @@
-//! The last hand on what a joint follows: nothing leaves the limits, whatever is asked for.
+//! The limiter of a joint: its reference keeps the limits, whatever setpoint is received.
 //!
-//! The state of a joint is its last reference. In a period it can come no further down than by the
-//! quickest way to its largest downward speed, no further up than by that to its largest upward
-//! speed, and each mixture of the two keeps acceleration, jerk and speed limits. So one number a
-//! period is chosen: the share of the mixture. A share is refused from which even the hardest
-//! braking passes an end of the range; the hardest braking is always left. A setpoint that follows
-//! on the last reference is taken as it is, bit for bit.
+//! The state of a joint is its last reference. In one period the joint can reach the positions
+//! between two motions: the fastest towards its largest downward speed and the fastest towards its
+//! largest upward speed. Each mixture of the two keeps speed, acceleration and jerk limits. So one
+//! number per period is chosen: the share of the mixture. A share is refused if even the hardest
+//! braking after it would pass an end of the range; the hardest braking itself is always possible.
+//! A setpoint that continues the last reference within the limits is used as it is, bit for bit.
 //!
 //! # Source
-//! Own derivation. The choice of the share makes the distance to the target, stopped as quickly as
-//! allowed, zero: the switching surface of a third-order time-optimal law, as in R. Zanasi,
-//! C. Guarino Lo Bianco, A. Tonielli, "Nonlinear filters for the generation of smooth
-//! trajectories", Automatica 36(3), 2000.
+//! Own derivation. The share is chosen so that the joint, braked as fast as allowed, would stop at
+//! the target: the switching surface of a third-order time-optimal law, as in R. Zanasi, C. Guarino
+//! Lo Bianco, A. Tonielli, "Nonlinear filters for the generation of smooth trajectories",
+//! Automatica 36(3), 2000.
 
 use crate::{Ramp, Reference};
 

@@ -1,4 +1,4 @@
-//! What the driver received, as a file: the witness of every fault test.
+//! Writes what the driver received to a file, for the fault tests.
 
 use std::fs::File;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! The driver between shared memory and a clock.
+//! Runs a driver with shared memory and a clock.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! From one speed to another within acceleration and jerk limits, as quickly as that goes.
+//! The fastest change from one speed to another within acceleration and jerk limits.
 
 use crate::Reference;
 

@@ -1,4 +1,4 @@
-//! What one joint follows.
+//! The reference that one joint follows.
 
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) to follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! What a robot must be able to do.
+//! The interface of a robot.
 
 use ipc::{MAX_JOINTS, ToolAction, ToolFeedback, ToolStatus};
 

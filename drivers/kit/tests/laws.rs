@@ -1,5 +1,5 @@
-//! What a robot is told to follow, in virtual time: whatever comes and whoever stalls, no joint
-//! leaves its range, its speed, its acceleration or its jerk, in any period.
+//! The reference of a robot, in virtual time: whatever is received and whichever process stalls,
+//! each joint keeps its limits of range, speed, acceleration and jerk in every period.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use driver_kit::{About, Driver, Measured, Reference, Robot};

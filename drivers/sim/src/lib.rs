@@ -1,9 +1,8 @@
-//! The built-in simulated servo driver: a process of its own that stands where a robot's driver
-//! stands.
+//! The built-in driver with simulated servos: a separate process in place of a robot's driver.
 //!
-//! [`Simulated`] is the robot; [`driver`] puts it behind the protocol without a clock and without a
-//! channel, [`run`] between shared memory and a clock. The protocol's side is `driver-kit`'s, as in
-//! any other driver.
+//! [`Simulated`] is the robot. [`driver`] combines it with the protocol, without a clock and
+//! without a channel; [`run`] runs it with shared memory and a clock. `driver-kit` implements the
+//! protocol, as in any other driver.
 //!
 //! This crate never plans, and knows no kinematics.
 

@@ -1,4 +1,4 @@
-//! Noise that is the same every time.
+//! Reproducible noise.
 
 /// A stream of numbers from a seed.
 ///

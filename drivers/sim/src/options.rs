@@ -1,4 +1,4 @@
-//! What the simulated robot is like.
+//! Options of the simulated robot.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ impl Default for ToolOptions {
     }
 }
 
-/// What the simulated robot is like. Lists have one value a joint.
+/// Options of the simulated robot. Lists have one value a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The arm it drives.

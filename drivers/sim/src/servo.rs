@@ -1,4 +1,4 @@
-//! One servo: a mass that an acceleration moves, and the controller that chooses it.
+//! One servo: a mass and the controller that chooses its acceleration.
 
 use driver_kit::Reference;
 

@@ -1,4 +1,4 @@
-//! A gripper or tool changer that takes its time.
+//! A gripper or tool changer whose actions take time.
 
 use ipc::{ToolAction, ToolFeedback, ToolStatus};
 

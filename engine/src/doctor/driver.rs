@@ -1,4 +1,4 @@
-//! The driver of an arm, and whether it and the robot's description agree.
+//! Checks whether the driver of an arm and the robot's description agree.
 
 use core::time::Duration;
 

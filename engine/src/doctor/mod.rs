@@ -1,4 +1,4 @@
-//! Looks at what the servo loop needs of this machine, and says what would repair it.
+//! Checks what the servo loop needs of this machine, and says how to correct problems.
 
 mod driver;
 

@@ -1,4 +1,4 @@
-//! The commands that wait, where who gives them and who plans them meet.
+//! The waiting commands, shared by the threads that give commands and the thread that plans them.
 
 use crcl::Command;
 

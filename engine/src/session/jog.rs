@@ -1,4 +1,4 @@
-//! A request to move by hand.
+//! A request to jog the arm.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub enum JogSpace {
     Workstation,
 }
 
-/// A request to move by hand.
+/// A request to jog the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jog {
     /// What the shares are about.

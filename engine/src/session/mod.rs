@@ -1,9 +1,9 @@
-//! The real run: commands through queue, planner and executor to a driver.
+//! A session with a driver: commands go through queue, planner and executor.
 //!
-//! A session owns a worker thread, which plans ahead of the executor and
-//! reports each command in order. The executor's real-time thread is its own.
-//! What an operator asks of the motion goes straight to the real-time thread;
-//! the worker, which may think for long, learns of it afterwards.
+//! A session has a worker thread, which plans ahead of the executor and reports each command in
+//! order. The executor has a separate real-time thread. Orders of an operator (pause, stop, ...) go
+//! directly to the real-time thread; the worker, which may plan for a long time, reads them
+//! afterwards.
 
 mod inbox;
 mod jog;

@@ -1,4 +1,4 @@
-//! What a session tells about the commands it was given.
+//! What a session reports about its commands.
 
 use core::fmt;
 

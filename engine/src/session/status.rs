@@ -1,4 +1,4 @@
-//! Where a session is, for operators.
+//! The status of a session, for operators.
 
 use nalgebra::Isometry3;
 use serde::Serialize;

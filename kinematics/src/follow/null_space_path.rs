@@ -1,8 +1,8 @@
 //! The best polynomial of the null-space motion over a whole path.
 //!
-//! A grid of path parameter and null-space motion is filled by continuation; a shortest
-//! way through it weighs room to the limits, distance from singular poses and changes
-//! of the null-space motion; polynomials through that way are the polynomials to try.
+//! A grid over path parameter and null-space motion is filled by continuation. The cheapest path
+//! through it weighs distance from limits, distance from singular poses and changes of the
+//! null-space motion. The candidates are polynomials fitted to that path.
 
 use super::redundancy::{NullSpace, NullSpacePolynomial};
 use super::trace::{Task, smallest};
@@ -20,7 +20,7 @@ const SWING: usize = 3;
 /// Largest difference of a joint from one cell of the grid to the next, rad.
 const SURPRISE: f64 = 0.8;
 
-/// A place in the grid: joints and what it costs to be there.
+/// A cell of the grid: the joints and the cost of this cell.
 #[derive(Clone, Copy)]
 struct Cell<const N: usize> {
     q: SVector<f64, N>,
@@ -29,7 +29,7 @@ struct Cell<const N: usize> {
 
 type Layer<const N: usize> = Vec<Option<Cell<N>>>;
 
-/// Courses worth trying, best fit first; none where the search finds no way.
+/// The polynomials to try, best fit first; none if the search finds no path.
 pub(super) fn search<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -96,7 +96,7 @@ fn fill<const N: usize>(
             .collect();
         layers.push(next);
     }
-    // Only the start itself can be the beginning of a way.
+    // A path can only begin at the start itself.
     for (column, cell) in layers[0].iter_mut().enumerate() {
         if column != SIDE {
             *cell = None;
@@ -105,7 +105,7 @@ fn fill<const N: usize>(
     layers
 }
 
-/// What it costs to be at `q`: grows towards limits and singular poses, infinite beyond.
+/// The cost of `q`: grows towards limits and singular poses, infinite beyond them.
 fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>) -> f64 {
     let chain = task.solver.chain();
     let mut sum = 0.0;
@@ -120,7 +120,7 @@ fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>) -> f64 {
     sum + (0.08 / smallest(jacobian).max(1e-4)).powi(2)
 }
 
-/// Columns of the cheapest way through the grid.
+/// Columns of the cheapest path through the grid.
 fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
     let mut total: Vec<f64> = layers
         .first()?
@@ -136,7 +136,7 @@ fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
                 let Some(before) = layers[i - 1][source] else {
                     continue;
                 };
-                // The same spare value can be on another branch: the joints tell.
+                // The same null-space value can belong to another branch; the joints show it.
                 if (before.q - cell.q).amax() > 2.0 * SURPRISE {
                     continue;
                 }

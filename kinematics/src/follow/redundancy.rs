@@ -1,9 +1,9 @@
 //! The null-space motion of arms with more than six joints.
 //!
-//! The null-space motion is fixed by linear functions of the joints, `c . q = r(u)`, where
-//! `c` is the direction in which the arm can move at the start without moving its
-//! tool, and `r` a polynomial of `u`. Thus it has exact derivatives, and nothing drifts.
-//! With two redundant joints the second one stands still.
+//! The null-space motion is given by linear functions of the joints, `c . q = r(u)`, where `c` is
+//! the direction in which the arm can move at the start without moving its tool, and `r` is a
+//! polynomial of `u`. So it has exact derivatives and does not drift. With two redundant joints,
+//! the second function is constant.
 
 use super::FollowPoint;
 use super::error::FollowError;
@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 /// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
 pub(super) type NullSpacePolynomial = [f64; 6];
 
-/// NullSpace motion: up to two linear functions of the joints with their polynomials.
+/// Null-space motion: up to two linear functions of the joints with their polynomials.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NullSpace<const N: usize> {
     directions: [SVector<f64, N>; 2],
@@ -56,9 +56,9 @@ impl<const N: usize> NullSpace<N> {
             .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c))
     }
 
-    /// Progress of the polynomials and its first three derivatives at `x` from 0 to 1: `x`
-    /// itself, or a shape that rises from rest in the first [`EASE`] of the way, goes on
-    /// evenly and comes to rest in the last.
+    /// Progress of the polynomials and its first three derivatives at `x` from 0 to 1: `x` itself,
+    /// or a function that starts from rest, accelerates over the first [`EASE`] of the path, is
+    /// linear in the middle and comes to rest over the last [`EASE`].
     pub(super) fn progress(&self, x: f64) -> [f64; 4] {
         if !self.still_ends {
             return [x, 1.0, 0.0, 0.0];
@@ -98,7 +98,7 @@ impl<const N: usize> NullSpace<N> {
     }
 }
 
-/// Part of the way in which a polynomial gets going, where it begins at rest.
+/// Fraction of the path in which a polynomial that begins at rest accelerates.
 const EASE: f64 = 0.2;
 
 /// First half of an eased progress: its rate is `10 t^3 - 15 t^4 + 6 t^5` of what it
@@ -117,13 +117,13 @@ fn eased(x: f64) -> [f64; 4] {
     ]
 }
 
-/// Distance from a limit, rad or m, that counts as well inside.
+/// Distance from a limit, rad or m, from which a joint counts as well inside.
 const ROOM: f64 = 0.1;
 /// Smallest singular value that counts as well away from singular poses.
 const NIMBLE: f64 = 0.05;
 
-/// Follows with the null-space motion standing still if that goes well, else along the
-/// polynomial that a search over the whole path finds.
+/// Follows without null-space motion if the quality is good, otherwise along the polynomial that a
+/// search over the whole path finds.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -143,7 +143,7 @@ pub(super) fn resolve<const N: usize>(
     let first = task.trace(start, &still);
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
-    // Standing no worse than at the start is as well as can be asked for.
+    // A path cannot be expected to be better than its start.
     if first.is_ok() && best >= 1.0 {
         return first;
     }
@@ -164,8 +164,8 @@ pub(super) fn resolve<const N: usize>(
     answer
 }
 
-/// How well a path stays inside limits and away from singular poses: 1 is well, or
-/// no worse than where it starts.
+/// How well a path stays inside limits and away from singular poses: 1 is good, or no worse than at
+/// its start.
 fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
     let chain = task.solver.chain();
     let one = |point: &FollowPoint<N>| {
@@ -184,7 +184,7 @@ fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64
 fn null_space<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [SVector<f64, N>; 2] {
     let mut basis: Vec<SVector<f64, N>> = Vec::new();
     let mut reduce = |mut v: SVector<f64, N>, keep: bool| {
-        // Twice, so that rounding of the first pass is taken out by the second.
+        // Twice: the second pass removes the rounding of the first.
         for _ in 0..2 {
             for b in &basis {
                 v -= b * b.dot(&v);

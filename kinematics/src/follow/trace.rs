@@ -1,4 +1,4 @@
-//! Following by continuity, point after point.
+//! Follows a path by continuity, point after point.
 
 use super::differential::{derivatives, task_rows};
 use super::error::{FollowCause, FollowError};
@@ -16,20 +16,21 @@ pub(super) struct Task<'a, const N: usize> {
     pub(super) options: &'a FollowOptions,
 }
 
-/// Distance that counts as being at the start of the path, m (rad times [`LENGTH`]).
+/// Largest distance from the start of the path that counts as being there, m (rad times
+/// [`LENGTH`]).
 const START: f64 = 1e-6;
 /// Distance at which a point counts as exactly reached.
 const EXACT: f64 = 1e-12;
-/// Distance that is good enough where rounding allows no better.
+/// Largest acceptable distance where rounding prevents a smaller one.
 const ENOUGH: f64 = 1e-10;
 /// Largest difference from the predicted joint positions, rad: more is another branch.
 const SURPRISE: f64 = 0.1;
 /// Shortest step as a fraction of the whole path.
 const SHORTEST: f64 = 1e-9;
-/// Rounding that a limit forgives.
+/// Tolerance of a joint limit for rounding.
 const SLACK: f64 = 1e-9;
 
-/// The worst that a joint passes its limit along a path.
+/// The largest excess of a joint beyond its limit along a path.
 struct Overrun {
     u: f64,
     joint: usize,
@@ -37,7 +38,7 @@ struct Overrun {
 }
 
 impl<const N: usize> Task<'_, N> {
-    /// Whether the arm stands at the start of the path.
+    /// Checks that the arm is at the start of the path.
     pub(super) fn check_start(&self, start: &SVector<f64, N>) -> Result<(), FollowError> {
         let u = self.grid[0];
         let error = distance(&self.solver.chain().forward(start), &(self.tool)(u).pose);
@@ -101,7 +102,7 @@ impl<const N: usize> Task<'_, N> {
             q: [*start, SVector::zeros(), SVector::zeros(), SVector::zeros()],
             smallest: 0.0,
         };
-        // The start may be off by rounding; the path goes on from the exact point.
+        // The start may be off by rounding; the path continues from the exact point.
         let exact = self.settle(&still, u, null_space).unwrap_or(*start);
         self.finish(u, &exact, &still, null_space)
     }
@@ -127,7 +128,7 @@ impl<const N: usize> Task<'_, N> {
         }
     }
 
-    /// One step, or `None` where it is too long to be sure of it.
+    /// One step, or `None` if it is too long to stay on the branch for certain.
     fn step(
         &self,
         last: &FollowPoint<N>,
@@ -233,7 +234,7 @@ impl<const N: usize> Task<'_, N> {
         worst
     }
 
-    /// Why no step, however short, leads on from a point.
+    /// Why no step from a point is possible, however short.
     #[cold]
     fn refusal(&self, last: &FollowPoint<N>, u: f64) -> FollowError {
         let goal = Goal::Pose((self.tool)(u).pose);

@@ -12,24 +12,24 @@ struct Tolerance {
     length: f64,
     /// Sine of an angle.
     angle: f64,
-    /// Squared relative miss that counts as rounding in the closed form.
+    /// Squared relative error that counts as rounding in the closed form.
     slack: f64,
 }
 
-/// The structure is there to rounding: the closed form is exact.
+/// The axes have the structure up to rounding: the closed form is exact.
 const EXACT: Tolerance = Tolerance {
     length: 1e-10,
     angle: 1e-10,
     slack: 1e-12,
 };
-/// The structure is there up to calibration: the closed form seeds a polish.
+/// The axes have the structure up to calibration errors: the closed form is the seed of a polish.
 const CALIBRATED: Tolerance = Tolerance {
     length: 4e-3,
     angle: 0.012,
     slack: 8e-2,
 };
 
-/// A closed form with up to one spare joint.
+/// A closed form with at most one redundant joint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Form {
     /// Six joints.
@@ -122,7 +122,7 @@ fn vector(v: [f64; 3]) -> Vector3<f64> {
     Vector3::from(v)
 }
 
-/// Gives axes that are parallel their mean direction, each keeping its way.
+/// Gives parallel axes their mean direction; each keeps its sign.
 fn align(lines: &mut [ScrewAxis]) {
     let Some(first) = lines.first().map(|line| vector(line.h)) else {
         return;
@@ -145,7 +145,7 @@ fn parallel(a: &ScrewAxis, b: &ScrewAxis, tolerance: Tolerance) -> bool {
 fn meeting(a: &ScrewAxis, b: &ScrewAxis, tolerance: Tolerance) -> Option<[f64; 3]> {
     let (ha, hb) = (vector(a.h), vector(b.h));
     let n = ha.cross(&hb);
-    // Axes that are nearly parallel meet nowhere in particular.
+    // Nearly parallel axes have no well-defined intersection.
     if n.norm() < 0.1 {
         return None;
     }

@@ -1,4 +1,4 @@
-//! Closed forms joined to a chain: branches as joint positions.
+//! The closed form of a chain: branches as joint positions.
 
 use super::classify::{Class, Form, classify};
 use super::product::{Product, Zero};
@@ -92,7 +92,7 @@ impl Closed {
         })
     }
 
-    /// Whether the closed form is exact, not only near.
+    /// Whether the closed form is exact, not approximate.
     pub(crate) fn exact(&self) -> bool {
         self.class.exact
     }
@@ -111,7 +111,7 @@ impl Closed {
         }
     }
 
-    /// One line for people.
+    /// The name of the form, for display.
     pub(crate) fn name(&self) -> &'static str {
         use super::six::Shape;
         match &self.class.form {
@@ -137,16 +137,16 @@ impl Closed {
     }
 }
 
-/// All branches of one pose as a dispatched computation.
+/// All branches of one pose, compiled for both builds.
 pub(crate) struct Branching<'a, const N: usize> {
     pub(crate) closed: &'a Closed,
     pub(crate) pose: &'a Isometry3<f64>,
     /// The free parameter, rad.
     pub(crate) parameter: f64,
-    /// Joint positions for joints that a singular pose leaves free, and to which the
-    /// turns are to be nearest.
+    /// Joint positions for joints that a singular pose leaves free; whole turns are chosen nearest
+    /// to them.
     pub(crate) seed: &'a SVector<f64, N>,
-    /// Where the answer goes.
+    /// The result.
     pub(crate) raw: &'a mut Raw<N>,
 }
 
@@ -182,9 +182,8 @@ impl<const N: usize> Op for Branching<'_, N> {
 }
 
 impl<const N: usize> Branching<'_, N> {
-    /// Takes the turns of every joint that are nearest to the seed inside the limits; the
-    /// angle `i` is that of the joint `slots[i]` behind the first, any other joint is the
-    /// free parameter.
+    /// Chooses the whole turns of every joint that are nearest to the seed inside the limits. Angle
+    /// `i` is that of joint `first + slots[i]`; any other joint is the free parameter.
     #[inline(always)]
     fn settle<A: Arith, const M: usize>(
         mut self,
@@ -210,7 +209,8 @@ impl<const N: usize> Branching<'_, N> {
         }
     }
 
-    /// Settles one joint; the sums tell what is inside and how far away.
+    /// Chooses the turns of one joint; adds to the sums whether it is inside and how far away it
+    /// is.
     #[inline(always)]
     fn put<A: Arith>(&mut self, joint: usize, angles: [F4<A>; 2], sums: &mut [(B4<A>, F4<A>); 2]) {
         let joint = joint.min(N - 1);

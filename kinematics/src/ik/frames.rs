@@ -1,13 +1,13 @@
-//! Frames along six turning axes in which every axis is a z axis and every constant turn
-//! between two of them is one about x: what closed forms compute in costs little there.
+//! Frames on six turning axes. Every axis is a z axis, and every constant rotation between two
+//! frames is about x, so closed forms need few operations.
 //!
-//! With `q'` the angle from x axis to x axis, `base_from_first^-1 * product * last` is
-//! `Rz(q1') C1 Rz(q2') C2 ... C5 Rz(q6')`, each `C` a shift and then a turn about x.
+//! With `q'` the angle from x axis to x axis, `base_from_first^-1 * product * last` equals `Rz(q1')
+//! C1 Rz(q2') C2 ... C5 Rz(q6')`, each `C` a shift and then a turn about x.
 //!
 //! # Source
-//! J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based
-//! on matrices", J. Appl. Mech. 22, 1955; here the origins are free along the axes, so
-//! that nothing grows large where axes are nearly parallel.
+//! J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on
+//! matrices", J. Appl. Mech. 22, 1955; here the origins may be anywhere on the axes, so that no
+//! number becomes large if axes are nearly parallel.
 
 use super::product::Columns;
 use crate::links::{ScrewAxis, normal};

@@ -1,4 +1,4 @@
-//! What the tool is to reach, and how far it is from it.
+//! Goals of inverse kinematics, and the distance of the tool from them.
 
 use crate::arith::{Arith, V4};
 use crate::frame::Frame;
@@ -8,18 +8,18 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 /// Length that counts as much as one radian, m.
 pub(crate) const LENGTH: f64 = 0.3;
 
-/// What the tool is to reach.
+/// The goal of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
     /// A full pose.
     Pose(Isometry3<f64>),
-    /// A position; the tool may turn as it likes.
+    /// A position, with any orientation.
     Position(Point3<f64>),
-    /// A position with the tool's z axis along a direction; the tool may spin about it.
+    /// A position with the tool's z axis along a direction; the angle about it is free.
     Axis(Point3<f64>, Unit<Vector3<f64>>),
 }
 
-/// A goal as the solver's inner loop takes it.
+/// A goal in the form that the solver's inner loop uses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target {
     frame: Frame,
@@ -64,7 +64,7 @@ impl Goal {
 }
 
 impl Target {
-    /// How far the tool is from the goal: what is to be added, in base axes.
+    /// The difference between goal and tool, in base axes.
     #[inline(always)]
     pub(crate) fn pose_error<A: Arith>(&self, a: A, tool: &Frame) -> PoseError {
         let d = self.frame.p.sub(tool.p).0;
@@ -82,8 +82,8 @@ impl Target {
         }
     }
 
-    /// Scales the position rows of a Jacobian and takes out of the angular rows what the
-    /// goal leaves free.
+    /// Scales the position rows of a Jacobian and removes the free directions of the goal from the
+    /// angular rows.
     #[inline(always)]
     pub(crate) fn shape<A: Arith>(&self, tool: &Frame, rows: &mut [[F4<A>; 2]; 6]) {
         for row in rows.iter_mut().take(3) {
@@ -150,7 +150,7 @@ fn rotation_between<A: Arith>(a: A, from: &Frame, to: &Frame) -> [f64; 3] {
     s.map(|value| value * ratio)
 }
 
-/// Rotation vector where the turn is so near half a turn that its sine says nothing.
+/// Rotation vector of a rotation so near half a turn that its sine is too small to be used.
 #[cold]
 fn half_turn(from: &Frame, to: &Frame, s: [f64; 3]) -> [f64; 3] {
     // R + 1 = 2 axis axis^T at half a turn: its longest column gives the axis.
@@ -184,7 +184,7 @@ fn turn_between<A: Arith>(a: A, from: V4, to: V4) -> [f64; 3] {
         if cos > 0.0 {
             return [s[0], s[1], s[2]];
         }
-        // Opposite: any axis across will do.
+        // Opposite directions: any perpendicular axis is possible.
         let z = from.0;
         let across = if z[0].abs() < 0.7 {
             [0.0, z[2], -z[1]]

@@ -1,7 +1,7 @@
 //! The numeric solver: damped Newton steps inside the joint limits.
 //!
-//! One descent is a pure function of chain, goal and seed; restarts are a fixed
-//! sequence, so the same question has the same answer on every run.
+//! One descent is a pure function of chain, goal and seed. Restarts are a fixed sequence, so the
+//! same goal has the same result in every run.
 
 use super::goal::Target;
 use crate::arith::{Arith, Op};
@@ -22,7 +22,7 @@ pub(crate) struct Stop {
     pub(crate) limits: bool,
 }
 
-/// Where a descent ended.
+/// The result of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolverResult<const N: usize> {
     pub(crate) q: SVector<f64, N>,
@@ -41,7 +41,7 @@ const HELD: u32 = 3;
 /// Steps after which the squared distance must have halved.
 const PATIENCE: u32 = 4;
 
-/// A descent from a seed as a dispatched computation.
+/// A descent from a seed, compiled for both builds.
 pub(crate) struct Descent<'a, const N: usize> {
     pub(crate) chain: &'a Chain<N>,
     pub(crate) target: &'a Target,
@@ -138,7 +138,7 @@ fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f
     [a, b, c, d, e, f, g, h]
 }
 
-/// Takes joints out that stand at a limit and would be pushed beyond it.
+/// Excludes joints that are at a limit and would be moved beyond it.
 #[inline(always)]
 fn freeze<A: Arith, const N: usize>(
     a: A,
@@ -165,8 +165,8 @@ fn freeze<A: Arith, const N: usize>(
     }
 }
 
-/// Holds joints that a step would bring beyond a limit: they go as far as the limit, and
-/// what that does is taken off the `rest` that the others are to do. Whether there are any.
+/// Holds joints that a step would move beyond a limit: they move to the limit, and their effect is
+/// subtracted from `rest`, which the other joints must do. Returns whether there are any.
 #[inline(always)]
 fn hold<A: Arith, const N: usize>(
     a: A,
@@ -253,7 +253,7 @@ fn solve_damped<A: Arith, const N: usize>(
     x
 }
 
-/// Takes a step, shortened as a whole where a joint would go too far.
+/// Takes a step, scaled down if a joint would move too far.
 #[inline(always)]
 fn advance<const N: usize>(
     chain: &Chain<N>,

@@ -1,4 +1,4 @@
-//! Three turns that bring one orientation to another, four branches side by side.
+//! Three rotations that turn one orientation into another, for four branches at once.
 
 use super::simd::{
     Angle, Held, Pair, TrigEquation, Vec4, angle_of, angles_of, last_turn_to, turn_to,
@@ -8,10 +8,10 @@ use crate::arith::Arith;
 use crate::wide::{B4, F4};
 use std::f64::consts::PI;
 
-/// Turns about three axes whose product brings the third axis to `axis`, and `spin`,
-/// at right angles to it, to `spun`. Where the first and third axis fall together the
-/// first is held. Beside them both answers for the middle one. The sine and cosine
-/// of the last turn may have any length.
+/// Rotations about three axes whose product turns the third axis to `axis`, and `spin`,
+/// perpendicular to it, to `spun`. If the first and third axis coincide, the first angle is held.
+/// Also returns both solutions for the middle one. The sine and cosine of the last rotation may
+/// have any length.
 #[inline(always)]
 pub(crate) fn orient<A: Arith>(
     [first, middle, last]: [[f64; 3]; 3],
@@ -22,8 +22,8 @@ pub(crate) fn orient<A: Arith>(
     let a = axis.0[0].build();
     let level = axis.along(first);
     let wave = TrigEquation::of(Vec4::splat(a, first), middle, Vec4::splat(a, last), level);
-    // With the middle axis square to both, the discriminant is the squared sine between
-    // first axis and target; taken from their product it stays exact when small.
+    // If the middle axis is perpendicular to both, the discriminant is the squared sine between
+    // first axis and target; computed from their product, it is exact when small.
     let tilts = if square([first, middle, last]) {
         let across = Vec4::splat(a, first).cross(axis);
         let one = F4::splat(a, 1.0);
@@ -39,13 +39,13 @@ pub(crate) fn orient<A: Arith>(
     ([swing, tilt, roll], tilts)
 }
 
-/// Whether the middle axis is square to both others.
+/// Whether the middle axis is perpendicular to both others.
 #[inline(always)]
 fn square([first, middle, last]: [[f64; 3]; 3]) -> bool {
     dot(first, middle).abs() < 1e-12 && dot(middle, last).abs() < 1e-12
 }
 
-/// Both answers of [`orient`] as angles (rad), each with whether it is real.
+/// Both solutions of [`orient`] as angles (rad), each with whether it is real.
 #[inline(always)]
 pub(crate) fn orient_both<A: Arith>(
     axes: [[f64; 3]; 3],

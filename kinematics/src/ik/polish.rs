@@ -1,8 +1,8 @@
 //! Branches of arms that are only near a closed form, as calibrated ones are.
 //!
-//! The closed form of the near arm seeds a descent. Where two branches lie close
-//! together (a fold: elbow straight, wrist straight), both seeds may fall on the same
-//! one or on none; then the other is looked for across the fold.
+//! The closed form of the ideal arm gives the seed of a descent. Where two branches lie close
+//! together (a fold: elbow straight, wrist straight), both descents may end in the same branch or
+//! in none; then the other branch is searched for across the fold.
 
 use super::closed::{Closed, Raw};
 use super::goal::{Goal, Target};
@@ -11,15 +11,15 @@ use super::report::{Branches, Solution};
 use super::{LENGTH, Solver, turns};
 use nalgebra::{Isometry3, SMatrix, SVector};
 
-/// Smallest singular value below which a twin across a fold is looked for.
+/// Smallest singular value below which another branch across a fold is searched for.
 const FOLD: f64 = 0.3;
 /// Smallest singular value below which a fold is searched along its whole length.
 const NARROW: f64 = 0.05;
-/// Steps along a fold when its middle is all that is known, rad.
+/// Steps along a fold if only its middle is known, rad.
 const ASIDE: [f64; 10] = [0.15, -0.15, 0.5, -0.5, 1.0, -1.0, 1.7, -1.7, 2.6, -2.6];
 
 impl<const N: usize> Solver<N> {
-    /// All branches at one parameter of an arm whose closed form is only near.
+    /// All branches at one parameter of an arm whose closed form is approximate.
     #[cold]
     pub(super) fn near_branches(
         &self,
@@ -31,7 +31,7 @@ impl<const N: usize> Solver<N> {
         let mut raw = Raw::none();
         self.branch(closed, (pose, parameter), seed, &mut raw);
         let target = Goal::Pose(*pose).target();
-        // All that are found, beyond the limits too: a branch outside must not look lost.
+        // All branches, also those beyond the limits: a branch outside is not missing.
         let (mut all, mut lost) = (Branches::new(), Branches::new());
         let mut expected = 0;
         for id in 0..8_u8 {
@@ -39,7 +39,7 @@ impl<const N: usize> Solver<N> {
                 continue;
             };
             expected += 1;
-            // At the edge of reach two seeds are one.
+            // At the edge of the reach two seeds coincide.
             let same = |other: u8| raw.any(other).is_some_and(|p| (p - q).amax() < 1e-9);
             if (0..id).any(same) {
                 continue;
@@ -66,8 +66,8 @@ impl<const N: usize> Solver<N> {
         found
     }
 
-    /// Looks along the fold of a seed that led nowhere new: where two axes nearly fall
-    /// together, small errors of the links turn the joints between them far.
+    /// Searches along the fold of a seed that led to no new branch: where two axes nearly coincide,
+    /// small errors of the links change the joints between them by large angles.
     fn add_along(
         &self,
         target: &Target,
@@ -97,7 +97,7 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    /// Looks across every fold that is near for a branch that is not there yet.
+    /// Searches across every near fold for a branch that is still missing.
     fn add_twins(&self, target: &Target, all: &mut Branches<N>) {
         for index in 0..all.len() {
             let Some(solution) = all.get(index).copied() else {
@@ -127,7 +127,7 @@ impl<const N: usize> Solver<N> {
         new
     }
 
-    /// Brings a near branch onto the pose; `None` where it does not get there.
+    /// Moves an approximate branch to the exact pose; `None` if that fails.
     fn polished(&self, target: &Target, q: &SVector<f64, N>) -> Option<SVector<f64, N>> {
         let result = self.descend(
             target,
@@ -138,7 +138,7 @@ impl<const N: usize> Solver<N> {
                 ..self.stop
             },
         );
-        // A seed that had to go far was none.
+        // A seed that had to move far was not a branch.
         (result.reached && turns::distance(&self.chain, &result.q, q) < 2.0).then_some(result.q)
     }
 

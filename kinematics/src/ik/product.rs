@@ -1,4 +1,4 @@
-//! The product of the turns of an arm's joints, as closed forms take it.
+//! The product of the rotations of an arm's joints, as closed forms use it.
 
 use crate::arith::{self, Arith};
 use crate::links::ScrewAxis;

@@ -1,10 +1,10 @@
-//! Answers of the solver: solutions, or why there is none.
+//! Results of the solver: solutions, or why there is none.
 
 use arrayvec::ArrayVec;
 use nalgebra::{Isometry3, SVector};
 use std::fmt;
 
-/// Most solutions that one pose is given.
+/// Largest number of solutions of one pose.
 pub const MOST_BRANCHES: usize = 16;
 
 /// One joint position that reaches a goal.
@@ -12,8 +12,8 @@ pub const MOST_BRANCHES: usize = 16;
 pub struct Solution<const N: usize> {
     /// Joint positions, rad or m, inside the limits.
     pub q: SVector<f64, N>,
-    /// Which of the arm's branches it is on (bits: shoulder or base, elbow, wrist);
-    /// `None` where the arm has no closed form.
+    /// The branch of the solution (bits: shoulder or base, elbow, wrist); `None` if the arm has no
+    /// closed form.
     pub branch: Option<u8>,
 }
 
@@ -50,7 +50,7 @@ impl<'a, const N: usize> IntoIterator for &'a Branches<N> {
     }
 }
 
-/// What keeps the arm from a goal.
+/// Why the arm does not reach a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum IkFailure {
@@ -61,7 +61,7 @@ pub enum IkFailure {
         /// How far the nearest position is from the goal's, m.
         distance: f64,
     },
-    /// The position can be reached, but not turned like this.
+    /// The position can be reached, but not with this orientation.
     Orientation {
         /// How far the nearest orientation at that position is from the goal's, rad.
         angle: f64,
@@ -80,10 +80,10 @@ pub enum IkFailure {
     },
 }
 
-/// Why a goal is not reached, with the nearest that is.
+/// Why a goal is not reached, with the nearest pose that is reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IkReport<const N: usize> {
-    /// What is in the way.
+    /// The reason.
     pub failure: IkFailure,
     /// Joint positions whose tool pose is the nearest found.
     pub nearest: SVector<f64, N>,

@@ -1,5 +1,4 @@
-//! Four branches side by side: vectors of four lanes, and the subproblems that closed
-//! forms are made of.
+//! Four branches at once with SIMD: vectors of four lanes, and the subproblems of closed forms.
 //!
 //! # Source
 //! A. J. Elias and J. T. Wen, "IK-Geo: unified robot inverse kinematics using
@@ -38,7 +37,7 @@ impl<A: Arith> Angle<A> {
         }
     }
 
-    /// The angle, but `held` where `free` says so.
+    /// The angle, or `held` in the lanes of `free`.
     #[inline(always)]
     fn unless(self, free: B4<A>, held: Held) -> Self {
         let a = self.sin.build();
@@ -153,8 +152,8 @@ impl<A: Arith> Vec4<A> {
     }
 }
 
-/// Subproblem 1: the angle about `k` that turns `p` to `q`; where either lies
-/// along `k`, which leaves it free, `hold`.
+/// Subproblem 1: the angle about `k` that turns `p` to `q`; `hold` where either lies along `k` and
+/// the angle is free.
 #[inline(always)]
 pub(crate) fn turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
     let (x, y, free) = swept(p, q, k);
@@ -179,7 +178,7 @@ pub(crate) fn last_turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: 
 fn swept<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3]) -> (F4<A>, F4<A>, B4<A>) {
     let across = p.crossed_by(k);
     let y = across.dot(q);
-    // Not p.q - (k.p)(k.q), which has no figures left where both lie near k.
+    // Not p.q - (k.p)(k.q), which cancels where both lie near k.
     let x = across.dot(q.crossed_by(k));
     let free = x.fma(x, y * y).le(p.dot(p) * q.dot(q) * FREE);
     (x, y, free)
@@ -188,19 +187,18 @@ fn swept<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3]) -> (F4<A>, F4<A>, B4<A>)
 /// Fourth power of the sine below which a direction counts as along an axis.
 const FREE: f64 = 1e-50;
 
-/// The two answers of a subproblem with two: sine and cosine are the middle, plus or
-/// minus the offset.
+/// The two solutions of a subproblem: sine and cosine are the middle, plus or minus the offset.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair<A: Arith> {
     middle: Angle<A>,
     offset: Angle<A>,
     free: B4<A>,
-    /// Whether there are answers.
+    /// Whether there are solutions.
     pub(crate) real: B4<A>,
 }
 
 impl<A: Arith> Pair<A> {
-    /// The answers told apart by `sign`; `hold` where any angle would do.
+    /// The solutions selected by `sign`; `hold` where any angle is a solution.
     #[inline(always)]
     pub(crate) fn pick(self, sign: [f64; 4], hold: Held) -> Angle<A> {
         let sign = F4::new(self.middle.sin.build(), sign);
@@ -212,8 +210,8 @@ impl<A: Arith> Pair<A> {
     }
 }
 
-/// Equation `x cos + y sin = d`. Where both coefficients vanish against `scale`, any
-/// angle will do. Misses of up to `slack` (relative, squared) count as rounding.
+/// Equation `x cos + y sin = d`. If both coefficients vanish compared with `scale`, any angle is a
+/// solution. Errors of up to `slack` (relative, squared) count as rounding.
 #[derive(Clone, Copy)]
 pub(crate) struct TrigEquation<A: Arith> {
     x: F4<A>,

@@ -1,8 +1,8 @@
 //! Closed forms of six turning joints.
 //!
-//! The arm is taken as a product of turns about its axes at q = 0, so that
-//! `pose * zero_pose^-1 = e1 e2 e3 e4 e5 e6`, seen in [`Frames`] on those axes. Two
-//! families are solved, and with the chain read backwards two more:
+//! The arm is a product of rotations about its axes at q = 0: `pose * zero_pose^-1 = e1 e2 e3 e4 e5
+//! e6`, expressed in [`Frames`] on those axes. Two families are solved, and two more with the chain
+//! read backwards:
 //! - axes 4, 5, 6 meet in a point (spherical wrist), and either axes 2 and 3 are
 //!   parallel or axes 1 and 2 meet;
 //! - axes 2, 3, 4 are parallel and axes 5 and 6 meet.
@@ -20,7 +20,7 @@ use crate::links::{ScrewAxis, foot};
 use crate::wide::{B4, F4};
 use nalgebra::Vector3;
 
-/// How the first three joints place the wrist.
+/// How the first three joints position the wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Placing {
     /// Axes 2 and 3 are parallel.
@@ -44,10 +44,10 @@ pub(crate) struct Six {
     pub(crate) shape: Shape,
     /// Whether the axes are those of the chain read from its tip.
     pub(crate) reversed: bool,
-    /// Squared relative miss that counts as rounding; large for approximate shapes.
+    /// Squared relative error that counts as rounding; large for approximate shapes.
     pub(super) slack: f64,
     pub(super) frames: Frames,
-    /// What the product of turns is multiplied with from the left and from the right.
+    /// Constant left factor of the product of rotations, and the right one.
     left: Padded,
     right: Columns,
     /// Where joint positions are found in angles of the frames: `sign * angle + offset`.
@@ -57,7 +57,7 @@ pub(crate) struct Six {
     /// second is turned in its frame, as sine and cosine.
     pub(super) links: [f64; 2],
     pub(super) bend: [f64; 2],
-    /// Whether axis 5 is square to its neighbours.
+    /// Whether axis 5 is perpendicular to its neighbours.
     pub(super) square: bool,
     /// Inverses of sines: between axes 1 and 2, and of those beside axis 5 multiplied.
     pub(super) inverse: [f64; 2],
@@ -89,7 +89,7 @@ impl Six {
             Shape::Wrist(_, Placing::Meeting(_)) => 2..2,
             Shape::Parallels(_) => 2..4,
         };
-        // Parallel axes are taken to point the same way.
+        // Parallel axes must point in the same direction.
         for i in parallel {
             if dot(lines[1].h, lines[i].h) < 0.0 {
                 lines[i].h = lines[i].h.map(|x| -x);
@@ -127,12 +127,12 @@ impl Six {
         }
     }
 
-    /// What the product of turns is to be multiplied with from the right.
+    /// Constant right factor of the product of rotations.
     pub(crate) fn right(&self) -> &Columns {
         &self.right
     }
 
-    /// Which joints those of the frames are.
+    /// The joint of each frame.
     #[inline(always)]
     pub(crate) fn slots(&self) -> &'static [usize; 6] {
         if self.reversed {

@@ -1,5 +1,5 @@
-//! One closed form of six joints under way: four branches side by side, in the frames of
-//! the arm.
+//! The computation of one closed form of six joints: four branches at once, in the frames of the
+//! arm.
 
 use super::product::Columns;
 use super::simd::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
@@ -11,13 +11,13 @@ use std::f64::consts::PI;
 /// A vector in each lane.
 type V3<A> = [F4<A>; 3];
 
-/// Squared length, relative, below which a direction says nothing.
+/// Squared length, relative, below which a direction is undefined.
 const FREE: f64 = 1e-50;
 
 /// Squared lengths this near to one are made one by a single step of Newton's method.
 const NEAR_ONE: f64 = 1e-8;
 
-/// One solution under way.
+/// The state of one computation.
 pub(super) struct Solving<'a, A: Arith> {
     a: A,
     six: &'a Six,
@@ -44,7 +44,7 @@ impl<'a, A: Arith> Solving<'a, A> {
         [self.number(v[0]), self.number(v[1]), self.number(v[2])]
     }
 
-    /// All branches of a product of turns as the frames see it.
+    /// All branches of a product of rotations, expressed in the frames.
     #[inline(always)]
     pub(super) fn solve(&mut self, seen: &Columns) -> Joints<A, 6> {
         match self.six.shape {
@@ -79,8 +79,8 @@ impl<'a, A: Arith> Solving<'a, A> {
         self.or_held(angle, self.number(scale * FREE).le(square), joint)
     }
 
-    /// The same where the length is known to be `length` but for rounding, so that no root
-    /// has to be waited for; `real` tells where it must be right.
+    /// The same if the length is known to be `length` up to rounding, so that no square root is
+    /// needed; `real` tells in which lanes it must be right.
     #[inline(always)]
     fn turn_by(
         &mut self,
@@ -207,7 +207,7 @@ impl<'a, A: Arith> Solving<'a, A> {
         let [first, second, third, ..] = self.six.frames.steps;
         let far = dot(*p, *p);
         let (bend, bends) = self.bends(far);
-        // The wrist as axis 2 carries it.
+        // The wrist in the frame that axis 2 moves.
         let (fore, [a, b, d], height) = (self.six.links[1], second.shift, third.shift[2]);
         let (c3, s3) = (bend.cos * fore, bend.sin * fore);
         let wrist = [
@@ -324,7 +324,7 @@ impl<'a, A: Arith> Solving<'a, A> {
         let still = self.number(fourth.cos * fifth.cos * both);
         let cos = axis[2].taken_from(self.number(both), still);
         let (zero, one) = (self.number(0.0), self.number(1.0));
-        // With axis 5 square to both, the squared sine is exact even when it is small.
+        // With axis 5 perpendicular to both, the squared sine is exact even when it is small.
         let rest = if self.six.square {
             axis[0].fma(axis[0], axis[1] * axis[1])
         } else {

@@ -1,8 +1,7 @@
 //! Closed form of seven-joint arms with a spherical shoulder and a spherical wrist.
 //!
-//! The spare joint is expressed by the swivel: the angle of the plane of the arm
-//! about the line from shoulder to wrist, counted from the plane through that line
-//! and axis 1.
+//! The free parameter is the swivel angle: the angle of the plane of the arm about the line from
+//! shoulder to wrist, measured from the plane through that line and axis 1.
 
 use super::orient::{orient, orient_both};
 use super::product::Product;
@@ -37,7 +36,7 @@ impl Swivel {
         }
     }
 
-    /// Direction from which the swivel is counted, at right angles to `along`.
+    /// Direction from which the swivel angle is measured, perpendicular to `along`.
     fn reference(&self, along: &Vector3<f64>) -> Vector3<f64> {
         let up = Vector3::from(self.lines[0].h);
         let side = up.cross(along);
@@ -141,8 +140,8 @@ impl Swivel {
         }
     }
 
-    /// Where the plane of the arm lies: the way to the wrist, the hinge of the elbow at a
-    /// swivel (rad), and the direction square to both.
+    /// The plane of the arm: the direction to the wrist, the axis of the elbow at a swivel angle
+    /// (rad), and the direction perpendicular to both.
     #[inline(always)]
     fn plane<A: Arith>(&self, a: A, away: [f64; 3], swivel: f64) -> [[f64; 3]; 3] {
         let scale = |v: [f64; 3], s: f64| v.map(|x| x * s);

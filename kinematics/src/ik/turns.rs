@@ -1,4 +1,4 @@
-//! Whole turns of joints: the same pose, another joint position.
+//! Whole turns of joints: other joint positions with the same pose.
 
 use crate::arith::Arith;
 use crate::chain::Chain;

@@ -112,7 +112,7 @@ pub enum UrdfError {
         /// The second joint.
         second: String,
     },
-    /// Joints lead round in a circle.
+    /// The joints form a cycle.
     #[error("{place}: joint \"{joint}\" is part of a cycle; a robot must be a tree")]
     Cycle {
         /// A joint of the cycle.
@@ -120,7 +120,7 @@ pub enum UrdfError {
         /// Its name.
         joint: String,
     },
-    /// Several links are nobody's child.
+    /// Several links have no parent.
     #[error("{place}: links {links} are all roots; a robot has exactly one")]
     SeveralRoots {
         /// The second root.
@@ -200,7 +200,7 @@ pub enum UrdfError {
         /// Joints asked for.
         expected: usize,
     },
-    /// The loader `k` refused what we took for good.
+    /// The loader `k` refused a file that passed our checks.
     #[error("the kinematics loader refused the chain: {message}")]
     Loader {
         /// What it said.

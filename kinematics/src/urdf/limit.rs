@@ -106,7 +106,7 @@ fn bound(node: Node<'_, '_>, joint: &Joint<'_>, name: &str) -> Result<Option<f64
     }
 }
 
-/// What the file says of a joint of the chain; `None` for a fixed one.
+/// The data of a joint of the chain; `None` for a fixed joint.
 ///
 /// # Errors
 /// [`UrdfError::UnsupportedJoint`] for floating, planar and mimic joints, and

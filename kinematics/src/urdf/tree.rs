@@ -1,4 +1,4 @@
-//! The tree of links and joints in a URDF, and the way from its root to a tip.
+//! The tree of links and joints in a URDF, and the path from its root to a tip.
 
 use super::error::{Place, UrdfError};
 use roxmltree::Node;
@@ -74,7 +74,7 @@ impl<'a> Tree<'a> {
     /// Reads links and joints and checks that they form one tree.
     ///
     /// # Errors
-    /// Any fault of names, links or loops, with its element.
+    /// Any error of names, links or loops, with its element.
     pub(super) fn read(document: &'a roxmltree::Document<'a>) -> Result<Self, UrdfError> {
         let robot = document.root_element();
         if robot.tag_name().name() != "robot" {
@@ -177,7 +177,7 @@ impl<'a> Tree<'a> {
             .iter()
             .filter(|(name, _)| !self.above.contains_key(name))
             .collect();
-        // Every link has at most one joint above it, so what no root reaches goes in circles.
+        // Every link has at most one joint above it, so links that no root reaches form a cycle.
         let below = self.joints_below();
         let mut reached = vec![false; self.joints.len()];
         let mut open: Vec<&str> = roots.iter().map(|(name, _)| *name).collect();

@@ -1,4 +1,4 @@
-//! Following a tool path: exact, continuous, with true derivatives, or a clear refusal.
+//! Following a tool path: exact, continuous, with correct derivatives, or a clear refusal.
 
 use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;

@@ -1,4 +1,4 @@
-//! Damaged robot descriptions: an answer or an error, never a panic.
+//! Damaged robot descriptions: a result or an error, never a panic.
 
 use crate::arms::{self, Random, SEVEN, SIX};
 use kinematics::urdf;

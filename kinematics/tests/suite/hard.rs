@@ -1,4 +1,4 @@
-//! Where solvers fail: singular poses, axis-aligned poses, calibrated arms.
+//! Difficult cases for solvers: singular poses, axis-aligned poses, calibrated arms.
 
 use crate::arms::{self, Random, SIX};
 use kinematics::{Chain, Solver, urdf};

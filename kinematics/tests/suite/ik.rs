@@ -1,4 +1,4 @@
-//! Inverse kinematics: what comes out reaches the pose, and what does not come is explained.
+//! Inverse kinematics: each solution reaches the pose, and a missing solution is explained.
 
 use crate::arms::{self, Random, SEVEN, SIX};
 use kinematics::{Goal, IkFailure, Solver};

@@ -1,4 +1,4 @@
-//! Laws and oracles of the crate `kinematics`, one binary.
+//! Property tests and oracle tests of the crate `kinematics`, one binary.
 #![allow(clippy::unwrap_used, reason = "a test may fail this way")]
 
 mod arms;

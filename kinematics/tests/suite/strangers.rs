@@ -1,7 +1,7 @@
 //! Robot descriptions that are not shipped: classified, solved, or refused with a reason.
 //!
-//! `CANTER_URDFS` names a folder of URDF files, as the packages `example-robot-data` and
-//! `pybullet` bring them; without it there is nothing to do. Prints a table.
+//! `CANTER_URDFS` names a folder of URDF files, for example of the packages `example-robot-data`
+//! and `pybullet`; without it there is nothing to test. Prints a table.
 
 use crate::arms::Random;
 use kinematics::{Solver, UrdfError, urdf};

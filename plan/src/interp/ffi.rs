@@ -1,9 +1,9 @@
 //! The five functions for callers in C, C++ and other languages.
 //!
-//! The specification gives them no handle, so there is one interpreter in a process, behind a lock.
-//! [`canter_configure`] says where the world database is and who takes the commands; each command
-//! comes as one line of the text language. The only unsafe code of this crate is here: reading C
-//! strings and naming the functions (docs/decisions/0070).
+//! The specification gives them no handle, so there is one interpreter per process, behind a lock.
+//! [`canter_configure`] sets the world database and the function that receives the commands; each
+//! command comes as one line of the text language. The only unsafe code of this crate is here:
+//! reading C strings and naming the functions (docs/decisions/0070).
 #![allow(
     unsafe_code,
     reason = "C strings and unmangled names; see docs/decisions/0070"

@@ -1,4 +1,4 @@
-//! Types of expressions, with findings about those that make no sense.
+//! Types of expressions, with findings about type errors.
 
 use super::ast::{Expression, Keyword, Operator, Term};
 use super::check::Checker;

@@ -1,4 +1,4 @@
-//! The position in the tokens, and expressions.
+//! The parser: position in the tokens, and expressions.
 
 use super::ast::{Expression, Keyword, Name, Operator, Span, Term};
 use super::token::{Kind, Token};

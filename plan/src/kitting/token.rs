@@ -1,4 +1,4 @@
-//! From characters to tokens.
+//! Divides text into tokens.
 
 use super::ast::Span;
 use crate::finding::Finding;

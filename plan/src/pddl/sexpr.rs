@@ -1,4 +1,4 @@
-//! Symbolic expressions: what PDDL files are made of.
+//! Symbolic expressions, the syntax of PDDL files.
 
 use crate::finding::position;
 

@@ -1,4 +1,4 @@
-//! What a step asks for: commands for the robot, work for the factotum.
+//! Requests of a step: commands for the robot, requests to the factotum.
 
 use crcl::{Command, Pose};
 use nalgebra::{Isometry3, Vector3};

@@ -1,4 +1,4 @@
-//! The order of lists that leave it open: the one with the shortest predicted time.
+//! Chooses the order of lists that leave it open: the one with the shortest predicted time.
 
 use super::factotum::Factotum;
 use super::machine::{Chooser, Machine};

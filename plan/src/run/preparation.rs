@@ -1,4 +1,4 @@
-//! What is settled before the first step: the plan is sound, its parameters have values.
+//! Checks before the first step: the plan is correct, its parameters have values.
 
 use std::collections::BTreeMap;
 

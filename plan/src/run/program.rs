@@ -1,4 +1,4 @@
-//! A plan lowered to numbered nodes, so that a place in it is a number.
+//! A plan as numbered nodes, so that a place in it is a number.
 
 use crate::kitting::ast::{Action, Expression, Plan, Span, Statement};
 use crate::kitting::effects::{conflicts, steps};

@@ -1,4 +1,4 @@
-//! A motion that only takes time, by a simple model.
+//! A simulated motion that only computes times, by a simple model.
 
 use crcl::{Command, Pose};
 use nalgebra::Isometry3;

@@ -1,4 +1,4 @@
-//! Where a plan is, and what its next step asks for.
+//! The state of a running plan, and its next step.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Is the world consistent?
+//! Checks whether the world is consistent.
 
 use super::class::{Kind, stored_property};
 use super::{Class, Model, Object, Scalar};

@@ -1,8 +1,8 @@
 //! The world model: what is where in the workstation.
 //!
-//! [`Model`] is plain data in memory. [`Writer`] is the only type that can change the database and
-//! belongs to the controller; [`Reader`] is what an interpreter gets. Inside, lengths are metres and
-//! angles radians; files use the units of the workstation.
+//! [`Model`] is plain data in memory. [`Writer`] is the only type that can change the database;
+//! only the controller has one. An interpreter has a [`Reader`]. In the program, lengths are in
+//! metres and angles in radians; files use the units of the workstation.
 
 mod change;
 mod check;

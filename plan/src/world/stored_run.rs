@@ -1,4 +1,4 @@
-//! A run of a plan as the database has it.
+//! A run of a plan as stored in the database.
 
 use rusqlite::{Connection, OptionalExtension};
 

@@ -1,4 +1,4 @@
-//! Thirty bad plans and what is said about each.
+//! Thirty wrong plans and the findings about each.
 
 use plan::finding::Severity;
 use plan::kitting::{check, read};

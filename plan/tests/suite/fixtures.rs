@@ -1,4 +1,4 @@
-//! Things that several tests need.
+//! Fixtures for several tests.
 
 use std::path::Path;
 

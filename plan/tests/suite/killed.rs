@@ -1,4 +1,4 @@
-//! A run that is killed at any moment goes on from its database.
+//! A run that is killed at any time can be resumed from its database.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What single statements and expressions do, in small plans of their own.
+//! Single statements and expressions, each in a small plan.
 
 use plan::kitting::read;
 use plan::run::Event;

@@ -1,4 +1,4 @@
-//! One writer of a world at a time, and files that are taken away from under it.
+//! One writer of a world at a time, and database files that are removed during a run.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -1,6 +1,5 @@
-//! Where the modes of the language die: settings, units and the states of
-//! InitCanon and EndCanon turn each command, as it leaves the queue, into a
-//! self-contained [`Task`] in SI units.
+//! Applies the modes of the language (settings, units, the state between InitCanon and EndCanon):
+//! each command becomes a self-contained [`Task`] in SI units.
 
 mod pose;
 mod settings;

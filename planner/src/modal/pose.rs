@@ -1,4 +1,4 @@
-//! From the numbers of a program to a pose.
+//! Converts the numbers of a program into a pose.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 

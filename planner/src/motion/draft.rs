@@ -1,4 +1,4 @@
-//! A motion on its way to its certificate.
+//! A motion that is not certified yet.
 
 use trajectory::{MotionBounds, Trajectory};
 

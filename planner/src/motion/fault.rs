@@ -1,4 +1,4 @@
-//! What a planned motion may break of what its certificate has to say.
+//! The claims of a certificate that a planned motion may break.
 
 use thiserror::Error;
 

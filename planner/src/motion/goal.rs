@@ -1,4 +1,4 @@
-//! MoveTo: the configuration that is reached soonest, moved to in joint space.
+//! MoveTo: moves in joint space to the configuration that is reached soonest.
 
 use kinematics::{IkFailure, IkReport};
 use nalgebra::{Isometry3, SVector};

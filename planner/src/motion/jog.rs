@@ -31,12 +31,7 @@ pub enum Direction<const N: usize> {
 }
 
 impl<const N: usize> Planner<N> {
-    /// Plans the way from `start`, at rest, as far as the arm can go in a direction, within the
-    /// limits `most` of the controlled point.
-    ///
-    /// # Errors
-    /// [`MotionError`] when it cannot go in that direction at all.
-    pub fn jog(
+    pub(super) fn plan_jog(
         &self,
         direction: &Direction<N>,
         start: &SVector<f64, N>,

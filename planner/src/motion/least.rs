@@ -1,4 +1,4 @@
-//! A time that no motion within the limits can beat.
+//! A lower bound of the time of all motions within the limits.
 
 use nalgebra::SVector;
 use trajectory::smooth::{self, SmoothOptions};

@@ -10,6 +10,7 @@ mod draft;
 mod fault;
 mod goal;
 mod jog;
+mod kernel;
 mod least;
 mod motion_error;
 mod reach;
@@ -18,7 +19,7 @@ mod singular;
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
 use trajectory::bounds::Held;
-use trajectory::{JointLimits, MotionBounds, Trajectory};
+use trajectory::{JointLimits, MotionBounds, ToolLimits, Trajectory};
 
 pub use active::ActiveLimit;
 pub use certificate::{CrossingReport, LimitReport, MoveCertificate, Peaks};
@@ -29,6 +30,7 @@ use motion_error::figures;
 
 use certificate::Arm;
 use draft::Draft;
+use kernel::Kernel;
 
 use crate::task::{Move, Shape};
 
@@ -71,6 +73,7 @@ pub struct Planner<const N: usize> {
     limits: JointLimits<N>,
     joint_names: Vec<String>,
     flange_from_tool: Isometry3<f64>,
+    kernel: Kernel<N>,
 }
 
 impl<const N: usize> Planner<N> {
@@ -82,12 +85,13 @@ impl<const N: usize> Planner<N> {
         limits: JointLimits<N>,
         joint_names: Vec<String>,
     ) -> Self {
-        let solver = Solver::new(chain.with_tool(&flange_from_tool));
+        let kernel = Kernel::get();
         Self {
-            solver,
+            solver: (kernel.solver)(chain.with_tool(&flange_from_tool)),
             limits,
             joint_names,
             flange_from_tool,
+            kernel,
         }
     }
 
@@ -115,6 +119,44 @@ impl<const N: usize> Planner<N> {
     /// [`MotionError`] when any part of the move cannot be made; then nothing
     /// of it may be executed.
     pub fn plan(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.plan)(self, motion, start)
+    }
+
+    /// Plans the way from `start`, at rest, as far as the arm can go in a direction, within the
+    /// limits `most` of the controlled point.
+    ///
+    /// # Errors
+    /// [`MotionError`] when it cannot go in that direction at all.
+    pub fn jog(
+        &self,
+        direction: &Direction<N>,
+        start: &SVector<f64, N>,
+        most: &ToolLimits,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.jog)(self, direction, start, most)
+    }
+
+    /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the
+    /// joints: all branches, the nearest to `near` first.
+    #[must_use]
+    pub fn postures(&self, pose: &Isometry3<f64>, near: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
+        (self.kernel.postures)(self, pose, near)
+    }
+
+    fn find_postures(&self, pose: &Isometry3<f64>, near: &SVector<f64, N>) -> Vec<SVector<f64, N>> {
+        let branches = self.solver.solve_all(pose);
+        let mut postures: Vec<_> = branches.iter().map(|branch| branch.q).collect();
+        postures.extend(self.solver.nearest(pose, near).map(|solution| solution.q));
+        postures.sort_by(|a, b| (a - near).norm().total_cmp(&(b - near).norm()));
+        postures.dedup_by(|a, b| (*a - *b).amax() < 1e-6);
+        postures
+    }
+
+    fn plan_move(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,

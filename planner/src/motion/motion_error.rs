@@ -1,4 +1,4 @@
-//! Why a motion cannot be made.
+//! Why a motion cannot be planned.
 
 use thiserror::Error;
 use trajectory::TimingError;

@@ -1,4 +1,4 @@
-//! Reach, looked at before a curve is laid.
+//! Checks the reach before a curve is planned.
 
 use super::{MotionError, Planner};
 use crate::task::{Move, Shape};

@@ -1,4 +1,4 @@
-//! Paths that come so near to a singular pose that they cannot be timed.
+//! Detects paths that come so near to a singular pose that they have no time law.
 
 use kinematics::follow::FollowPoint;
 use kinematics::measure::dexterity;

@@ -1,4 +1,4 @@
-//! The arm as the checker sees it: plain forward kinematics of its own, from the URDF's joints.
+//! The checker's own forward kinematics, from the joints of the URDF.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 

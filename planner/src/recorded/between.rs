@@ -1,5 +1,5 @@
-//! What can happen between two samples: bounds that follow from the limits of the joints and the
-//! time between samples, and from nothing else.
+//! Bounds of the motion between two samples, from the limits of the joints and the time between
+//! samples alone.
 
 use crate::robot::JointLimits;
 

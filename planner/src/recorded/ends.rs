@@ -1,4 +1,4 @@
-//! Moves begin and end at rest, and end in their last pose.
+//! Rules: moves begin and end at rest, and end in their last pose.
 
 use nalgebra::Isometry3;
 

@@ -1,4 +1,4 @@
-//! Joint columns: limits, and each column against the others.
+//! Rules for the joint columns: limits, and each column against the others.
 
 use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;

@@ -1,13 +1,12 @@
-//! A recorded motion held against the program it came from.
+//! Checks a recorded motion against its program.
 //!
-//! Everything is judged from the samples: the program says what was asked for, the robot what is
-//! allowed, and plain arithmetic on the samples does the rest. Nothing is planned, and nothing of
-//! the planner, of its certificate or of its kinematics is used: forward kinematics, interpolation
-//! and passes are the checker's own.
+//! Everything is computed from the samples, the program and the limits of the robot. Nothing is
+//! planned, and the planner's certificates and kinematics are not used: forward kinematics,
+//! interpolation and the search for passes are the checker's own.
 //!
-//! What must hold is a list of [`Rule`]s. Samples are a time `h` apart, and what happens between
-//! them is not seen. Each rule allows for just what the limits of the joints make possible in `h`,
-//! so that no good motion is refused at any period, and finer samples prove more.
+//! What must hold is a list of [`Rule`]s. Samples are a time `h` apart; what happens between them
+//! is not recorded. Each rule allows for what the joints can do in `h` within their limits, and no
+//! more. So no correct motion is refused at any period, and a shorter period proves more.
 
 mod arm;
 mod between;

@@ -1,4 +1,4 @@
-//! What must hold of a recorded motion: the rules, each with a name and a statement.
+//! The rules for a recorded motion, each with a name and a statement.
 
 use serde::{Serialize, Serializer};
 

@@ -1,4 +1,4 @@
-//! What only a recording of a run has: path time and measured joints.
+//! Rules for columns that only a recording of a run has: path time and measured joints.
 
 use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;

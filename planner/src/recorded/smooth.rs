@@ -1,4 +1,4 @@
-//! Smooth moves: the poses passed in order within tolerance, along the straight legs.
+//! Rules for smooth moves: the poses are passed in order within tolerance, along the straight legs.
 //!
 //! There must be passing times, not decreasing, such that the controlled point is within the
 //! tolerance of each intermediate pose at its time and, from each to the next, within the corridor

@@ -1,4 +1,4 @@
-//! A recording cut into the commands of its program.
+//! A recording divided into the commands of its program.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Commands that move nothing: they do not, and last as long as they must.
+//! Rules for commands that move nothing: the arm rests, and they last as long as they must.
 
 use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;

@@ -1,4 +1,4 @@
-//! Straight moves: on the line, never back, turning in step.
+//! Rules for straight moves: on the line, never back, rotation in proportion to the distance.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 

@@ -1,4 +1,4 @@
-//! The time column and the command column.
+//! Rules for the time column and the command column.
 
 use super::finding::{Measure, RuleReport, Subject};
 use super::row::RecordedSample;

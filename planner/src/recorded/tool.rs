@@ -1,4 +1,4 @@
-//! The controlled point: pose columns, speed, acceleration and jerk.
+//! Rules for the controlled point: pose columns, speed, acceleration and jerk.
 
 use nalgebra::Isometry3;
 use trajectory::ToolLimits;

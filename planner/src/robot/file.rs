@@ -1,4 +1,4 @@
-//! Reading `robot.toml` and joining it with the URDF.
+//! Reads `robot.toml` and combines it with the URDF.
 
 use super::error::RobotError;
 use super::{EndEffector, Gripper, JointLimits, Robot, ToolChanger, ToolLimits};

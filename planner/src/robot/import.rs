@@ -1,4 +1,4 @@
-//! A robot folder from any URDF, with our own defaults for what it does not say.
+//! Makes a robot folder from any URDF, with Canter's defaults for what the URDF does not have.
 
 use super::Robot;
 use super::error::RobotError;

@@ -1,4 +1,4 @@
-//! Damage to single columns: each is then at odds with the others.
+//! Damage to single columns, which then contradict the others.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use planner::recorded::{RecordedSample, Rule};

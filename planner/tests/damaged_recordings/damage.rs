@@ -1,4 +1,4 @@
-//! One kind of damage: what it does, and the rule that it breaks.
+//! One kind of damage: its effect, and the rule that it breaks.
 
 use crcl::Command;
 use planner::recorded::{RecordedSample, Rule};

@@ -1,7 +1,7 @@
-//! Damaged recordings are refused by the rule that the damage breaks, and good ones are not.
+//! Damaged recordings are refused by the rule that the damage breaks; good recordings are accepted.
 //!
-//! The damages are of three sorts: columns changed so that they are at odds with others, times and
-//! commands changed, and sound recordings of another motion than the one that was asked for.
+//! There are three sorts of damage: columns that contradict others, changed times and commands, and
+//! valid recordings of another motion than the one that was asked for.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 

@@ -1,4 +1,4 @@
-//! Damage to what only a recording of a run has: path time and measured columns.
+//! Damage to columns that only a recording of a run has: path time and measured columns.
 
 use nalgebra::Vector3;
 use planner::recorded::{RecordedSample, Rule, RunColumns};

@@ -1,4 +1,4 @@
-//! Programs that every robot can do, made from its home pose, and recordings of them.
+//! Programs that every robot can execute, made from its home pose, and recordings of them.
 
 use crcl::{Command, LengthUnit, Pose, Program};
 use nalgebra::{Isometry3, Vector3};

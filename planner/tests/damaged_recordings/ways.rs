@@ -1,4 +1,4 @@
-//! Recordings that are sound in themselves, of another motion than the one that was asked for.
+//! Valid recordings of another motion than the one that was asked for.
 
 use crcl::{Command, CoordinateFrame, LengthUnit, Pose};
 use planner::recorded::Rule;

@@ -1,4 +1,4 @@
-//! What leaves the real-time thread in a period: the setpoint, and where the motion is.
+//! Output of the real-time thread in a period: the setpoint, and the progress of the motion.
 
 use ipc::{MAX_JOINTS, Setpoint, SetpointFlags};
 use nalgebra::SVector;

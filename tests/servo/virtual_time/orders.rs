@@ -1,4 +1,4 @@
-//! What operators ask, and when it acts.
+//! Orders of operators, and when they act.
 
 use realtime::{Piece, Sample, Segment};
 use servo::{Control, Event};

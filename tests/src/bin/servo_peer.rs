@@ -1,7 +1,7 @@
-//! An engine or a driver as a process of its own, to be killed and stopped by the tests.
+//! An engine or a driver as a separate process that tests kill and stop.
 //!
-//! `servo-peer driver ARM LOG` runs the simulated driver; `servo-peer engine ARM` drives it to
-//! and fro for ever and prints a line for each event; a line `recover` on its standard input asks
+//! `servo-peer driver ARM LOG` runs the simulated driver; `servo-peer engine ARM` drives it back
+//! and forth for ever and prints a line for each event; a line `recover` on its standard input asks
 //! for a new session. `servo-peer paced ARM COMMANDS` drives that many commands in step with any
 //! driver and says how fast that was.
 

@@ -1,4 +1,4 @@
-//! An engine or a driver as a process of its own, for the storm of stalls and kills.
+//! An engine or a driver as a separate process, for the test of random stalls and kills.
 //!
 //! `shuttle-peer driver ARM FILE` runs the simulated driver under a witness that writes to FILE.
 //! `shuttle-peer engine ARM` drives all joints from one end of their range to the other, as fast as

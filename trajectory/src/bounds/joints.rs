@@ -1,4 +1,4 @@
-//! Bounds of what the joints do: hulls of their polynomials.
+//! Bounds of the joint motion: hulls of its polynomials.
 
 use nalgebra::SVector;
 use realtime::Piece;

@@ -1,9 +1,9 @@
-//! Bounds of a motion of the joints, and of the tool that they carry, for all times.
+//! Bounds of a motion of the joints, and of the tool, for all times.
 //!
-//! What joints do is a polynomial, bounded by the hull of its Bernstein points. What the tool does
-//! is not, but it is analytic: over a stretch of time it is a quartic through five moments, give
-//! or take an error that is bounded by derivatives of higher order. Only stretches that may hold
-//! the largest value are looked at more closely.
+//! The joint motion is a polynomial, bounded by the hull of its Bernstein points. The motion of the
+//! tool is not a polynomial, but it is analytic: over an interval of time it is a quartic through
+//! its values at five times, plus an error that is bounded by derivatives of higher order. Only
+//! intervals that may contain the largest value are refined.
 
 mod found;
 mod joints;

@@ -1,4 +1,4 @@
-//! Bounds of what the tool does over a stretch of time.
+//! Bounds of the tool's motion over an interval of time.
 
 use nalgebra::{SVector, Vector3};
 use realtime::Piece;

@@ -1,4 +1,4 @@
-//! Bounds of the way of the tool: how far it leaves a line or the legs between poses.
+//! Bounds of the tool's distance from a line or from the legs between poses.
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! A second look at a planned move.
+//! An independent check of a planned move.
 
 use realtime::Piece;
 

@@ -1,4 +1,4 @@
-//! Back inside the limits, when a start breaks them.
+//! Brakes a joint into its limits, if the start state breaks them.
 
 use super::extremal::{Bounds, End};
 use super::profile::Point;

@@ -1,4 +1,4 @@
-//! What must hold before and after planning.
+//! Checks before and after planning.
 
 use super::error::OtgError;
 use super::joint::Joint;

@@ -1,4 +1,4 @@
-//! The profile that turns to one constant velocity at once: the one that strays least.
+//! The profile that goes to one constant velocity at once: its excess motion is the smallest.
 
 use super::axis::Axis;
 use super::extremal::{Bounds, End, pulse};

@@ -1,4 +1,4 @@
-//! The outermost positions of one joint's part of a move.
+//! The smallest and largest position of one joint during a move.
 
 use super::motion::Track;
 

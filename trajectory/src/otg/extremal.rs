@@ -1,4 +1,4 @@
-//! The farthest a joint can get in a given time, in one direction, in closed form.
+//! The largest displacement of a joint in a given time, in one direction, in closed form.
 
 /// One direction of the normalised problem of one joint: how far can it get in a given time?
 ///

@@ -1,4 +1,4 @@
-//! One joint's problem: from SI units to the normalised form and back.
+//! The problem of one joint: conversion between SI units and the normalised form.
 
 use super::axis::Axis;
 use super::brake::Brake;

@@ -1,4 +1,4 @@
-//! What the joints must not exceed.
+//! Limits of the joints.
 
 use nalgebra::SVector;
 

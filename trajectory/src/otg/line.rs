@@ -1,4 +1,4 @@
-//! All joints along one straight line in joint space.
+//! Moves all joints along one straight line in joint space.
 
 use nalgebra::SVector;
 

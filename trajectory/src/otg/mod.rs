@@ -3,8 +3,8 @@
 //! [`Otg::plan`] takes `N` joints from any position, velocity and acceleration to any other, under
 //! limits on velocity, acceleration and jerk, and returns a [`Motion`]: plain data of fixed size,
 //! sampled at any time. Neither planning nor sampling allocates, so both may run in every control
-//! cycle; [`Running`] does that and never gets slower by it. [`Audit`] checks a motion from its
-//! pieces alone.
+//! cycle; [`Running`] does that, and the arrival never becomes later by it. [`Audit`] checks a
+//! motion from its pieces alone.
 //!
 //! ```
 //! use nalgebra::vector;
@@ -21,20 +21,20 @@
 //!
 //! # How it works
 //!
-//! Each joint is first put into units in which its acceleration and jerk limits are 1 (`joint`).
-//! A start that breaks limits is braked (`brake`). For a given duration the displacements a joint
-//! can reach form an interval; both its ends have a closed form (`side`). So the joint can arrive
-//! after that duration exactly if its distance lies in the interval, and a weighted mean of the two
-//! extreme profiles then keeps every limit and ends at the target (`axis`): no root has to be found
-//! for a given duration. The shortest common duration (`plan`) starts from the slowest joint's, and
-//! every joint raises it to its next possible duration until all agree; only there is a root found,
-//! by Newton's method between bounds. A joint whose mean profile would leave its position range
-//! gets the profile that settles on one velocity at once (`direct`).
+//! Each joint is first put into units in which its acceleration and jerk limits are 1 (`joint`). A
+//! start that breaks limits is braked (`brake`). For a given duration the displacements that a
+//! joint can reach form an interval; both its ends have a closed form (`extremal`). So the joint
+//! can arrive after that duration exactly if its distance lies in the interval. Then a weighted
+//! mean of the two extreme profiles keeps every limit and ends at the target (`axis`): no root
+//! finding is needed for a given duration. The search for the shortest common duration (`plan`)
+//! starts from that of the slowest joint; every joint raises it to its next possible duration until
+//! all agree. Only there roots are found, by Newton's method between bounds. A joint whose mean
+//! profile would leave its position range gets the profile with one constant velocity (`direct`).
 //!
 //! # Source
-//! The closed forms are derived in `side` from Pontryagin's principle; problem and benchmark are
-//! those of L. Berscheid, T. Kröger, "Jerk-limited Real-time Trajectory Generation with Arbitrary
-//! Target States", RSS 2021.
+//! The closed forms are derived in `extremal` from Pontryagin's principle; problem and benchmark
+//! are those of L. Berscheid, T. Kröger, "Jerk-limited Real-time Trajectory Generation with
+//! Arbitrary Target States", RSS 2021.
 
 mod audit;
 mod axis;

@@ -1,4 +1,4 @@
-//! What kind of move is asked for.
+//! Options of a move.
 
 /// What of the target has to be reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

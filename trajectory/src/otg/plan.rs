@@ -1,4 +1,4 @@
-//! From states, limits and options to a move.
+//! Plans a move from states, limits and options.
 
 use super::error::OtgError;
 use super::joint::{Given, Joint};

@@ -1,4 +1,4 @@
-//! A normalised profile as a handful of phases, and the weighted mean of two of them.
+//! A normalised profile as a few phases, and the weighted mean of two profiles.
 
 /// Position, velocity, acceleration and jerk of one joint, normalised.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

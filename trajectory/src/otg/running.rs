@@ -1,4 +1,4 @@
-//! A move that is under way and is planned anew on the way.
+//! A running move that is planned again while it runs.
 
 use realtime::Sample;
 

@@ -1,4 +1,4 @@
-//! What a joint group does at one instant.
+//! The state of a group of joints at one time.
 
 use nalgebra::SVector;
 use realtime::Sample;

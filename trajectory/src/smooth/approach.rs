@@ -1,9 +1,8 @@
 //! Where a motion comes closest to a pose.
 //!
-//! The first local minimum of the distance counts. Minima are told from rounding by what
-//! the distance rises behind them, so that a tool that rests, or turns on the spot, has
-//! one approach, however its place trembles in the last digits, and the same one in a
-//! part of a motion as in the whole.
+//! The first local minimum of the distance counts. A minimum is distinguished from rounding by the
+//! rise of the distance after it. So a tool that rests, or turns on the spot, has one approach in
+//! spite of rounding, and the same one in a part of a motion as in the whole.
 
 use nalgebra::{Isometry3, Vector3};
 

@@ -1,4 +1,4 @@
-//! What is known of a motion for every moment, as data.
+//! What is proved of a motion for all times, as data.
 
 use nalgebra::{Isometry3, Vector3};
 

@@ -1,4 +1,4 @@
-//! The plainest motion: straight legs with a stop at each pose.
+//! The simplest motion: straight legs with a stop at each pose.
 
 use nalgebra::{Isometry3, Vector3};
 

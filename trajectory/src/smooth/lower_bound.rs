@@ -1,16 +1,15 @@
-//! A time that no motion through the poses within the limits can beat.
+//! A lower bound of the time of all motions through the poses within the limits.
 //!
-//! With tolerance and corridor zero the motion is known: straight legs from stop to stop, turned
-//! in step, each of which takes the time of the tightest limit.
+//! With tolerance and corridor zero the motion is known: straight legs from stop to stop, with the
+//! rotation in proportion. Each takes the time of its tightest limit.
 //!
 //! Otherwise two bounds that hold for every motion from rest to rest, whatever its shape:
 //!
-//! - **Length.** The speed is at most what the limits allow since the start and
-//!   until the end, so the way covered in a given time is bounded; the way is
-//!   at least the legs, less the tolerances at both of their ends.
-//! - **Turning back.** Seen along any one direction, the motion stands still
-//!   wherever it turns back. Between two such moments it covers a known
-//!   distance, from standing to standing.
+//! - **Length.** The limits bound the speed at any time after the start and before the end, so the
+//!   distance covered in a given time is bounded; the distance is at least the legs, less the
+//!   tolerances at both of their ends.
+//! - **Turning back.** Along any direction, the speed is zero where the motion turns back. Between
+//!   two such times it covers a known distance, from rest to rest.
 
 use nalgebra::{Isometry3, Vector3};
 

@@ -1,16 +1,15 @@
 //! Smooth motion through a list of poses: intermediate poses are passed within
 //! a tolerance, without stopping, under limits of speed, acceleration and jerk.
 //!
-//! [`plan`] gives the fastest motion it can certify, and always gives one: what
-//! cannot be blended is joined by an exact stop, which needs no tolerance. The
-//! [`Certificate`] of a [`SmoothPlan`] holds for every moment of the motion;
-//! deviation, tolerance and time are reported for each intermediate pose.
+//! [`plan`] returns the fastest motion that it can certify. It always returns one: where blending
+//! is not possible, there is an exact stop, which needs no tolerance. The [`Certificate`] of a
+//! [`SmoothPlan`] holds for all times of the motion; deviation, tolerance and time are reported for
+//! each intermediate pose.
 //!
-//! This module knows no robot: positions are of the controlled point, limits
-//! are norms of its velocity, acceleration and jerk and of the angular ones. A
-//! plan is a [`ToolCurve`](crate::ToolCurve) whose parameter is time;
-//! where joints need more time, the path timing stretches it, and stretching
-//! changes no geometry.
+//! This module knows no robot: positions are of the controlled point, limits are norms of its
+//! velocity, acceleration and jerk and of the angular ones. A plan is a
+//! [`ToolCurve`](crate::ToolCurve) whose parameter is time; if joints need more time, the path
+//! timing stretches time, which does not change the geometry.
 
 mod approach;
 mod certificate;

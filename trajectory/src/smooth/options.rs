@@ -1,4 +1,4 @@
-//! What a smooth motion may do, and why one cannot be planned.
+//! Options of a smooth motion, and why one cannot be planned.
 
 use nalgebra::Isometry3;
 use thiserror::Error;

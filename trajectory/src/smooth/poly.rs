@@ -1,7 +1,7 @@
 //! Polynomials on an interval: power form, Bernstein form, products.
 //!
-//! The curve of a polynomial lies in the convex hull of its Bernstein
-//! coefficients, so a bound on the coefficients is a bound for every moment.
+//! The curve of a polynomial lies in the convex hull of its Bernstein coefficients, so a bound on
+//! the coefficients holds for all times.
 //!
 //! # Source
 //! G. Farin, "Curves and Surfaces for CAGD", 5th edition 2002, chapters 5, 6.

@@ -1,4 +1,4 @@
-//! One stretch of a smooth motion: a polynomial in time.
+//! One span of a smooth motion: a polynomial in time.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 

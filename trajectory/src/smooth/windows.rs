@@ -1,4 +1,4 @@
-//! Long lists, window by window, so that motion can start after the first.
+//! Plans long lists window by window, so that motion can start after the first window.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 

@@ -1,4 +1,4 @@
-//! Bounds on every limit over a motion in pieces.
+//! Bounds of every limited quantity over a motion in pieces.
 
 use nalgebra::{SVector, Vector3};
 use realtime::Piece;

@@ -1,4 +1,4 @@
-//! Where the cells of a law lie, and what bounds a path.
+//! The cells of a law, and the limits of a path.
 
 use super::reachability::ReachabilityPass;
 use super::reparametrization::Reparametrization;

@@ -1,4 +1,4 @@
-//! The path at the nodes and middles of a grid, seen once for all that need it.
+//! The path at the nodes and middles of a grid, evaluated once.
 
 use nalgebra::{SVector, Vector3};
 

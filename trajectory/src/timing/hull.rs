@@ -1,4 +1,4 @@
-//! Hulls of the derivatives of a piece, all joints at once.
+//! Bernstein hulls of the derivatives of a piece, all joints at once.
 
 use nalgebra::SVector;
 use realtime::Piece;

@@ -1,4 +1,4 @@
-//! The interior point method that makes a time law the fastest.
+//! The interior point method that finds the fastest time law.
 //!
 //! Every iterate is feasible, so the search may stop at any time.
 //!

@@ -1,4 +1,4 @@
-//! The law alone, before it is bounded and made into pieces.
+//! The law alone, before it is made into pieces and bounded.
 
 use super::TimingOptions;
 use super::grid::{Bounded, Grid};

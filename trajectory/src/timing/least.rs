@@ -1,4 +1,4 @@
-//! The least time of a straight way, as a bound for any path between the same ends.
+//! The least time along a straight line, as a lower bound for any path between the same ends.
 
 use super::grid::Bounded;
 use super::{Boundary, TimingOptions};

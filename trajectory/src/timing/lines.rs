@@ -1,4 +1,4 @@
-//! The rows of a problem with their states, slot by slot in the order they stand in.
+//! The rows of a problem with their states, slot by slot in memory order.
 
 use super::problem::{Basis, Problem};
 use super::simd::Lane;

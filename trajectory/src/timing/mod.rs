@@ -1,9 +1,9 @@
 //! The fastest time law along a given path.
 //!
-//! A survey of the path gives the fastest law without jerk limits (reachability analysis). Made
-//! smooth, it becomes the parameter in which the law proper is sought: a C1, piecewise quadratic
-//! squared rate, found by an interior point method under all limits at once. The law then becomes
-//! quintic pieces in time, and every limit is bounded on the pieces themselves, for all times.
+//! A reachability pass over the path gives the fastest law without jerk limits. Smoothed, it
+//! becomes the parameter in which the final law is computed: a C1, piecewise quadratic squared
+//! rate, found by an interior point method under all limits at once. The law then becomes quintic
+//! pieces in time, and every limit is bounded on the pieces themselves, for all times.
 
 mod audit;
 mod band;

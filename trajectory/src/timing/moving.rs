@@ -1,8 +1,8 @@
 //! Laws that start from a given state of motion.
 //!
-//! Such a law cannot be slowed down as a whole, so a feasible one has to be found first: with all
-//! limits wide enough for the first guess, go to the middle of what is feasible, narrow the
-//! limits to what that needs, and so on until they are the true ones.
+//! Such a law cannot be slowed down uniformly, so a feasible one has to be found first. All limits
+//! are widened to contain the first guess; the iterate moves to the centre of the feasible set; the
+//! limits are narrowed to what it needs; and so on until they are the true ones.
 
 use super::certificate::Limit;
 use super::grid::Bounded;

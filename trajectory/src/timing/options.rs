@@ -1,4 +1,4 @@
-//! What is asked of a time law.
+//! Options of a time law.
 
 use crate::TimingError;
 

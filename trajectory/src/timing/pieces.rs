@@ -1,4 +1,4 @@
-//! From a law over the path to quintic pieces in time.
+//! Converts a law over the path into quintic pieces in time.
 
 use nalgebra::SVector;
 use realtime::{Piece, Sample};

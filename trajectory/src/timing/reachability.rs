@@ -1,4 +1,5 @@
-//! A first look at a path: is it sound, and how fast could it be without jerk limits.
+//! The reachability pass over a path: whether the path is valid, and the fastest law without jerk
+//! limits.
 
 use nalgebra::{SVector, Vector3};
 

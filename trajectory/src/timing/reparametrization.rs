@@ -1,4 +1,4 @@
-//! A change of the path parameter to one that runs like time.
+//! A change of the path parameter to one that is nearly proportional to time.
 
 use super::Boundary;
 

@@ -1,4 +1,4 @@
-//! The rows of a path and its limits at the places of a [`Problem`].
+//! The rows of a path and its limits at the gridpoints of a [`Problem`].
 
 use nalgebra::{SVector, Vector3};
 

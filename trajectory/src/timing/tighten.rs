@@ -1,5 +1,5 @@
-//! From a problem to the law that ships: solve, bound between the grid points, tighten the rows
-//! that are exceeded there, solve again.
+//! Computes the final law of a problem: solves, bounds between the gridpoints, tightens the rows
+//! that are exceeded there, solves again.
 
 use super::audit::Audit;
 use super::certificate::{Limit, order};

@@ -1,4 +1,4 @@
-//! Laws that need no peer.
+//! Properties that need no other library.
 
 use measure::{Ends, Problems};
 use nalgebra::vector;

@@ -1,4 +1,4 @@
-//! Laws of state-to-state moves, and agreement with a peer.
+//! Properties of state-to-state moves, and agreement with rsruckig.
 
 mod laws;
 mod peer;

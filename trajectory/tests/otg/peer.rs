@@ -1,4 +1,4 @@
-//! Durations beside rsruckig: equal to 1e-9, or shorter (and then audited, as all are).
+//! Durations compared with rsruckig: equal to 1e-9, or shorter. All motions are audited.
 
 use rsruckig::prelude as peer;
 

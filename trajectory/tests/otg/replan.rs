@@ -1,4 +1,4 @@
-//! Planning again on the way.
+//! Planning again during the motion.
 
 use measure::{Ends, Problems};
 use trajectory::otg::{Otg, Problem, Running};

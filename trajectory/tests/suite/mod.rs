@@ -1,5 +1,4 @@
-//! The motion suite: used by the tests of this crate, by those of the engine
-//! and by the benchmark.
+//! The motion suite, for the tests of this crate and others, and for the benchmark.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! `canter bench`: trajectory generation, measured on this machine.
+//! `canter bench`: measures trajectory generation on this machine.
 
 mod motion;
 mod otg;

@@ -1,4 +1,4 @@
-//! Moving by hand, with a dead man's switch: a jog lasts as long as requests keep coming.
+//! Jogging with a dead man's switch: a jog lasts as long as requests keep coming.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,5 @@
-//! What the servo thread reports, and what the session tells of it, in the order of the commands.
+//! Reads the reports of the servo thread and makes the session's notes, in the order of the
+//! commands.
 
 use std::sync::PoisonError;
 

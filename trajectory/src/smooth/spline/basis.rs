@@ -1,7 +1,7 @@
 //! The uniform quartic B-spline.
 //!
-//! Control point `k` acts on the spans `k - 4 ..= k`; span `k` runs over one
-//! knot interval and is ruled by the control points `k ..= k + 4`.
+//! Control point `k` affects the spans `k - 4 ..= k`; span `k` is one knot interval and depends on
+//! the control points `k ..= k + 4`.
 //!
 //! # Source
 //! C. de Boor, "A Practical Guide to Splines", 1978, chapter 10, for uniform

@@ -1,11 +1,10 @@
 //! Minimum time over a spline through balls, as a convex problem.
 //!
-//! Unknown are the control points `c` and `z = (h / scale)^3`, with the knot
-//! spacing `h`. With `D1, D2, D3` the differences of control points,
-//! `|D1 c| <= V h`, `|D2 c| <= A h^2`, `|D3 c| <= J h^3` bound speed,
-//! acceleration and jerk for every moment; in `z` all three are convex. A pass
-//! is a ball around a pose at the closest approach, the corridor a distance
-//! from the leg at each knot and between.
+//! Unknown are the control points `c` and `z = (h / scale)^3`, with the knot spacing `h`. With `D1,
+//! D2, D3` the differences of control points, `|D1 c| <= V h`, `|D2 c| <= A h^2`, `|D3 c| <= J h^3`
+//! bound speed, acceleration and jerk for all times; in `z` all three are convex. A via point is a
+//! ball around a pose at the closest approach; the corridor is a distance from the leg at each knot
+//! and between knots.
 
 use super::basis::{self, START, weights};
 

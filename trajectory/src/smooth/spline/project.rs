@@ -1,5 +1,5 @@
-//! Passing times: the closest approach to each ball, in order; and how much
-//! room an iterate needs.
+//! Passing times: the closest approach to each ball, in order. Also how much an iterate exceeds its
+//! bounds.
 
 use super::basis::{FIRST, SECOND, THIRD};
 use super::problem::{Point, Problem, Room, part, square};

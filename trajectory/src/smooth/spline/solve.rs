@@ -1,5 +1,5 @@
-//! The interior point iteration: anytime, every iterate after the first
-//! feasible one is a motion.
+//! The interior point iteration. It may stop at any time: every iterate after the first feasible
+//! one is a valid motion.
 
 use super::newton::{Barrier, Step, System};
 use super::problem::{Point, Problem, Room};

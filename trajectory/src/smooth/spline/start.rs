@@ -1,5 +1,5 @@
-//! First iterate: control points on the polyline, at the places where a cheap
-//! look-ahead over junction speeds would have the tool.
+//! First iterate: control points on the polyline, at the positions that a simple look-ahead over
+//! junction speeds gives.
 
 use super::problem::{Point, Problem, square};
 
