@@ -20,7 +20,6 @@ mod plan_costs;
 mod planned_motions;
 mod planned_once;
 mod plans;
-mod recordings;
 mod runs;
 mod session;
 mod shared_memory;

@@ -1,6 +1,12 @@
 //! Recordings of running arms: what is written can be read, judged, and executed again with equal
 //! bits; a kill loses a second at most; a fault leaves the minute before it.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(dead_code, reason = "helpers that the other tests use")]
+
+#[path = "../suite/canter.rs"]
+mod canter;
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
