@@ -95,6 +95,8 @@ function setStatus(message) {
   get('state').title = text;
   get('state').dataset.kind = kind;
   get('recover').hidden = kind !== 'fault';
+  get('resume').hidden = kind !== 'held';
+  get('pause').hidden = kind === 'held';
   notice(message.engine ? '' : message.reason);
   if (message.replay) player.set(message.replay);
   if (!status || !robot) return;

@@ -112,7 +112,8 @@ export class Program {
     const index = running && id >= running.first && id <= running.last ? id - running.first : -1;
     const command = this.plan && this.plan.commands.find((found) => found.index === index);
     const line = command && !this.edited ? command.line : 0;
-    if (line !== this.line) { this.line = line; this.draw(); this.follow(line); }
+    if (line !== this.line) { this.line = line; this.draw(); }
+    this.follow(line);
     this.certify(command || null, time);
     return command || null;
   }
@@ -169,6 +170,7 @@ export class Program {
     const limits = [...new Set(certificate.active.map((stretch) => stretch.limit))];
     for (const stretch of certificate.active) {
       const part = document.createElement('div');
+      part.style.left = `${stretch.start_s / certificate.duration_s * 100}%`;
       part.style.width = `${(stretch.end_s - stretch.start_s) / certificate.duration_s * 100}%`;
       part.style.background = JOINTS[limits.indexOf(stretch.limit) % JOINTS.length];
       part.title = `${stretch.limit}: ${stretch.start_s.toFixed(3)} to ${stretch.end_s.toFixed(3)} s`;

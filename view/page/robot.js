@@ -110,7 +110,7 @@ export class Robot {
     const add = (from, to, radius) => {
       const geometry = new CylinderGeometry(radius, radius, (to - from) * length, 24);
       geometry.rotateX(Math.PI / 2);
-      const mesh = new Mesh(geometry, this.material(0x39434f));
+      const mesh = new Mesh(geometry, this.material(0x66717f));
       mesh.position.copy(end).multiplyScalar((from + to) / 2);
       mesh.quaternion.copy(turn);
       mesh.castShadow = true;

@@ -98,7 +98,7 @@ export class Stage {
   theme() {
     this.scene.background = new Color(styled('--field'));
     if (this.grid) { this.scene.remove(this.grid); this.grid.dispose(); }
-    this.grid = new GridHelper(4, 40, new Color(styled('--dim')), new Color(styled('--edge')));
+    this.grid = new GridHelper(4, 40, new Color(styled('--edge')).lerp(new Color(styled('--dim')), 0.35), new Color(styled('--edge')));
     this.grid.rotation.x = Math.PI / 2;
     this.grid.material.transparent = true;
     this.grid.material.opacity = 0.55;
