@@ -17,6 +17,13 @@ pub(crate) struct ProgramArgument {
     /// File of canonical commands, text or JSON; `-` is standard input
     #[arg(value_name = "PROGRAM")]
     path: String,
+    #[command(flatten)]
+    reading: ReadingOptions,
+}
+
+/// How a program is read.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ReadingOptions {
     /// Refuse the extensions of the language
     #[arg(long)]
     strict: bool,
@@ -69,6 +76,14 @@ pub(crate) struct ProgramFile {
 }
 
 impl ProgramArgument {
+    /// The program at a path.
+    pub(crate) fn new(path: &str, reading: &ReadingOptions) -> Self {
+        Self {
+            path: path.to_owned(),
+            reading: reading.clone(),
+        }
+    }
+
     /// Reads and checks the program as far as that needs no robot.
     ///
     /// # Errors
@@ -81,10 +96,10 @@ impl ProgramArgument {
             &self.path
         };
         let options = ReadOptions {
-            strict: self.strict,
+            strict: self.reading.strict,
             ..ReadOptions::default()
         };
-        let json = match self.form {
+        let json = match self.reading.form {
             Form::Text => false,
             Form::Json => true,
             Form::Auto => {
@@ -98,11 +113,11 @@ impl ProgramArgument {
             crcl::text::read_bytes
         };
         let mut reading = read(&bytes, &options);
-        let default_length = self.default_length.into();
+        let default_length = self.reading.default_length.into();
         // What comes after a fault of form may only be its consequence.
         if !reading.findings.iter().any(is_unreadable) {
             let options = CheckOptions {
-                strict: self.strict,
+                strict: self.reading.strict,
                 default_length,
             };
             reading

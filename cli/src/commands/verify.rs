@@ -11,10 +11,9 @@ use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::program::{ProgramArgument, ProgramFile};
+use crate::program::{ProgramArgument, ProgramFile, ReadingOptions};
 use crate::recorded_program::RecordedFile;
-use crate::robot::RobotOption;
-use crate::{input, output};
+use crate::{input, output, robot};
 
 /// Check a recorded motion against its program, from the samples alone
 ///
@@ -27,10 +26,15 @@ pub(crate) struct Verify {
     /// CSV file of samples, `-` is standard input; or a recording, which has its program and robot
     #[arg(value_name = "SAMPLES.csv|FILE.mcap")]
     samples: String,
+    /// File of canonical commands, text or JSON; a recording has its own
+    #[arg(value_name = "PROGRAM")]
+    program: Option<String>,
     #[command(flatten)]
-    program: Option<ProgramArgument>,
-    #[command(flatten)]
-    robot: Option<RobotOption>,
+    reading: ReadingOptions,
+    /// Shipped robot (see `canter robots list`) or a folder with robot.urdf and robot.toml; a
+    /// recording has its own
+    #[arg(short, long, value_name = "R")]
+    robot: Option<String>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -47,8 +51,8 @@ impl Verify {
             let cause = anyhow!("a CSV file needs PROGRAM and --robot; a recording has both");
             return Err(Failure::new(Exit::Usage, cause));
         };
-        let robot = robot.load()?;
-        let program = program.read()?;
+        let robot = robot::load(robot)?;
+        let program = ProgramArgument::new(program, &self.reading).read()?;
         if program.exit() != Exit::Done {
             program.report();
             return Ok(program.exit());
@@ -80,13 +84,13 @@ impl Verify {
     fn run_recording(&self, path: &Path) -> Result<Exit, Failure> {
         let recorded = RecordedFile::read(path)?;
         let robot = match &self.robot {
-            Some(option) => option.load()?,
+            Some(name) => robot::load(name)?,
             None => recorded.robot()?,
         };
         let mut exit = Exit::Done;
         for given in recorded.programs(self.json)? {
             let program = match &self.program {
-                Some(argument) => argument.read()?,
+                Some(path) => ProgramArgument::new(path, &self.reading).read()?,
                 None => ProgramFile::given(&given),
             };
             if program.exit() != Exit::Done {
