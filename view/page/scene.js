@@ -10,7 +10,7 @@ import { ramp, styled } from './colours.js';
 import { Robot } from './robot.js';
 
 const TRAIL = 6000;
-const CAMERAS = { iso: [1.15, -1.35, 0.95], front: [2.1, 0, 0.5], side: [0, -2.1, 0.5], top: [0.001, 0, 2.3] };
+const CAMERAS = { iso: [0.98, -1.16, 0.8], front: [2.1, 0, 0.5], side: [0, -2.1, 0.5], top: [0.001, 0, 2.3] };
 
 /** Line segments that are drawn with a width in pixels and a colour at each end. */
 class Segments {
