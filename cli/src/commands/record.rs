@@ -88,26 +88,8 @@ impl Record {
             arm,
             path.display()
         ));
-        let mut chronicle = Chronicle::default();
-        let (begun, mut asked, mut heard) = (Instant::now(), None::<Instant>, Instant::now());
-        let over = |at: Instant| {
-            self.seconds
-                .is_some_and(|seconds| at.elapsed().as_secs_f64() >= seconds)
-        };
-        while !stop.load(Ordering::Relaxed) && !over(begun) && heard.elapsed() < SILENCE {
-            let samples = watch.look(&observer);
-            if !samples.is_empty() {
-                heard = Instant::now();
-            }
-            recording.put(samples);
-            if asked.is_none_or(|at| at.elapsed() >= ASK) {
-                asked = Some(Instant::now());
-                chronicle.ask(&engine, &recording, watch.missed);
-            }
-            sleep(LOOK);
-        }
-        chronicle.ask(&engine, &recording, watch.missed);
-        if heard.elapsed() >= SILENCE {
+        let silent = self.follow((&engine, &observer), (&mut watch, &recording), &stop);
+        if silent {
             printer.note("canter: the engine has ended, and so does the recording");
         }
         let summary = recording.close()?;
@@ -119,6 +101,35 @@ impl Record {
             ));
         }
         Ok(Exit::Done)
+    }
+
+    /// Records until it is told to end; says whether the engine fell silent.
+    fn follow(
+        &self,
+        (engine, observer): (&EngineClient, &Observer),
+        (watch, recording): (&mut Watch, &Recording),
+        stop: &AtomicBool,
+    ) -> bool {
+        let mut chronicle = Chronicle::default();
+        let (begun, mut asked, mut heard) = (Instant::now(), None::<Instant>, Instant::now());
+        let over = || {
+            let seconds = begun.elapsed().as_secs_f64();
+            self.seconds.is_some_and(|most| seconds >= most)
+        };
+        while !stop.load(Ordering::Relaxed) && !over() && heard.elapsed() < SILENCE {
+            let samples = watch.look(observer);
+            if !samples.is_empty() {
+                heard = Instant::now();
+            }
+            recording.put(samples);
+            if asked.is_none_or(|at| at.elapsed() >= ASK) {
+                asked = Some(Instant::now());
+                chronicle.ask(engine, recording, watch.missed);
+            }
+            sleep(LOOK);
+        }
+        chronicle.ask(engine, recording, watch.missed);
+        heard.elapsed() >= SILENCE
     }
 }
 

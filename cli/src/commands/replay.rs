@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -174,14 +174,18 @@ fn execute(
         .session
         .execute(program.program(), plan)
         .map_err(|error| Failure::new(Exit::Refused, error))?;
-    let last = ids.last().copied().unwrap_or(0);
+    finish(&mut host, ids.last().copied().unwrap_or(0))
+}
+
+/// Waits for the last command and gives all periods.
+fn finish(host: &mut Host, last: u32) -> Result<Vec<RunSample>, Failure> {
     let mut samples = Vec::new();
-    let mut silent = std::time::Instant::now();
+    let mut heard = Instant::now();
     loop {
         let note = host.turn()?;
         let fresh = host.samples();
         if !fresh.is_empty() {
-            silent = std::time::Instant::now();
+            heard = Instant::now();
         }
         samples.extend(fresh);
         match note {
@@ -193,14 +197,14 @@ fn execute(
                 return Err(Failure::new(Exit::Refused, anyhow!(error.message)));
             }
             Some(Note::Closed) => return Err(Failure::new(Exit::Internal, anyhow!("it ended"))),
-            _ if silent.elapsed() > PATIENCE => {
+            _ if heard.elapsed() > PATIENCE => {
                 let cause = anyhow!("no period for {} s", PATIENCE.as_secs());
                 return Err(Failure::new(Exit::NoPeer, cause));
             }
             _ => {}
         }
     }
-    let _ = host.close()?;
+    host.close()?;
     samples.extend(host.samples());
     Ok(samples)
 }
