@@ -156,6 +156,7 @@ function follow() {
   stage.setJoints(samples.newestJoints(true));
   const time = samples.at(newest, PATH_TIME);
   command = program.at(samples.at(newest, COMMAND), time);
+  if (command) stage.cross(command.index, time);
   progress(time);
 }
 

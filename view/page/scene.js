@@ -10,6 +10,8 @@ import { ramp, styled } from './colours.js';
 import { Robot } from './robot.js';
 
 const TRAIL = 6000;
+const AHEAD = new Color(0x0072b2);
+const CROSSED = new Color(0xe69f00);
 const CAMERAS = { iso: [0.98, -1.16, 0.8], front: [2.1, 0, 0.5], side: [0, -2.1, 0.5], top: [0.001, 0, 2.3] };
 
 /** Line segments that are drawn with a width in pixels and a colour at each end. */
@@ -207,17 +209,32 @@ export class Stage {
     for (const command of plan.commands) {
       for (const pass of (command.certificate && command.certificate.poses) || []) {
         const pose = command.poses[pass.index - 1];
-        if (pose) found.push({ pose, radius: Math.max(pass.tolerance_m, 0.002) });
+        if (pose) found.push({ pose, radius: Math.max(pass.tolerance_m, 0.002), command: command.index, time: pass.time_s });
       }
     }
     if (found.length === 0) return;
-    const material = new MeshBasicMaterial({ color: 0x0072b2, transparent: true, opacity: 0.22, depthWrite: false });
+    this.crossings = found;
+    const material = new MeshBasicMaterial({ transparent: true, opacity: 0.28, depthWrite: false });
     this.balls = new InstancedMesh(new SphereGeometry(1, 20, 14), material, found.length);
     for (const [index, { pose, radius }] of found.entries()) {
       this.balls.setMatrixAt(index, new Matrix4().makeScale(radius, radius, radius).setPosition(...pose));
+      this.balls.setColorAt(index, AHEAD);
     }
+    this.passed = 0;
     this.balls.frustumCulled = false;
     this.scene.add(this.balls);
+  }
+
+  /** Marks the via points that were crossed: those up to `time` s of command number `command`. */
+  cross(command, time) {
+    if (!this.balls) return;
+    const done = (via) => via.command < command || (via.command === command && via.time <= time);
+    const passed = this.crossings.filter(done).length;
+    if (passed === this.passed) return;
+    this.passed = passed;
+    for (const [index, via] of this.crossings.entries()) this.balls.setColorAt(index, done(via) ? CROSSED : AHEAD);
+    this.balls.instanceColor.needsUpdate = true;
+    this.dirty = true;
   }
 
   show(layer, shown) { this.layers[layer] = shown; this.apply(); }
