@@ -10,7 +10,7 @@ use crate::scene::{Peer, Scene};
 use system_tests::repository::root;
 use system_tests::signal;
 
-const SIZE: [u32; 2] = [1440, 900];
+const SIZE: [u32; 2] = [1400, 860];
 
 /// Waits until the page has the robot and periods come.
 fn ready(tab: &mut Tab) {
@@ -314,7 +314,7 @@ pub(crate) fn two_pages_fight_for_the_hand() {
     first.click("#resume");
     first.wait("!__view.status.held");
     // The hand goes with its page.
-    first.call("Page.close", serde_json::json!({}));
+    first.call("Page.navigate", serde_json::json!({"url": "about:blank"}));
     second.wait("!document.querySelector('#hand').disabled");
     take_hand(&mut second);
     assert!(second.complaints.is_empty(), "{:#?}", second.complaints);
