@@ -37,7 +37,7 @@ fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), Unwritable(message))
 }
 
-/// A named file that cannot be written: no mistake of ours.
+/// A named file that cannot be written: not an internal error.
 #[derive(Debug)]
 pub(crate) struct Unwritable(String);
 

@@ -13,8 +13,8 @@ type Name = Vec<String>;
 /// Which modules of a crate a module names.
 type Arrows = BTreeMap<Name, BTreeSet<Name>>;
 
-/// Circles that are still there, by crate and modules. None may be added; who breaks one takes it
-/// out of this list.
+/// Remaining circles, by crate and modules. None may be added; remove an entry when its circle is
+/// resolved.
 const KNOWN: [(&str, &str); 17] = [
     ("cli", "failure, output_file"),
     ("crcl", "command, finding, pose, program, value"),

@@ -25,18 +25,18 @@ pub(crate) trait Four: Copy {
     fn div(self, x: Self::F, y: Self::F) -> Self::F;
     /// The square root of each number.
     fn sqrt(self, x: Self::F) -> Self::F;
-    /// The larger of each pair; `y` where one of them is no number.
+    /// The larger of each pair; `y` if one of them is NaN.
     fn max(self, x: Self::F, y: Self::F) -> Self::F;
     /// The sum of the four.
     fn sum(self, x: Self::F) -> f64;
 }
 
-/// Which build to use, with the proof that the processor can.
+/// Which build to use, with the proof that the processor has it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wide(#[cfg(target_arch = "x86_64")] Option<pulp::x86::V3>);
 
-/// A computation for both builds. `run` and all that it calls must be
-/// `#[inline(always)]`, or falls back to the plain build.
+/// A computation for both builds. `run` and all that it calls must be `#[inline(always)]`;
+/// otherwise they use the plain instruction set.
 pub(crate) trait Op {
     /// What it computes.
     type Output;
@@ -171,7 +171,7 @@ impl Four for pulp::x86::V3 {
     }
 }
 
-/// Adapter for `pulp`, which compiles `call` for the wide instruction set.
+/// Adapter for `pulp`, which compiles `call` with SIMD instructions.
 #[cfg(target_arch = "x86_64")]
 struct Call<O>(O, pulp::x86::V3);
 

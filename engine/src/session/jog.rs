@@ -9,9 +9,9 @@ use thiserror::Error;
 /// What the shares of a jog are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogSpace {
-    /// One share a joint, root first.
+    /// One fraction per joint, root first.
     Joint,
-    /// Along x, y, z and about x, y, z of the controlled point's own axes.
+    /// Along and about the x, y and z axes of the controlled point.
     Tool,
     /// Along x, y, z and about x, y, z of the workstation, in the controlled point.
     Workstation,
@@ -22,34 +22,34 @@ pub enum JogSpace {
 pub struct Jog {
     /// What the shares are about.
     pub space: JogSpace,
-    /// Shares of the largest speeds, -1..=1; all 0 stops.
+    /// Fractions of the largest speeds, -1..=1; all 0 stops.
     pub speeds: Vec<f64>,
     /// The arm stops when no further request comes for this long.
     pub timeout: Duration,
 }
 
-/// Why a request to move by hand is refused.
+/// Why a jog is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum JogError {
-    /// Not as many shares as there are axes, or one that is not within -1 to 1.
-    #[error("a jog has {wanted} shares of speed from -1 to 1, got {got}")]
+    /// The number of speeds is not the number of axes, or one is not within -1 to 1.
+    #[error("a jog has {wanted} speeds from -1 to 1, got {got}")]
     Speeds {
         /// How many axes there are.
         wanted: usize,
         /// What was given.
         got: String,
     },
-    /// A program is under way or waits.
-    #[error("a program is under way; canter abort ends it")]
+    /// A program is running or waiting.
+    #[error("a program is running; canter abort ends it")]
     Program,
     /// A pause or stop is in force.
-    #[error("the arm is held; canter resume lets it go")]
+    #[error("the arm is held; canter resume releases it")]
     Held,
     /// A fault is latched.
     #[error("a fault is latched ({0}); canter recover clears it")]
     Fault(String),
-    /// There is no way in that direction.
+    /// The arm cannot move in that direction.
     #[error("{0}")]
     Motion(String),
     /// The session is over.
@@ -57,13 +57,13 @@ pub enum JogError {
     Closed,
 }
 
-/// The direction that a request means; `None` where it asks for rest.
+/// The direction of a request; `None` if it asks for rest.
 ///
-/// `tool_in_workstation` is how the tool is turned now: axes of the workstation are those of the
-/// tool turned back.
+/// `workstation_from_tool` is the orientation of the tool now: a jog along axes of the workstation is
+/// one along the tool's axes, rotated back.
 pub(super) fn direction<const N: usize>(
     jog: &Jog,
-    tool_in_workstation: &UnitQuaternion<f64>,
+    workstation_from_tool: &UnitQuaternion<f64>,
 ) -> Result<Option<Direction<N>>, JogError> {
     let wanted = match jog.space {
         JogSpace::Joint => N,
@@ -78,7 +78,7 @@ pub(super) fn direction<const N: usize>(
         return Ok(None);
     }
     let back = match jog.space {
-        JogSpace::Workstation => tool_in_workstation.inverse(),
+        JogSpace::Workstation => workstation_from_tool.inverse(),
         _ => UnitQuaternion::identity(),
     };
     Ok(Some(match jog.space {

@@ -45,7 +45,7 @@ impl fmt::Display for Limit {
     }
 }
 
-/// How a ratio shrinks when time is stretched: as the first, second or third power.
+/// The power of the stretching factor by which a ratio falls: first, second or third.
 pub(crate) fn order(limit: Limit) -> i32 {
     match limit {
         Limit::JointVelocity(_) | Limit::ToolSpeed | Limit::AngularSpeed | Limit::Rate => 1,
@@ -74,7 +74,7 @@ pub struct LimitPeak {
     pub time: f64,
 }
 
-/// A part of the motion over which one limit decides the speed.
+/// A part of the motion in which one limit is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActiveSpan {
     /// Which limit.
@@ -93,7 +93,8 @@ pub struct ActiveSpan {
 pub struct TimeCertificate {
     /// Every finite limit with its peak, in the order of [`Limit`].
     pub peaks: Vec<LimitPeak>,
-    /// Which limit is active when, in the order of time; spans of different limits may overlap.
+    /// The intervals in which limits are active, in the order of time; those of different limits
+    /// may overlap.
     pub active: Vec<ActiveSpan>,
     /// How long the motion lasts (s).
     pub duration: f64,
@@ -103,11 +104,12 @@ pub struct TimeCertificate {
     pub lower_bound: f64,
     /// Largest distance of a joint from the path (rad), at the middle and the quarters of pieces.
     pub fit_error: f64,
-    /// What was added to sampled tool ratios to cover the times between the samples.
+    /// Margin added to sampled tool ratios for the times between the samples.
     pub tool_margin: f64,
-    /// Factor by which the whole law was slowed at the end to meet every bound; 1 = not at all.
+    /// Factor by which the whole law was slowed down at the end to meet every bound; 1 = not at
+    /// all.
     pub stretch: f64,
-    /// Until when (s) the motion is ruled by a given start state; 0 from rest.
+    /// Time (s) until which the given start state determines the motion; 0 from rest.
     pub given: f64,
     /// Cells of the law.
     pub cells: usize,

@@ -74,7 +74,7 @@ impl<S: Four> Packed<S> {
         lane
     }
 
-    /// The larger of each pair; `other` where one of them is no number.
+    /// The larger of each pair; `other` if one of them is NaN.
     #[inline(always)]
     pub(super) fn max(self, other: Self) -> Self {
         let x = self.simd.max(self.x, other.x);
@@ -177,7 +177,7 @@ impl<S: Four> AddAssign for Packed<S> {
     }
 }
 
-/// Where groups of four of `count` numbers begin; the last group takes some once more where the
+/// The starts of groups of four of `count` numbers; the last group overlaps the one before if the
 /// numbers do not fill it.
 #[inline(always)]
 pub(super) fn groups(count: usize) -> impl Iterator<Item = usize> {

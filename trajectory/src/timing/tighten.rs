@@ -11,7 +11,7 @@ use super::problem::Problem;
 use super::simd::{LANE, Lane};
 use crate::{Path, TimingError};
 
-/// Newton steps after which the best law so far is taken.
+/// Newton steps after which the best law so far is used.
 pub(super) const MOST_STEPS: usize = 60;
 /// Newton steps after rows were tightened.
 const FEW_STEPS: usize = 12;
@@ -81,7 +81,7 @@ pub(super) fn best<P: Path<N>, const N: usize>(
     Ok(best)
 }
 
-/// The faster of two drafts, the first when they are even.
+/// The faster of two drafts, the first if they are equal.
 fn faster<const N: usize>(first: Option<Draft<N>>, second: Draft<N>) -> Draft<N> {
     match first {
         Some(first) if first.duration <= second.duration => first,
