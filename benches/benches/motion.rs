@@ -15,6 +15,10 @@ use trajectory::smooth::{SmoothOptions, Windows};
 #[path = "../../trajectory/tests/suite/mod.rs"]
 mod suite;
 
+#[path = "../../trajectory/tests/dense/lists.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod dense;
+
 fn main() {
     let limits = ToolLimits {
         speed: 0.5,
@@ -67,6 +71,7 @@ fn main() {
         worst = worst.max(motion / reference);
     }
     lines.extend(long_lists(limits));
+    let dense = dense_lists(limits);
     for line in lines {
         println!("{line}");
     }
@@ -75,6 +80,39 @@ fn main() {
         "ratio motion-geomean {:.4}",
         (sum / cases.len() as f64).exp()
     );
+    for line in dense {
+        println!("{line}");
+    }
+}
+
+/// Lists dense in poses, beside the least time along the exact curve. Budget: 1.02 of it, 20 ms for
+/// 1000 poses.
+fn dense_lists(limits: ToolLimits) -> Vec<String> {
+    let (mut lines, mut worst) = (Vec::new(), 0.0_f64);
+    for case in dense::suite() {
+        let options = SmoothOptions::new(case.tolerance, limits);
+        let rows: Vec<_> = (0..5).map(|_| measure(&case.poses, &options)).collect();
+        let planning = rows
+            .iter()
+            .map(|row| row.planning)
+            .fold(f64::INFINITY, f64::min);
+        let row = &rows[0];
+        let ratio = row.motion.unwrap_or(f64::NAN) / case.reference;
+        println!(
+            "{:<11} {:>5} {:>8.4} s, reference {:.4} s, {:.2} ms for 1000 poses, {} {}",
+            case.name,
+            row.poses,
+            ratio * case.reference,
+            case.reference,
+            planning * 1e6 / row.poses as f64,
+            row.certified,
+            row.fallbacks,
+        );
+        lines.push(format!("ratio motion-dense-{} {ratio:.4}", case.name));
+        worst = if ratio <= worst { worst } else { ratio };
+    }
+    lines.push(format!("ratio motion-dense-worst {worst:.4}"));
+    lines
 }
 
 /// A zigzag of 1000 and of 10 000 poses in windows: time until motion can

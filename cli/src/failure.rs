@@ -4,7 +4,6 @@ use ipc::IpcError;
 use recorder::RecorderError;
 
 use crate::exit::Exit;
-use crate::output_file::Unwritable;
 use crate::printer::Printer;
 
 /// Why a command failed: the exit code and the chain of causes.
@@ -106,6 +105,18 @@ impl From<recorder::RecorderError> for Failure {
         Self::new(exit, error)
     }
 }
+
+/// A named file that cannot be written: not an internal error.
+#[derive(Debug)]
+pub(crate) struct Unwritable(pub(crate) String);
+
+impl std::fmt::Display for Unwritable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Unwritable {}
 
 #[cfg(test)]
 mod tests {

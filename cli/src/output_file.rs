@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::exit::Exit;
-use crate::failure::Failure;
+use crate::failure::{Failure, Unwritable};
 
 /// A buffered file; every error of it names it.
 #[derive(Debug)]
@@ -36,18 +36,6 @@ fn named(path: &Path, error: &io::Error) -> io::Error {
     let message = format!("cannot write {}: {error}", path.display());
     io::Error::new(error.kind(), Unwritable(message))
 }
-
-/// A named file that cannot be written: not an internal error.
-#[derive(Debug)]
-pub(crate) struct Unwritable(String);
-
-impl std::fmt::Display for Unwritable {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Unwritable {}
 
 impl Write for OutputFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

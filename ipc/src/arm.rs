@@ -12,6 +12,16 @@ pub struct Arm {
     domain: Domain,
 }
 
+impl Domain {
+    /// The arm called `name`, `cell/arm`, in this domain.
+    ///
+    /// # Errors
+    /// [`IpcError::BadArmName`] when the name is not of that form.
+    pub fn arm(&self, name: &str) -> Result<Arm, IpcError> {
+        Arm::new(name, self.clone())
+    }
+}
+
 impl Arm {
     /// The name of one of the arm's services, such as `kitting/left/setpoint`.
     pub(crate) fn service(&self, kind: &str) -> String {
@@ -23,7 +33,7 @@ impl Arm {
         &self.domain
     }
 
-    pub(crate) fn new(name: &str, domain: Domain) -> Result<Self, IpcError> {
+    fn new(name: &str, domain: Domain) -> Result<Self, IpcError> {
         let word = |part: &str| {
             !part.is_empty()
                 && part.len() <= 60

@@ -8,7 +8,7 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::{Arm, IpcError};
+use crate::IpcError;
 
 /// The environment variable that names the directory, for programs that have no option for it.
 pub const DOMAIN_VARIABLE: &str = "CANTER_DOMAIN";
@@ -133,14 +133,6 @@ impl Domain {
             directory: whole,
             prefix,
         })))
-    }
-
-    /// The arm called `name`, `cell/arm`, in this domain.
-    ///
-    /// # Errors
-    /// [`IpcError::BadArmName`] when the name is not of that form.
-    pub fn arm(&self, name: &str) -> Result<Arm, IpcError> {
-        Arm::new(name, self.clone())
     }
 
     /// The directory, without links.

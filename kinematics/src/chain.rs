@@ -1,14 +1,13 @@
 //! A serial arm as flat data: forward kinematics, Jacobian, limits.
 
-use crate::arith::{Arith, Build, Op, Plain};
 use crate::links::{Links, Reached, ScrewAxis};
-use crate::urdf::{JointKind, Model};
-use crate::wide::{F4, transposed};
+use crate::urdf::{JointKind, Model, UrdfError};
 use nalgebra::{ArrayStorage, Isometry3, Point3, SMatrix, SVector, Vector3};
+use simd::{Build, F4, Four, Op, Plain, transposed};
 
 /// `a x b` of vectors in the first three lanes.
 #[inline(always)]
-fn cross<A: Arith>(a: F4<A>, b: F4<A>) -> F4<A> {
+fn cross<A: Four>(a: F4<A>, b: F4<A>) -> F4<A> {
     a.next().taken_from(b, a * b.next()).next()
 }
 
@@ -44,9 +43,22 @@ pub struct Chain<const N: usize> {
     build: Build,
 }
 
+impl Model {
+    /// The arm as flat data for `N` joints.
+    ///
+    /// # Errors
+    /// [`UrdfError::JointCount`] when the arm does not have `N` joints.
+    pub fn chain<const N: usize>(&self) -> Result<Chain<N>, UrdfError> {
+        Chain::new(self).ok_or(UrdfError::JointCount {
+            found: self.joints.len(),
+            expected: N,
+        })
+    }
+}
+
 impl<const N: usize> Chain<N> {
     /// `None` when the model does not have `N` joints.
-    pub(crate) fn new(model: &Model) -> Option<Self> {
+    fn new(model: &Model) -> Option<Self> {
         if model.joints.len() != N || model.frames.len() != N || model.axes.len() != N || N == 0 {
             return None;
         }
@@ -225,13 +237,13 @@ impl<const N: usize> Chain<N> {
 
     /// Positions of the links with the joints at `q`.
     #[inline(always)]
-    pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
+    pub(crate) fn reach<A: Four>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
         self.links.reach(a, q)
     }
 
     /// The Jacobian as rows of eight, the last ones zero; `N` is at most 8.
     #[inline(always)]
-    pub(crate) fn rows<A: Arith>(&self, reached: &Reached<A, N>) -> [[F4<A>; 2]; 6] {
+    pub(crate) fn rows<A: Four>(&self, reached: &Reached<A, N>) -> [[F4<A>; 2]; 6] {
         let zero = F4::splat(reached.end.p.build(), 0.0);
         let mut columns = [(zero, zero); 8];
         for i in 0..N {
@@ -253,7 +265,7 @@ impl<const N: usize> Chain<N> {
 
     /// Linear and angular part of a column of the Jacobian.
     #[inline(always)]
-    fn column<A: Arith>(&self, i: usize, reached: &Reached<A, N>) -> (F4<A>, F4<A>) {
+    fn column<A: Four>(&self, i: usize, reached: &Reached<A, N>) -> (F4<A>, F4<A>) {
         let axis = reached.axes[i];
         if self.links.slides(i) {
             return (axis, F4::splat(axis.build(), 0.0));
@@ -272,7 +284,7 @@ impl<const N: usize> Op for Forward<'_, N> {
     type Output = Isometry3<f64>;
 
     #[inline(always)]
-    fn run<A: Arith>(self, a: A) -> Isometry3<f64> {
+    fn run<A: Four>(self, a: A) -> Isometry3<f64> {
         self.chain.reach(a, self.q).end.frame().isometry()
     }
 }
@@ -287,7 +299,7 @@ impl<const N: usize> Op for Jacobian<'_, N> {
     type Output = (Isometry3<f64>, SMatrix<f64, 6, N>);
 
     #[inline(always)]
-    fn run<A: Arith>(self, a: A) -> Self::Output {
+    fn run<A: Four>(self, a: A) -> Self::Output {
         let reached = self.chain.reach(a, self.q);
         let mut columns = [[0.0; 6]; N];
         for i in 0..N {

@@ -10,6 +10,7 @@
 mod differential;
 mod error;
 mod linear;
+mod null_space;
 mod null_space_path;
 mod redundancy;
 mod trace;
@@ -64,6 +65,10 @@ impl Default for FollowOptions {
     }
 }
 
+/// Follows a path with a null-space motion.
+type Resolve<const N: usize> =
+    fn(&trace::Task<'_, N>, &SVector<f64, N>) -> Result<Vec<FollowPoint<N>>, FollowError>;
+
 /// Joint path of a tool path.
 ///
 /// `tool` is the path of the tool. `grid` has the parameters, in rising order, at which points are
@@ -103,9 +108,16 @@ pub fn follow<const N: usize>(
         options,
     };
     task.check_start(start)?;
-    if N > 6 {
-        redundancy::resolve(&task, start)
-    } else {
-        task.trace(start, &redundancy::NullSpace::none())
+    // A constant: only arms with a null space carry the code of the search in it.
+    let resolve: Option<Resolve<N>> = const {
+        if N > 6 {
+            Some(redundancy::resolve::<N>)
+        } else {
+            None
+        }
+    };
+    match resolve {
+        Some(resolve) => resolve(&task, start),
+        None => task.trace(start, &null_space::NullSpace::none()),
     }
 }

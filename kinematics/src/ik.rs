@@ -9,20 +9,20 @@ mod orient;
 mod polish;
 mod product;
 mod report;
-mod simd;
 mod six;
 mod solving;
+mod subproblems;
 mod swivel;
 mod turns;
 
 pub use goal::Goal;
-pub(crate) use goal::{LENGTH, PoseError};
+pub(crate) use goal::PoseError;
 pub(crate) use numeric::restart;
 pub use report::{Branches, IkFailure, IkReport, MOST_BRANCHES, Solution};
+use simd::Frame;
 
 use crate::chain::Chain;
-use crate::frame::Frame;
-use crate::measure;
+use crate::measure::{self, LENGTH};
 use closed::{Branching, Closed, Raw};
 use goal::Target;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector};
@@ -322,10 +322,7 @@ impl<const N: usize> Solver<N> {
     ) -> (PoseError, SMatrix<f64, 6, N>) {
         let (tool, jacobian) = self.chain.jacobian(q);
         let tool = Frame::from_isometry(&tool);
-        (
-            goal.target().pose_error(crate::arith::Plain, &tool),
-            jacobian,
-        )
+        (goal.target().pose_error(simd::Plain, &tool), jacobian)
     }
 
     fn descend(&self, target: &Target, seed: &SVector<f64, N>, stop: Stop) -> SolverResult<N> {
@@ -381,13 +378,17 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         raw: &mut Raw<N>,
     ) {
-        self.chain.build().run(Branching {
+        let Some(compute) = (const { closed::branching::<N>() }) else {
+            return;
+        };
+        let branching = Branching {
             closed,
             pose,
             parameter,
             seed,
             raw,
-        });
+        };
+        compute(self.chain.build(), branching);
     }
 
     fn branches_at(

@@ -14,18 +14,14 @@
 //! | [`measure`] | manipulability, singular values, condition number |
 //! | [`reach`] | how far the arm reaches |
 
-mod arith;
 pub mod chain;
 pub mod follow;
-mod four;
-mod frame;
 pub mod ik;
 mod links;
 pub mod measure;
 mod motion;
 pub mod reach;
 pub mod urdf;
-mod wide;
 
 pub use chain::Chain;
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};

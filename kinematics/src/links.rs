@@ -6,11 +6,9 @@
 //! matrices", J. Appl. Mech. 22, 1955; here each origin is the point of its axis that is nearest to
 //! the origin before it, so that no number becomes large if axes are nearly parallel.
 
-use crate::arith::{Arith, V4, sin_cos_of};
-use crate::frame::{Frame, Moving, Turn};
 use crate::urdf::{JointKind, Model};
-use crate::wide::F4;
 use nalgebra::{Isometry3, SVector, Vector3};
+use simd::{F4, Four, Frame, Moving, Turn, V4, sin_cos_of};
 
 /// An axis with all joints at zero: its direction and a point on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +37,7 @@ pub(crate) struct Links<const N: usize> {
 }
 
 /// Position and axis of every joint, and the end of the arm.
-pub(crate) struct Reached<A: Arith, const N: usize> {
+pub(crate) struct Reached<A: Four, const N: usize> {
     pub(crate) points: [F4<A>; N],
     pub(crate) axes: [F4<A>; N],
     pub(crate) end: Moving<A>,
@@ -149,7 +147,7 @@ impl<const N: usize> Links<N> {
 
     /// Computes the positions along the links with the joints at `q` (rad, m).
     #[inline(always)]
-    pub(crate) fn reach<A: Arith>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
+    pub(crate) fn reach<A: Four>(&self, a: A, q: &SVector<f64, N>) -> Reached<A, N> {
         let mut frame = Moving::of(a, &self.first);
         let (mut points, mut axes) = ([frame.p; N], [frame.z; N]);
         for group in (0..N).step_by(4) {
@@ -177,7 +175,7 @@ impl<const N: usize> Links<N> {
 
 /// Four of `N` numbers, starting at one of them; filled with zeros if `N` is below four.
 #[inline(always)]
-fn four<A: Arith, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<A> {
+fn four<A: Four, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<A> {
     let (mut four, count) = ([0.0; 4], N.min(4));
     four[..count].copy_from_slice(&numbers[first..first + count]);
     F4::new(a, four)

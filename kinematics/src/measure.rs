@@ -1,8 +1,10 @@
 //! How well an arm can move at a joint position.
 
 use crate::chain::Chain;
-use crate::ik::LENGTH;
 use nalgebra::{SMatrix, SVector};
+
+/// Length that counts as much as one radian, m.
+pub(crate) const LENGTH: f64 = 0.3;
 
 /// How well an arm can move at one joint position. Lengths are in units of 0.3 m, so that
 /// translations and rotations can be compared.

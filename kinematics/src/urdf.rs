@@ -13,7 +13,6 @@ mod tree;
 
 pub use error::{Place, UrdfError};
 
-use crate::chain::Chain;
 use k::nalgebra as k_nalgebra;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use std::fmt::Write as _;
@@ -150,17 +149,6 @@ impl Model {
     #[must_use]
     pub fn dof(&self) -> usize {
         self.joints.len()
-    }
-
-    /// The arm as flat data for `N` joints.
-    ///
-    /// # Errors
-    /// [`UrdfError::JointCount`] when the arm does not have `N` joints.
-    pub fn chain<const N: usize>(&self) -> Result<Chain<N>, UrdfError> {
-        Chain::new(self).ok_or(UrdfError::JointCount {
-            found: self.joints.len(),
-            expected: N,
-        })
     }
 }
 

@@ -117,7 +117,8 @@ pub fn measure(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Measure {
         fallbacks: plan.fallbacks(),
         poses: poses.len(),
         planning,
-        first,
+        // Where the whole is planned sooner, motion starts from that.
+        first: first.min(planning),
         reason: None,
     }
 }

@@ -5,6 +5,7 @@
 
 use std::fs;
 use std::net::TcpStream;
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -35,8 +36,10 @@ pub(crate) struct Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // It has ended, unless the test is over before it.
-        let _ = self.child.kill();
+        // A browser is a family of processes: the whole group goes.
+        #[expect(unsafe_code, reason = "the standard library can only kill one process")]
+        // SAFETY: the group is that of our child, which was not waited for; the call takes numbers.
+        let _ = unsafe { libc::kill(-self.child.id().cast_signed(), libc::SIGKILL) };
         let _ = self.child.wait();
     }
 }
@@ -62,6 +65,7 @@ impl Browser {
                 "about:blank",
             ])
             .arg(format!("--user-data-dir={}", folder.path().display()))
+            .process_group(0)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 17] = [
+const ARROWS: [(&str, &[&str]); 18] = [
     (
         "cli",
         &[
@@ -48,12 +48,13 @@ const ARROWS: [(&str, &[&str]); 17] = [
     ),
     ("servo", &["realtime", "ipc", "scheduling"]),
     ("planner", &["crcl", "kinematics", "trajectory", "realtime"]),
-    ("trajectory", &["realtime"]),
+    ("trajectory", &["realtime", "simd"]),
     ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
-    ("kinematics", &[]),
+    ("kinematics", &["simd"]),
+    ("simd", &[]),
     ("realtime", &[]),
     ("ipc", &[]),
     ("recorder", &[]),
@@ -62,9 +63,10 @@ const ARROWS: [(&str, &[&str]); 17] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 11] = [
+const FENCES: [(&str, &[&str]); 12] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
+    ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
@@ -202,7 +204,12 @@ fn impurity(text: &str) -> Option<&'static str> {
 
 #[test]
 fn the_planner_is_pure() {
-    for folder in ["planner/src", "trajectory/src", "kinematics/src"] {
+    for folder in [
+        "planner/src",
+        "trajectory/src",
+        "kinematics/src",
+        "simd/src",
+    ] {
         for path in sources(folder) {
             let found = impurity(&fs::read_to_string(&path).unwrap());
             assert_eq!(found, None, "{}", path.display());

@@ -1,6 +1,6 @@
 //! Which limit is active at which time.
 
-use crate::timing::{ActiveSpan, Limit};
+use crate::limit::{ActiveSpan, Limit};
 
 /// Collects the intervals of time in which limits are used to a given fraction or more.
 #[derive(Clone, Debug)]

@@ -13,15 +13,15 @@ mod error;
 mod extrema;
 mod hermite_path;
 mod joint_line;
+mod limit;
 mod limits;
 mod line;
 mod path;
-
+mod poly;
 pub mod smooth;
 mod spline_path;
 pub mod timing;
 mod trajectory;
-mod wide;
 
 pub use bounds::MotionBounds;
 pub use error::TimingError;

@@ -2,8 +2,8 @@
 
 use super::TwistPoint;
 use super::linear::{self, Rows};
-use super::redundancy::NullSpace;
-use crate::ik::LENGTH;
+use super::null_space::NullSpace;
+use crate::measure::LENGTH;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 /// A screw about the tool point: velocity of the body there, and angular velocity.

@@ -4,7 +4,7 @@
 //! through it weighs distance from limits, distance from singular poses and changes of the
 //! null-space motion. The candidates are polynomials fitted to that path.
 
-use super::redundancy::{NullSpace, NullSpacePolynomial};
+use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::trace::{Task, smallest};
 use nalgebra::{SMatrix, SVector};
 

@@ -2,10 +2,11 @@
 
 use super::differential::{derivatives, task_rows};
 use super::error::{FollowCause, FollowError};
-use super::redundancy::NullSpace;
+use super::null_space::NullSpace;
 use super::{FollowOptions, FollowPoint, TwistPoint, linear};
-use crate::ik::{Goal, LENGTH, Solver};
+use crate::ik::{Goal, Solver};
 use crate::measure;
+use crate::measure::LENGTH;
 use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// A path to follow.

@@ -4,10 +4,9 @@ use super::classify::{Class, Form, classify};
 use super::product::{Product, Zero};
 use super::six::Joints;
 use super::turns::Range;
-use crate::arith::{Arith, Op};
 use crate::chain::Chain;
-use crate::wide::{B4, F4};
 use nalgebra::{Isometry3, SVector};
+use simd::{Build, F4, Four, Mask, Op};
 
 /// The closed form of one arm.
 #[derive(Clone, Copy, Debug)]
@@ -137,6 +136,21 @@ impl Closed {
     }
 }
 
+/// How the branches of an arm of `N` joints are computed. A constant: only arms with six or seven
+/// joints have closed forms, and others do not carry their code.
+pub(crate) const fn branching<const N: usize>() -> Option<fn(Build, Branching<'_, N>)> {
+    if N == 6 || N == 7 {
+        Some(compute::<N>)
+    } else {
+        None
+    }
+}
+
+#[inline]
+fn compute<const N: usize>(build: Build, branching: Branching<'_, N>) {
+    build.run(branching);
+}
+
 /// All branches of one pose, compiled for both builds.
 pub(crate) struct Branching<'a, const N: usize> {
     pub(crate) closed: &'a Closed,
@@ -154,7 +168,7 @@ impl<const N: usize> Op for Branching<'_, N> {
     type Output = ();
 
     #[inline(always)]
-    fn run<A: Arith>(self, a: A) {
+    fn run<A: Four>(self, a: A) {
         let g = Product::of(a, self.pose, &self.closed.zero);
         let (parameter, seed) = (self.parameter, self.seed);
         let (six, g, first) = match &self.closed.class.form {
@@ -185,7 +199,7 @@ impl<const N: usize> Branching<'_, N> {
     /// Chooses the whole turns of every joint that are nearest to the seed inside the limits. Angle
     /// `i` is that of joint `first + slots[i]`; any other joint is the free parameter.
     #[inline(always)]
-    fn settle<A: Arith, const M: usize>(
+    fn settle<A: Four, const M: usize>(
         mut self,
         a: A,
         (first, slots): (usize, &[usize; M]),
@@ -212,7 +226,7 @@ impl<const N: usize> Branching<'_, N> {
     /// Chooses the turns of one joint; adds to the sums whether it is inside and how far away it
     /// is.
     #[inline(always)]
-    fn put<A: Arith>(&mut self, joint: usize, angles: [F4<A>; 2], sums: &mut [(B4<A>, F4<A>); 2]) {
+    fn put<A: Four>(&mut self, joint: usize, angles: [F4<A>; 2], sums: &mut [(Mask<A>, F4<A>); 2]) {
         let joint = joint.min(N - 1);
         let (seed, range) = (self.seed[joint], self.closed.ranges[joint & 7]);
         let raw = &mut self.raw.joints[joint];

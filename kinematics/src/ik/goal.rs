@@ -1,12 +1,8 @@
 //! Goals of inverse kinematics, and the distance of the tool from them.
 
-use crate::arith::{Arith, V4};
-use crate::frame::Frame;
-use crate::wide::F4;
+use crate::measure::LENGTH;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-
-/// Length that counts as much as one radian, m.
-pub(crate) const LENGTH: f64 = 0.3;
+use simd::{F4, Four, Frame, V4};
 
 /// The goal of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,8 +62,8 @@ impl Goal {
 impl Target {
     /// The difference between goal and tool, in base axes.
     #[inline(always)]
-    pub(crate) fn pose_error<A: Arith>(&self, a: A, tool: &Frame) -> PoseError {
-        let d = self.frame.p.sub(tool.p).0;
+    pub(crate) fn pose_error<A: Four>(&self, a: A, tool: &Frame) -> PoseError {
+        let d = self.frame.p.minus(tool.p).0;
         let w = match self.kind {
             Kind::Pose => rotation_between(a, tool, &self.frame),
             Kind::Position => [0.0; 3],
@@ -85,7 +81,7 @@ impl Target {
     /// Scales the position rows of a Jacobian and removes the free directions of the goal from the
     /// angular rows.
     #[inline(always)]
-    pub(crate) fn shape<A: Arith>(&self, tool: &Frame, rows: &mut [[F4<A>; 2]; 6]) {
+    pub(crate) fn shape<A: Four>(&self, tool: &Frame, rows: &mut [[F4<A>; 2]; 6]) {
         for row in rows.iter_mut().take(3) {
             *row = [row[0] * (1.0 / LENGTH), row[1] * (1.0 / LENGTH)];
         }
@@ -119,7 +115,7 @@ fn z_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
 /// # Source
 /// The logarithm of a rotation; J. J. Craig, Introduction to Robotics, 2005, eq. 2.80-2.82.
 #[inline(always)]
-fn rotation_between<A: Arith>(a: A, from: &Frame, to: &Frame) -> [f64; 3] {
+fn rotation_between<A: Four>(a: A, from: &Frame, to: &Frame) -> [f64; 3] {
     let pairs = [(from.x, to.x), (from.y, to.y), (from.z, to.z)];
     let (mut s, mut trace) = ([0.0; 3], 0.0);
     for (f, t) in pairs {
@@ -172,7 +168,7 @@ fn half_turn(from: &Frame, to: &Frame, s: [f64; 3]) -> [f64; 3] {
 
 /// Rotation vector that turns direction `from` into `to` the shortest way.
 #[inline(always)]
-fn turn_between<A: Arith>(a: A, from: V4, to: V4) -> [f64; 3] {
+fn turn_between<A: Four>(a: A, from: V4, to: V4) -> [f64; 3] {
     let s = from.cross(a, to).0;
     let cos = a.fma(
         from.0[0],

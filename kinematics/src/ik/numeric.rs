@@ -4,10 +4,9 @@
 //! same goal has the same result in every run.
 
 use super::goal::Target;
-use crate::arith::{Arith, Op};
 use crate::chain::Chain;
-use crate::wide::F4;
 use nalgebra::SVector;
+use simd::{F4, Four, Op};
 
 /// When a descent stops.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +33,7 @@ pub(crate) struct SolverResult<const N: usize> {
     pub(crate) reached: bool,
 }
 
-/// Largest step of a joint, rad (or m divided by [`super::goal::LENGTH`]).
+/// Largest step of a joint, rad (or m divided by [`crate::measure::LENGTH`]).
 const LONGEST_STEP: f64 = 1.2;
 /// How often joints are held at their limits before a step is taken.
 const HELD: u32 = 3;
@@ -58,7 +57,7 @@ impl<const N: usize> Op for Descent<'_, N> {
     /// T. Sugihara, "Solvability-unconcerned inverse kinematics by the
     /// Levenberg-Marquardt method", IEEE Trans. Robotics 27(5), 2011, eq. 8 and 23.
     #[inline(always)]
-    fn run<A: Arith>(self, a: A) -> SolverResult<N> {
+    fn run<A: Four>(self, a: A) -> SolverResult<N> {
         let Self {
             chain,
             target,
@@ -128,7 +127,7 @@ impl<const N: usize> Op for Descent<'_, N> {
 
 /// `J^T e`.
 #[inline(always)]
-fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f64; 8] {
+fn gradient<A: Four>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f64; 8] {
     let mut sum = [F4::splat(a, 0.0); 2];
     for r in 0..6 {
         let e = F4::splat(a, pose_error[r]);
@@ -140,7 +139,7 @@ fn gradient<A: Arith>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f
 
 /// Excludes joints that are at a limit and would be moved beyond it.
 #[inline(always)]
-fn freeze<A: Arith, const N: usize>(
+fn freeze<A: Four, const N: usize>(
     a: A,
     chain: &Chain<N>,
     q: &SVector<f64, N>,
@@ -168,7 +167,7 @@ fn freeze<A: Arith, const N: usize>(
 /// Holds joints that a step would move beyond a limit: they move to the limit, and their effect is
 /// subtracted from `rest`, which the other joints must do. Returns whether there are any.
 #[inline(always)]
-fn hold<A: Arith, const N: usize>(
+fn hold<A: Four, const N: usize>(
     a: A,
     chain: &Chain<N>,
     (q, step): (&SVector<f64, N>, &[f64; 8]),
@@ -199,7 +198,7 @@ fn hold<A: Arith, const N: usize>(
 
 /// Solves `(J^T J + damping) x = b` by elimination; the matrix is positive definite.
 #[inline(always)]
-fn solve_damped<A: Arith, const N: usize>(
+fn solve_damped<A: Four, const N: usize>(
     a: A,
     rows: &[[F4<A>; 2]; 6],
     b: &[f64; 8],

@@ -1,11 +1,10 @@
 //! Three rotations that turn one orientation into another, for four branches at once.
 
-use super::simd::{
+use super::six::dot;
+use super::subproblems::{
     Angle, Held, Pair, TrigEquation, Vec4, angle_of, angles_of, last_turn_to, turn_to,
 };
-use super::six::dot;
-use crate::arith::Arith;
-use crate::wide::{B4, F4};
+use simd::{F4, Four, Mask};
 use std::f64::consts::PI;
 
 /// Rotations about three axes whose product turns the third axis to `axis`, and `spin`,
@@ -13,7 +12,7 @@ use std::f64::consts::PI;
 /// Also returns both solutions for the middle one. The sine and cosine of the last rotation may
 /// have any length.
 #[inline(always)]
-pub(crate) fn orient<A: Arith>(
+pub(crate) fn orient<A: Four>(
     [first, middle, last]: [[f64; 3]; 3],
     (axis, spun, spin): (Vec4<A>, Vec4<A>, [f64; 3]),
     sign: [f64; 4],
@@ -47,11 +46,11 @@ fn square([first, middle, last]: [[f64; 3]; 3]) -> bool {
 
 /// Both solutions of [`orient`] as angles (rad), each with whether it is real.
 #[inline(always)]
-pub(crate) fn orient_both<A: Arith>(
+pub(crate) fn orient_both<A: Four>(
     axes: [[f64; 3]; 3],
     goal: (Vec4<A>, Vec4<A>, [f64; 3]),
     hold: [Held; 3],
-) -> [([F4<A>; 3], B4<A>); 2] {
+) -> [([F4<A>; 3], Mask<A>); 2] {
     let (turns, tilts) = orient(axes, goal, [1.0; 4], hold);
     let first = angles_of(turns);
     if square(axes) {

@@ -8,7 +8,8 @@ use super::closed::{Closed, Raw};
 use super::goal::{Goal, Target};
 use super::numeric::Stop;
 use super::report::{Branches, Solution};
-use super::{LENGTH, Solver, turns};
+use super::{Solver, turns};
+use crate::measure::LENGTH;
 use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// Smallest singular value below which another branch across a fold is searched for.

@@ -1,92 +1,51 @@
 //! The product of the rotations of an arm's joints, as closed forms use it.
 
-use crate::arith::{self, Arith};
 use crate::links::ScrewAxis;
-use crate::wide::F4;
 use nalgebra::Isometry3;
+use simd::{F4, Four, Frame, Moving, Plain};
 
 /// Columns of a rotation, and a position.
 pub(crate) type Columns = [[f64; 3]; 4];
 
-/// The same with a zero behind each column, to be read as wide numbers.
-pub(crate) type Padded = [[f64; 4]; 4];
-
-/// Columns with a zero behind each.
-pub(crate) fn padded(columns: &Columns) -> Padded {
-    columns.map(|[x, y, z]| [x, y, z, 0.0])
-}
-
-/// A product of turns: the columns of a rotation and a translation, one wide number each.
+/// A product of turns: a rigid transform.
 #[derive(Clone, Copy)]
-pub(crate) struct Product<A: Arith>([F4<A>; 4]);
+pub(crate) struct Product<A: Four>(Moving<A>);
 
-impl<A: Arith> Product<A> {
-    #[inline(always)]
-    fn new(a: A, columns: Columns) -> Self {
-        let [x, y, z, p] = columns;
-        Self([
-            F4::new(a, [x[0], x[1], x[2], 0.0]),
-            F4::new(a, [y[0], y[1], y[2], 0.0]),
-            F4::new(a, [z[0], z[1], z[2], 0.0]),
-            F4::new(a, [p[0], p[1], p[2], 0.0]),
-        ])
-    }
-
+impl<A: Four> Product<A> {
     /// `pose * zero^-1`.
     #[inline(always)]
     pub(crate) fn of(a: A, pose: &Isometry3<f64>, zero: &Zero) -> Self {
         let ([x, y, z], p) = (rotation(pose), pose.translation.vector);
-        Self::new(a, [x, y, z, [p.x, p.y, p.z]]).times(&zero.back)
+        let pose = Moving::of_columns(a, [x, y, z, [p.x, p.y, p.z]]);
+        Self(pose.times_columns(&zero.back))
     }
 
     #[inline(always)]
     pub(crate) fn build(&self) -> A {
-        self.0[0].build()
-    }
-
-    #[inline(always)]
-    fn turned(&self, [x, y, z]: [f64; 3]) -> F4<A> {
-        let a = self.build();
-        let rest = self.0[1].fma(F4::splat(a, y), self.0[0] * x);
-        self.0[2].fma(F4::splat(a, z), rest)
+        self.0.p.build()
     }
 
     /// `self * right`.
     #[inline(always)]
-    pub(crate) fn times(&self, [x, y, z, p]: &Columns) -> Self {
-        Self([
-            self.turned(*x),
-            self.turned(*y),
-            self.turned(*z),
-            self.turned(*p) + self.0[3],
-        ])
+    pub(crate) fn times(&self, right: &Columns) -> Self {
+        Self(self.0.times_columns(right))
     }
 
     #[inline(always)]
     pub(crate) fn point(&self, p: [f64; 3]) -> [f64; 3] {
-        three(self.turned(p) + self.0[3])
+        three(self.0.point(p))
     }
 
     #[inline(always)]
     pub(crate) fn turn(&self, v: [f64; 3]) -> [f64; 3] {
-        three(self.turned(v))
-    }
-
-    #[inline(always)]
-    fn columns(&self) -> Columns {
-        [
-            three(self.0[0]),
-            three(self.0[1]),
-            three(self.0[2]),
-            three(self.0[3]),
-        ]
+        three(self.0.direction(v))
     }
 
     /// `left * self`.
     #[inline(always)]
-    pub(crate) fn seen_from(&self, left: &Padded) -> Columns {
-        let left = Self(left.map(|column| F4::new(self.build(), column)));
-        left.times(&self.columns()).columns()
+    pub(crate) fn seen_from(&self, left: &Frame) -> Columns {
+        let left = Moving::of(self.build(), left);
+        columns(left.times_columns(&columns(self.0)))
     }
 
     /// Without a last turn by `angle` (rad) about a line.
@@ -99,12 +58,20 @@ impl<A: Arith> Product<A> {
     #[inline(always)]
     pub(crate) fn without_first(&self, line: &ScrewAxis, angle: f64) -> Self {
         let a = self.build();
-        Self::new(a, turn(a, line, -angle)).times(&self.columns())
+        let back = Moving::of_columns(a, turn(a, line, -angle));
+        Self(back.times_columns(&columns(self.0)))
     }
 }
 
+/// The columns of a transform in memory.
 #[inline(always)]
-fn three<A: Arith>(v: F4<A>) -> [f64; 3] {
+fn columns<A: Four>(transform: Moving<A>) -> Columns {
+    let Moving { x, y, z, p } = transform;
+    [three(x), three(y), three(z), three(p)]
+}
+
+#[inline(always)]
+fn three<A: Four>(v: F4<A>) -> [f64; 3] {
     let [x, y, z, _] = v.array();
     [x, y, z]
 }
@@ -125,9 +92,9 @@ impl Zero {
 
     /// With a constant that every product is multiplied with.
     pub(crate) fn times(&self, right: &Columns) -> Self {
-        let left = Product::new(arith::Plain, self.back);
+        let left = Moving::of_columns(Plain, self.back);
         Self {
-            back: left.times(right).columns(),
+            back: columns(left.times_columns(right)),
         }
     }
 }
@@ -146,8 +113,8 @@ pub(crate) fn inverse(&[x, y, z, p]: &Columns) -> Columns {
 
 /// One turn about a line (Rodrigues).
 #[inline(always)]
-fn turn<A: Arith>(a: A, line: &ScrewAxis, angle: f64) -> Columns {
-    let ([s], [c]) = arith::sin_cos(a, [angle]);
+fn turn<A: Four>(a: A, line: &ScrewAxis, angle: f64) -> Columns {
+    let ([s], [c]) = simd::sin_cos(a, [angle]);
     let ([x, y, z], p, v) = (line.h, line.p, 1.0 - c);
     let columns = [
         [

@@ -12,13 +12,10 @@
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025, sections 4.1 and 4.3.
 
 use super::frames::Frames;
-use super::product::{Columns, Padded, Product, inverse, padded};
-use super::simd::Held;
-use super::solving::Solving;
-use crate::arith::Arith;
+use super::product::{Columns, inverse};
 use crate::links::{ScrewAxis, foot};
-use crate::wide::{B4, F4};
 use nalgebra::Vector3;
+use simd::{F4, Four, Frame, Mask};
 
 /// How the first three joints position the wrist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,11 +45,11 @@ pub(crate) struct Six {
     pub(super) slack: f64,
     pub(super) frames: Frames,
     /// Constant left factor of the product of rotations, and the right one.
-    left: Padded,
+    pub(super) left: Frame,
     right: Columns,
     /// Where joint positions are found in angles of the frames: `sign * angle + offset`.
-    signs: [f64; 6],
-    offsets: [f64; 6],
+    pub(super) signs: [f64; 6],
+    pub(super) offsets: [f64; 6],
     /// The two links of the elbow seen along its axis, m, and the angle (rad) by which the
     /// second is turned in its frame, as sine and cosine.
     pub(super) links: [f64; 2],
@@ -64,9 +61,9 @@ pub(crate) struct Six {
 }
 
 /// Angles (rad) of `M` joints in two groups of four branches, and which of them exist.
-pub(crate) struct Joints<A: Arith, const M: usize> {
+pub(crate) struct Joints<A: Four, const M: usize> {
     pub(crate) angles: [[F4<A>; M]; 2],
-    pub(crate) real: [B4<A>; 2],
+    pub(crate) real: [Mask<A>; 2],
 }
 
 #[inline(always)]
@@ -118,7 +115,7 @@ impl Six {
             reversed,
             slack,
             frames,
-            left: padded(&left),
+            left: Frame::from_columns(left),
             right,
             signs,
             offsets,
@@ -140,44 +137,6 @@ impl Six {
         } else {
             &[0, 1, 2, 3, 4, 5]
         }
-    }
-
-    /// All branches, as angles of the six joints in the order of the frames, of a product
-    /// of turns already multiplied with [`Six::right`]. `hold` are joint positions (rad)
-    /// for joints that a singular pose leaves free.
-    #[inline(always)]
-    pub(crate) fn solve<A: Arith>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
-        let mut seen = product.seen_from(&self.left);
-        if self.reversed {
-            seen = inverse(&seen);
-        }
-        let a = product.build();
-        let mut quick = Solving::new(a, self, None);
-        let mut found = quick.solve(&seen);
-        let real = found.real[0].bits() | found.real[1].bits();
-        if real & !quick.sure.bits() != 0 {
-            found = self.held(a, &seen, hold);
-        }
-        for group in &mut found.angles {
-            for i in 0..6 {
-                let sign = F4::splat(a, self.signs[i]);
-                group[i] = group[i].fma(sign, F4::splat(a, self.offsets[i]));
-            }
-        }
-        found
-    }
-
-    /// The same where the pose leaves a joint free.
-    #[inline(always)]
-    fn held<A: Arith>(&self, a: A, seen: &Columns, hold: [f64; 6]) -> Joints<A, 6> {
-        let (slots, mut angles) = (self.slots(), [0.0; 7]);
-        for i in 0..6 {
-            angles[i] = self.signs[i] * (hold[slots[i]] - self.offsets[i]);
-        }
-        // The seventh is the sum of the turns about parallel axes.
-        angles[6] = angles[1] + angles[2] + angles[3];
-        let held = Held::all(a, angles);
-        Solving::new(a, self, Some(&held)).solve(seen)
     }
 }
 

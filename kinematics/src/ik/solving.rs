@@ -1,11 +1,10 @@
 //! The computation of one closed form of six joints: four branches at once, in the frames of the
 //! arm.
 
-use super::product::Columns;
-use super::simd::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
+use super::product::{Columns, Product, inverse};
 use super::six::{Joints, Placing, Shape, Six, dot};
-use crate::arith::Arith;
-use crate::wide::{B4, F4};
+use super::subproblems::{Angle, FIRST, Held, SECOND, angle_of, angles_of};
+use simd::{F4, Four, Mask};
 use std::f64::consts::PI;
 
 /// A vector in each lane.
@@ -18,17 +17,57 @@ const FREE: f64 = 1e-50;
 const NEAR_ONE: f64 = 1e-8;
 
 /// The state of one computation.
-pub(super) struct Solving<'a, A: Arith> {
+struct Solving<'a, A: Four> {
     a: A,
     six: &'a Six,
     hold: Option<&'a [Held; 7]>,
     /// Where every joint is determined.
-    pub(super) sure: B4<A>,
+    sure: Mask<A>,
 }
 
-impl<'a, A: Arith> Solving<'a, A> {
+impl Six {
+    /// All branches, as angles of the six joints in the order of the frames, of a product
+    /// of turns already multiplied with [`Six::right`]. `hold` are joint positions (rad)
+    /// for joints that a singular pose leaves free.
     #[inline(always)]
-    pub(super) fn new(a: A, six: &'a Six, hold: Option<&'a [Held; 7]>) -> Self {
+    pub(crate) fn solve<A: Four>(&self, product: &Product<A>, hold: [f64; 6]) -> Joints<A, 6> {
+        let mut seen = product.seen_from(&self.left);
+        if self.reversed {
+            seen = inverse(&seen);
+        }
+        let a = product.build();
+        let mut quick = Solving::new(a, self, None);
+        let mut found = quick.solve(&seen);
+        let real = found.real[0].bits() | found.real[1].bits();
+        if real & !quick.sure.bits() != 0 {
+            found = self.held(a, &seen, hold);
+        }
+        for group in &mut found.angles {
+            for i in 0..6 {
+                let sign = F4::splat(a, self.signs[i]);
+                group[i] = group[i].fma(sign, F4::splat(a, self.offsets[i]));
+            }
+        }
+        found
+    }
+
+    /// The same where the pose leaves a joint free.
+    #[inline(always)]
+    fn held<A: Four>(&self, a: A, seen: &Columns, hold: [f64; 6]) -> Joints<A, 6> {
+        let (slots, mut angles) = (self.slots(), [0.0; 7]);
+        for i in 0..6 {
+            angles[i] = self.signs[i] * (hold[slots[i]] - self.offsets[i]);
+        }
+        // The seventh is the sum of the turns about parallel axes.
+        angles[6] = angles[1] + angles[2] + angles[3];
+        let held = Held::all(a, angles);
+        Solving::new(a, self, Some(&held)).solve(seen)
+    }
+}
+
+impl<'a, A: Four> Solving<'a, A> {
+    #[inline(always)]
+    fn new(a: A, six: &'a Six, hold: Option<&'a [Held; 7]>) -> Self {
         let zero = F4::splat(a, 0.0);
         let sure = zero.le(zero);
         Self { a, six, hold, sure }
@@ -46,7 +85,7 @@ impl<'a, A: Arith> Solving<'a, A> {
 
     /// All branches of a product of rotations, expressed in the frames.
     #[inline(always)]
-    pub(super) fn solve(&mut self, seen: &Columns) -> Joints<A, 6> {
+    fn solve(&mut self, seen: &Columns) -> Joints<A, 6> {
         match self.six.shape {
             Shape::Wrist(_, Placing::Parallel) => self.wrist_on_parallels(seen),
             Shape::Wrist(_, Placing::Meeting(_)) => self.wrist_on_meeting(seen),
@@ -56,7 +95,7 @@ impl<'a, A: Arith> Solving<'a, A> {
 
     /// The angle if `known`, else the held one of a joint.
     #[inline(always)]
-    fn or_held(&mut self, angle: Angle<A>, known: B4<A>, joint: usize) -> Angle<A> {
+    fn or_held(&mut self, angle: Angle<A>, known: Mask<A>, joint: usize) -> Angle<A> {
         self.sure = self.sure & known;
         let Some(hold) = self.hold else { return angle };
         let held = hold[joint];
@@ -86,7 +125,7 @@ impl<'a, A: Arith> Solving<'a, A> {
         &mut self,
         [cos, sin]: [F4<A>; 2],
         length: F4<A>,
-        (scale, real): (f64, B4<A>),
+        (scale, real): (f64, Mask<A>),
         joint: usize,
     ) -> Angle<A> {
         let one = self.number(1.0);
@@ -107,7 +146,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Turns about axis 1 that bring a point, from where it is at the right height along
     /// axis 2, to where it is `seen`. Beside them the point seen from axis 2, and which exist.
     #[inline(always)]
-    fn base(&mut self, [x, y, z]: [f64; 3], height: f64) -> (Angle<A>, [F4<A>; 2], B4<A>) {
+    fn base(&mut self, [x, y, z]: [f64; 3], height: f64) -> (Angle<A>, [F4<A>; 2], Mask<A>) {
         let step = &self.six.frames.steps[0];
         let a = self.a;
         let up = z - step.shift[2];
@@ -138,7 +177,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Sine (not negative) and cosine of the bends of the elbow at which its links reach to
     /// a point in their plane, and which exist.
     #[inline(always)]
-    fn elbow(&self, [u, v]: [F4<A>; 2]) -> (Angle<A>, B4<A>) {
+    fn elbow(&self, [u, v]: [F4<A>; 2]) -> (Angle<A>, Mask<A>) {
         let [upper, fore] = self.six.links;
         let both = self.number(upper * upper + fore * fore);
         let cos = (u.fma(u, v * v) - both) * (0.5 / (upper * fore));
@@ -147,14 +186,14 @@ impl<'a, A: Arith> Solving<'a, A> {
 
     /// An angle by its cosine; beyond one by no more than rounding it is none or half a turn.
     #[inline(always)]
-    fn arc(&self, cos: F4<A>) -> (Angle<A>, B4<A>) {
+    fn arc(&self, cos: F4<A>) -> (Angle<A>, Mask<A>) {
         let (zero, one) = (self.number(0.0), self.number(1.0));
         let rest = cos.taken_from(cos, one);
         self.arc_with(cos, rest, zero, one)
     }
 
     #[inline(always)]
-    fn arc_with(&self, cos: F4<A>, rest: F4<A>, zero: F4<A>, one: F4<A>) -> (Angle<A>, B4<A>) {
+    fn arc_with(&self, cos: F4<A>, rest: F4<A>, zero: F4<A>, one: F4<A>) -> (Angle<A>, Mask<A>) {
         let real = self.number(-self.six.slack).le(rest);
         let angle = Angle {
             sin: rest.max(zero).sqrt(),
@@ -166,7 +205,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Turns about axis 2 that bring the links, bent by `bend`, to a point in their plane;
     /// `real` tells where they reach it.
     #[inline(always)]
-    fn lift(&mut self, [u, v]: [F4<A>; 2], bend: Angle<A>, real: B4<A>) -> Angle<A> {
+    fn lift(&mut self, [u, v]: [F4<A>; 2], bend: Angle<A>, real: Mask<A>) -> Angle<A> {
         let [upper, fore] = self.six.links;
         let along = bend.cos.fma(self.number(fore), self.number(upper));
         let off = bend.sin * fore;
@@ -245,7 +284,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Bends of axis 3 that bring the wrist to a squared distance `far` from where axes 1
     /// and 2 meet.
     #[inline(always)]
-    fn bends(&self, far: f64) -> (Angle<A>, B4<A>) {
+    fn bends(&self, far: f64) -> (Angle<A>, Mask<A>) {
         let [_, second, third, ..] = self.six.frames.steps;
         let (fore, height) = (self.six.links[1], third.shift[2]);
         let ([a, b, d], (sin, cos)) = (second.shift, (second.sin, second.cos));
@@ -270,7 +309,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Turns about axis 2 after which a point is at a height along axis 1; beside them
     /// where it then is across axis 2, and which exist.
     #[inline(always)]
-    fn raised(&mut self, [x, y, z]: V3<A>, height: f64) -> (Angle<A>, [F4<A>; 2], B4<A>) {
+    fn raised(&mut self, [x, y, z]: V3<A>, height: f64) -> (Angle<A>, [F4<A>; 2], Mask<A>) {
         let step = self.six.frames.steps[0];
         let zero = self.number(0.0);
         let up = z.taken_from(self.number(step.cos), self.number(height)) * self.six.inverse[0];
@@ -292,7 +331,7 @@ impl<'a, A: Arith> Solving<'a, A> {
     /// Both wrists of each arm position, from the directions that the last axis and the x
     /// axis of the last frame are to have, seen by axis 4.
     #[inline(always)]
-    fn wrist(&mut self, arm: [Angle<A>; 3], goal: [V3<A>; 2], real: B4<A>) -> Joints<A, 6> {
+    fn wrist(&mut self, arm: [Angle<A>; 3], goal: [V3<A>; 2], real: Mask<A>) -> Joints<A, 6> {
         let (turns, tilts) = self.orient(goal, [1.0; 4], [3, 4, 5]);
         let ([q1, q2, q3], [q4, q5, q6]) = (angles_of(arm), angles_of(turns));
         let real = real & tilts;
@@ -318,7 +357,7 @@ impl<'a, A: Arith> Solving<'a, A> {
         [axis, spin]: [V3<A>; 2],
         sign: [f64; 4],
         joints: [usize; 3],
-    ) -> ([Angle<A>; 3], B4<A>) {
+    ) -> ([Angle<A>; 3], Mask<A>) {
         let [.., fourth, fifth] = self.six.frames.steps;
         let both = self.six.inverse[1];
         let still = self.number(fourth.cos * fifth.cos * both);
@@ -389,7 +428,7 @@ impl<'a, A: Arith> Solving<'a, A> {
 
 /// A vector seen from a frame turned about z.
 #[inline(always)]
-fn about_z<A: Arith>([x, y, z]: V3<A>, angle: Angle<A>) -> V3<A> {
+fn about_z<A: Four>([x, y, z]: V3<A>, angle: Angle<A>) -> V3<A> {
     [
         x.fma(angle.cos, y * angle.sin),
         x.taken_from(angle.sin, y * angle.cos),
@@ -399,7 +438,7 @@ fn about_z<A: Arith>([x, y, z]: V3<A>, angle: Angle<A>) -> V3<A> {
 
 /// A vector seen from a frame turned about x.
 #[inline(always)]
-fn about_x<A: Arith>([x, y, z]: V3<A>, sin: f64, cos: f64) -> V3<A> {
+fn about_x<A: Four>([x, y, z]: V3<A>, sin: f64, cos: f64) -> V3<A> {
     let a = x.build();
     let (sin, cos) = (F4::splat(a, sin), F4::splat(a, cos));
     [x, y.fma(cos, z * sin), y.taken_from(sin, z * cos)]

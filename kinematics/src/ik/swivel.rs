@@ -5,12 +5,11 @@
 
 use super::orient::{orient, orient_both};
 use super::product::Product;
-use super::simd::{FIRST, Held, SECOND, TrigEquation, Vec4, angle_of, angles_of};
 use super::six::{Joints, dot, minus};
-use crate::arith::{self, Arith};
+use super::subproblems::{FIRST, Held, SECOND, TrigEquation, Vec4, angle_of, angles_of};
 use crate::links::{ScrewAxis, across};
-use crate::wide::F4;
 use nalgebra::{Rotation3, Unit, Vector3};
+use simd::{F4, Four};
 
 /// Axes at q = 0 of an arm with spherical shoulder, one elbow joint and spherical wrist.
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +80,7 @@ impl Swivel {
 
     /// All branches at one swivel (rad).
     #[inline(always)]
-    pub(crate) fn solve<A: Arith>(
+    pub(crate) fn solve<A: Four>(
         &self,
         g: &Product<A>,
         swivel: f64,
@@ -143,7 +142,7 @@ impl Swivel {
     /// The plane of the arm: the direction to the wrist, the axis of the elbow at a swivel angle
     /// (rad), and the direction perpendicular to both.
     #[inline(always)]
-    fn plane<A: Arith>(&self, a: A, away: [f64; 3], swivel: f64) -> [[f64; 3]; 3] {
+    fn plane<A: Four>(&self, a: A, away: [f64; 3], swivel: f64) -> [[f64; 3]; 3] {
         let scale = |v: [f64; 3], s: f64| v.map(|x| x * s);
         let along = scale(away, 1.0 / dot(away, away).sqrt());
         let up = self.lines[0].h;
@@ -155,7 +154,7 @@ impl Swivel {
             square = dot(reference, reference);
         }
         let reference = scale(reference, 1.0 / square.sqrt());
-        let ([s], [c]) = arith::sin_cos(a, [swivel]);
+        let ([s], [c]) = simd::sin_cos(a, [swivel]);
         let (one, other) = (scale(reference, c), scale(cross(along, reference), s));
         let side = [one[0] + other[0], one[1] + other[1], one[2] + other[2]];
         [along, side, cross(along, side)]
@@ -164,7 +163,7 @@ impl Swivel {
 
 /// A vector taken along from one frame of unit vectors to another.
 #[inline(always)]
-fn carried<A: Arith>(v: Vec4<A>, from: &[Vec4<A>; 3], to: &[Vec4<A>; 3]) -> Vec4<A> {
+fn carried<A: Four>(v: Vec4<A>, from: &[Vec4<A>; 3], to: &[Vec4<A>; 3]) -> Vec4<A> {
     let sum = to[0].times(from[0].dot(v));
     let sum = to[1].times_plus(from[1].dot(v), sum);
     to[2].times_plus(from[2].dot(v), sum)

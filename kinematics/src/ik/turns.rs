@@ -1,9 +1,8 @@
 //! Whole turns of joints: other joint positions with the same pose.
 
-use crate::arith::Arith;
 use crate::chain::Chain;
-use crate::wide::{B4, F4};
 use nalgebra::SVector;
+use simd::{F4, Four, Mask};
 use std::f64::consts::TAU;
 
 /// `q` with every turning joint moved by whole turns to be nearest to `seed`
@@ -54,7 +53,7 @@ impl Range {
     /// Four angles moved by whole turns to be nearest to `seed` inside the range; beside
     /// them whether they are.
     #[inline(always)]
-    pub(crate) fn nearest<A: Arith>(&self, q: F4<A>, seed: f64) -> (F4<A>, B4<A>) {
+    pub(crate) fn nearest<A: Four>(&self, q: F4<A>, seed: f64) -> (F4<A>, Mask<A>) {
         let number = |x: f64| F4::splat(q.build(), x);
         let at = q * (1.0 / TAU);
         let near = (number(seed * (1.0 / TAU) + 0.5) - at).floor();

@@ -171,13 +171,3 @@ impl Machine<'_> {
         }
     }
 }
-
-/// A number may be in quotes, by the type of its variable.
-pub(crate) fn coerce(value: Value, kind: Option<Type>) -> Value {
-    match (&value, kind) {
-        (Value::Text(text), Some(Type::Number { .. })) => {
-            text.parse().map_or(value.clone(), Value::Number)
-        }
-        _ => value,
-    }
-}

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::assignment::coerce;
 use super::batch::Errand;
 use super::eval::Context;
 use super::program::{Node, Program};
@@ -246,5 +245,15 @@ impl Machine<'_> {
             | Action::RobotPutDown { .. } => self.motion(action, span, state),
             _ => Ok(nothing(name, span, state)),
         }
+    }
+}
+
+/// A number may be in quotes, by the type of its variable.
+fn coerce(value: Value, kind: Option<Type>) -> Value {
+    match (&value, kind) {
+        (Value::Text(text), Some(Type::Number { .. })) => {
+            text.parse().map_or(value.clone(), Value::Number)
+        }
+        _ => value,
     }
 }

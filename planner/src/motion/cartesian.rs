@@ -9,7 +9,7 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{Blend, Draft, MotionError, Planner};
+use super::{Blend, BlockedCause, Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest distance of the tool between two solved points, m.
@@ -205,25 +205,23 @@ impl<const N: usize> Planner<N> {
         end: f64,
         towards: &dyn Fn(f64) -> usize,
     ) -> MotionError {
-        let joint = error
-            .joint
-            .map_or_else(String::new, |joint| self.joint_name(joint));
         let cause = match (error.cause, error.joint) {
-            (FollowCause::Limit, Some(index)) => format!(
-                "{joint} would pass its limit by {}",
-                self.amount(index, error.amount)
-            ),
-            (FollowCause::Singular, _) => format!(
-                "a singular pose, where {joint} would have to jump (smallest singular value {:.1e})",
-                error.amount
-            ),
-            (FollowCause::Unreachable(IkFailure::AtLimit { joint, beyond }), _) => format!(
-                "{} would have to go {} beyond its limit",
-                self.joint_name(joint),
-                self.amount(joint, beyond)
-            ),
-            (FollowCause::Unreachable(failure), _) => failure.to_string(),
-            (_, _) => error.to_string(),
+            (FollowCause::Limit, Some(joint)) => BlockedCause::JointLimit {
+                joint: self.joint_name(joint),
+                beyond: self.amount(joint, error.amount),
+            },
+            (FollowCause::Singular, Some(joint)) => BlockedCause::Singular {
+                joint: self.joint_name(joint),
+                smallest: error.amount,
+            },
+            (FollowCause::Unreachable(IkFailure::AtLimit { joint, beyond }), _) => {
+                BlockedCause::BeyondLimit {
+                    joint: self.joint_name(joint),
+                    beyond: self.amount(joint, beyond),
+                }
+            }
+            (FollowCause::Unreachable(failure), _) => BlockedCause::Unreachable(failure),
+            (_, _) => BlockedCause::Path(*error),
         };
         MotionError::Blocked {
             pose: towards(error.u),

@@ -46,13 +46,23 @@ impl<const N: usize> Planner<N> {
         let mut best: Option<(f64, Draft<N>)> = None;
         let mut refusal = None;
         for goal in &goals {
-            match self.joint_move(motion, start, goal) {
-                Ok(found) => {
-                    let time = found.trajectory.duration() / self.ease(goal);
+            let ease = self.ease(goal);
+            let found = self.rest_to_rest(start, goal).and_then(|free| {
+                // No motion of these joints is shorter, whatever the tool may do.
+                let least = free.duration() / ease;
+                let hopeless = best.as_ref().is_some_and(|(time, _)| least >= *time);
+                (!hopeless)
+                    .then(|| self.within_tool(motion, (start, goal), free))
+                    .transpose()
+            });
+            match found {
+                Ok(Some(found)) => {
+                    let time = found.trajectory.duration() / ease;
                     if best.as_ref().is_none_or(|(least, _)| time < *least) {
                         best = Some((time, found));
                     }
                 }
+                Ok(None) => {}
                 Err(error) => refusal = Some(error),
             }
         }
@@ -115,6 +125,16 @@ impl<const N: usize> Planner<N> {
         goal: &SVector<f64, N>,
     ) -> Result<Draft<N>, MotionError> {
         let free = self.rest_to_rest(start, goal)?;
+        self.within_tool(motion, (start, goal), free)
+    }
+
+    /// The motion `free` that the joints alone allow, or a slower one where the tool is too fast.
+    fn within_tool(
+        &self,
+        motion: &Move,
+        (start, goal): (&SVector<f64, N>, &SVector<f64, N>),
+        free: Trajectory<N>,
+    ) -> Result<Draft<N>, MotionError> {
         let alone = free.duration();
         let free = self.slowed(Draft::of(free), motion);
         if free.trajectory.duration() <= alone {

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use trajectory::ToolLimits;
 
-use super::{MotionError, PlannedMove, Planner};
+use super::{JogRefusal, MotionError, PlannedMove, Planner};
 use crate::task::{Move, Shape};
 
 /// Longest jog: of the tool in m, of the tool and of a joint in rad.
@@ -65,10 +65,8 @@ impl<const N: usize> Planner<N> {
             }
         }
         if time.is_nan() || time * largest < NEAR {
-            let name = self.joint_name(last);
-            return Err(MotionError::Jog(format!(
-                "joint {name} is at the end of its range"
-            )));
+            let joint = self.joint_name(last);
+            return Err(JogRefusal::EndOfRange { joint }.into());
         }
         let goal = start + speeds * time;
         let mut slow = self.clone();
@@ -109,7 +107,7 @@ impl<const N: usize> Planner<N> {
             angular_speed: slower(turning.norm(), most.angular_speed),
             ..*most
         };
-        let mut refusal = MotionError::Jog("no direction".to_owned());
+        let mut refusal = MotionError::from(JogRefusal::NoDirection);
         for _ in 0..TRIES {
             if !(time.is_finite() && time * velocity.norm().max(turning.norm()) >= NEAR) {
                 break;
@@ -173,7 +171,8 @@ mod tests {
         }
         // At the end, no further jog is possible.
         let on = planner.jog(&Direction::Joints(shares), &planned.end, &most);
-        assert!(on.is_ok() || on.unwrap_err().to_string().contains("end of its range"));
+        let at_the_end = |error| matches!(error, MotionError::Jog(JogRefusal::EndOfRange { .. }));
+        assert!(on.map_or_else(at_the_end, |_| true));
     }
 
     /// The tool moves straight along its own axis, as far as the arm reaches; repeated from there,

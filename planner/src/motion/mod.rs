@@ -4,10 +4,12 @@
 //! the real run and the benchmarks all call it.
 
 mod active;
+mod blocked_cause;
 mod cartesian;
 mod certificate;
 mod draft;
 mod fault;
+mod figures;
 mod goal;
 mod jog;
 mod kernel;
@@ -22,11 +24,11 @@ use trajectory::bounds::Held;
 use trajectory::{JointLimits, MotionBounds, ToolLimits, Trajectory};
 
 pub use active::ActiveLimit;
+pub use blocked_cause::{BlockedCause, JogRefusal, JointAmount};
 pub use certificate::{CrossingReport, LimitReport, MoveCertificate, Peaks};
 pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
-use motion_error::figures;
 
 use certificate::Arm;
 use draft::Draft;
@@ -338,10 +340,10 @@ impl<const N: usize> Planner<N> {
     }
 
     /// A joint quantity with its unit, for messages.
-    fn amount(&self, joint: usize, value: f64) -> String {
+    fn amount(&self, joint: usize, value: f64) -> JointAmount {
         match self.chain().prismatic().get(joint) {
-            Some(true) => format!("{} mm", figures(value * 1e3, 1)),
-            _ => format!("{} degrees", figures(value.to_degrees(), 2)),
+            Some(true) => JointAmount::Length(value),
+            _ => JointAmount::Angle(value),
         }
     }
 }

@@ -5,7 +5,8 @@ use trajectory::TimingError;
 use trajectory::otg::OtgError;
 use trajectory::smooth::SmoothError;
 
-use super::Fault;
+use super::figures::figures;
+use super::{BlockedCause, Fault, JogRefusal, JointAmount};
 
 /// A move that the arm cannot make. Poses are counted from 1, joints by name.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -26,8 +27,8 @@ pub enum MotionError {
         pose: usize,
         /// The joint, as people call it.
         joint: String,
-        /// How far beyond, with its unit.
-        beyond: String,
+        /// How far beyond.
+        beyond: JointAmount,
     },
     /// The position is in reach, the orientation is not.
     #[error(
@@ -61,12 +62,12 @@ pub enum MotionError {
         pose: usize,
         /// Where on the path, percent of the path parameter.
         percent: f64,
-        /// Joint, cause and amount as text.
-        cause: String,
+        /// What blocks the path.
+        cause: BlockedCause,
     },
     /// The arm cannot move in the direction of a jog.
     #[error("{0}")]
-    Jog(String),
+    Jog(#[from] JogRefusal),
     /// The smooth path could not be made.
     #[error("no smooth path: {0}")]
     Smooth(#[from] SmoothError),
@@ -82,21 +83,6 @@ pub enum MotionError {
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]
     Uncertified(#[from] Fault),
-}
-
-/// A number with this many decimals, or more if these would all be zero: a small amount is not
-/// shown as 0.
-pub(super) fn figures(value: f64, decimals: usize) -> String {
-    let size = value.abs();
-    if size >= 1e12 {
-        return format!("{value:.1e}");
-    }
-    let needed = if size > 0.0 && size < 1.0 {
-        (1.0 - size.log10().floor()).clamp(0.0, 12.0) as usize
-    } else {
-        0
-    };
-    format!("{value:.digits$}", digits = decimals.max(needed))
 }
 
 impl MotionError {
@@ -118,21 +104,5 @@ impl MotionError {
                 "please report this with the program: it is a fault of the planner"
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::figures;
-
-    #[test]
-    fn small_amounts_are_not_zero() {
-        let said = |value: f64| figures(value, 1);
-        assert_eq!(said(1388.11), "1388.1");
-        assert_eq!(said(0.5), "0.50");
-        assert_eq!(said(0.0123), "0.012");
-        assert_eq!(said(3.4e-7), "0.00000034");
-        assert_eq!(said(0.0), "0.0");
-        assert_eq!(said(1e300), "1.0e300");
     }
 }

@@ -4,7 +4,7 @@ use kinematics::follow::FollowPoint;
 use kinematics::measure::dexterity;
 use trajectory::Trajectory;
 
-use super::{MotionError, Planner};
+use super::{BlockedCause, MotionError, Planner};
 
 impl<const N: usize> Planner<N> {
     /// Returns the trajectory if all its numbers are finite. Next to a singular pose the
@@ -36,9 +36,7 @@ impl<const N: usize> Planner<N> {
         Err(MotionError::Blocked {
             pose: towards(u),
             percent: if end > 0.0 { 100.0 * u / end } else { 0.0 },
-            cause: format!(
-                "it comes too near to a singular pose (smallest singular value {smallest:.1e})"
-            ),
+            cause: BlockedCause::NearSingular { smallest },
         })
     }
 }

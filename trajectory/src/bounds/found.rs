@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul};
 
-use crate::smooth::poly::halve;
+use crate::poly::halve;
 
 /// Largest relative distance of a bound from a value that is reached.
 pub(super) const TOLERANCE: f64 = 1e-3;

@@ -5,8 +5,8 @@ use realtime::Piece;
 
 use super::found::Found;
 use crate::extrema;
-use crate::smooth::poly::bernstein;
-use crate::timing::Limit;
+use crate::limit::Limit;
+use crate::poly::bernstein;
 use crate::{JointLimits, Trajectory};
 
 /// Bounds of the joints over a whole motion.

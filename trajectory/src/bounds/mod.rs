@@ -13,7 +13,7 @@ mod way;
 use nalgebra::SVector;
 
 use crate::active::Active;
-use crate::timing::{ActiveSpan, Limit, LimitPeak, limit_order, limit_root};
+use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
 use crate::{JointLimits, JointPoint, ToolLimits, ToolPoint, Trajectory};
 use found::Found;
 use stretch::Stretch;
@@ -118,7 +118,7 @@ impl<const N: usize> MotionBounds<N> {
     /// faster. Speeds fall with the factor, accelerations with its square, jerks with its cube.
     pub fn slower(&self) -> f64 {
         let factors = self.peaks.iter();
-        let factors = factors.map(|peak| limit_root(peak.ratio, limit_order(peak.limit)));
+        let factors = factors.map(|peak| root(peak.ratio, order(peak.limit)));
         factors.fold(0.0, f64::max)
     }
 
@@ -126,7 +126,7 @@ impl<const N: usize> MotionBounds<N> {
     #[must_use]
     pub fn stretched(mut self, factor: f64) -> Self {
         let scales = [1, 2, 3].map(|order| 1.0 / factor.powi(order));
-        let scale = |limit: Limit| scales[limit_order(limit) as usize - 1];
+        let scale = |limit: Limit| scales[order(limit) as usize - 1];
         let columns: Vec<f64> = self.joint_limits().map(scale).collect();
         for row in self.rows.chunks_mut(columns.len().max(1)) {
             row.iter_mut()

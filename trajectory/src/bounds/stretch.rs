@@ -5,7 +5,7 @@ use realtime::Piece;
 
 use super::found::{Found, TOLERANCE};
 use super::{Held, JointsToTool};
-use crate::timing::Limit;
+use crate::limit::Limit;
 use crate::{JointPoint, Trajectory};
 
 /// The limits of the tool, in the order used in this file.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::MotionBounds;
 use super::found::Found;
 use super::stretch::Stretch;
-use crate::smooth::poly::halve;
+use crate::poly::halve;
 use crate::smooth::to_segment;
 
 /// A straight leg of the path, and the time in which it is travelled.

@@ -3,12 +3,12 @@
 use nalgebra::SVector;
 
 use super::check;
+use super::duration::common_duration;
 use super::error::OtgError;
 use super::joint::{Given, Joint};
 use super::limits::Limits;
 use super::motion::{Motion, Track};
 use super::options::{Interface, Options};
-use super::plan::common_duration;
 use super::profile::BlendedProfile;
 use super::state::State;
 

@@ -26,7 +26,7 @@
 //! joint can reach form an interval; both its ends have a closed form (`extremal`). So the joint
 //! can arrive after that duration exactly if its distance lies in the interval. Then a weighted
 //! mean of the two extreme profiles keeps every limit and ends at the target (`axis`): no root
-//! finding is needed for a given duration. The search for the shortest common duration (`plan`)
+//! finding is needed for a given duration. The search for the shortest common duration (`duration`)
 //! starts from that of the slowest joint; every joint raises it to its next possible duration until
 //! all agree. Only there roots are found, by Newton's method between bounds. A joint whose mean
 //! profile would leave its position range gets the profile with one constant velocity (`direct`).
@@ -41,6 +41,7 @@ mod axis;
 mod brake;
 mod check;
 mod direct;
+mod duration;
 mod error;
 mod extent;
 mod extremal;

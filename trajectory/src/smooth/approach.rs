@@ -6,9 +6,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::crossing::RESOLUTION;
 use super::poly::{self, halve};
 use super::span::Span;
+
+/// Lengths (m) and angles (rad) below this count as zero.
+pub const RESOLUTION: f64 = 1e-12;
 
 /// First local closest approach to `pose` from (span, time) on, as (span, time); the end if there
 /// is none. If the start is within `tolerance` (m) of the pose, it may be the approach.

@@ -5,8 +5,8 @@ use nalgebra::Isometry3;
 use super::certificate::{Certificate, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
+use super::method::Method;
 use super::options::SmoothOptions;
-use super::plan::Method;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
 
@@ -51,6 +51,20 @@ impl Motion {
     /// Time of the motion, s.
     pub(crate) fn duration(&self) -> f64 {
         self.spans.last().map_or(0.0, Span::end)
+    }
+
+    /// The same way from its end to its start.
+    pub(crate) fn reversed(&self) -> Self {
+        let total = self.duration();
+        Self {
+            spans: self
+                .spans
+                .iter()
+                .rev()
+                .map(|span| span.reversed(total))
+                .collect(),
+            parts: self.parts.iter().rev().copied().collect(),
+        }
     }
 
     /// Adds a motion that starts where this one ends.
@@ -240,7 +254,7 @@ fn narrow(
 }
 
 /// Slows a motion down by a factor; its path does not change.
-fn stretch(spans: &mut [Span], factor: f64) {
+pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
     for span in spans {
         span.start *= factor;
         span.duration *= factor;

@@ -2,12 +2,10 @@
 
 use nalgebra::Isometry3;
 
+pub use super::approach::RESOLUTION;
 use super::approach::{approach, closest};
 use super::options::SmoothOptions;
 use super::span::Span;
-
-/// Lengths (m) and angles (rad) below this count as zero.
-pub const RESOLUTION: f64 = 1e-12;
 
 /// How one intermediate pose is passed.
 ///

@@ -7,6 +7,7 @@ use super::ramp::{self, Caps, Gate};
 use super::span::{Span, Turn};
 use crate::ToolLimits;
 use crate::line::{Line, body_turn};
+use crate::timing::least_time;
 
 /// The straight leg between two poses, with progress 0 to 1 as its unit.
 #[derive(Clone, Debug)]
@@ -111,6 +112,15 @@ pub(crate) fn plan(poses: &[Isometry3<f64>], limits: &ToolLimits) -> Vec<Span> {
         from = to;
     }
     spans
+}
+
+/// Time of [`plan`], s: the sum of the least times of the legs.
+pub(crate) fn duration(poses: &[Isometry3<f64>], limits: &ToolLimits) -> f64 {
+    let legs = poses
+        .windows(2)
+        .filter(|pair| !Line::new(pair[0], pair[1]).is_still());
+    legs.map(|pair| least_time(1.0, Leg::new(&pair[0], &pair[1]).caps(limits).values()))
+        .sum()
 }
 
 /// The poses without those that the straight leg between their neighbours passes anyway, in

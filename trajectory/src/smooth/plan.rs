@@ -2,25 +2,16 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::certificate::Certificate;
+use super::certificate::{Certificate, certify};
 use super::choose::Motion;
 use super::crossing::Crossing;
+use super::lower_bound::lower_bound;
+use super::method::Method;
 use super::options::{SmoothError, SmoothOptions};
 use super::span::Span;
 use super::windows::Windows;
+use super::{dense, exact_stop};
 use crate::{ToolCurve, ToolPoint};
-
-/// How a motion, or a part of it, was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Method {
-    /// Nothing moves.
-    Still,
-    /// Straight legs with a stop at each pose.
-    ExactStop,
-    /// The time-optimal spline.
-    Spline,
-}
 
 /// A certified motion through a list of poses, as a curve of time.
 ///
@@ -79,11 +70,15 @@ impl SmoothPlan {
     /// How the motion was planned: as the time-optimal spline if every part was.
     #[must_use]
     pub fn method(&self) -> Method {
-        let stops = self.parts.iter().find(|part| part.0 != Method::Spline);
-        match (self.parts.is_empty(), stops) {
-            (true, _) => Method::Still,
-            (false, Some(stop)) => stop.0,
-            (false, None) => Method::Spline,
+        let made = |method| self.parts.iter().any(|part| part.0 == method);
+        if self.parts.is_empty() {
+            Method::Still
+        } else if made(Method::ExactStop) {
+            Method::ExactStop
+        } else if made(Method::Fit) {
+            Method::Fit
+        } else {
+            Method::Spline
         }
     }
 
@@ -94,7 +89,7 @@ impl SmoothPlan {
         let stops = self
             .parts
             .iter()
-            .filter(|part| part.0 != Method::Spline)
+            .filter(|part| part.0 == Method::ExactStop)
             .count();
         if self.crossings.is_empty() { 0 } else { stops }
     }
@@ -159,11 +154,38 @@ impl ToolCurve for SmoothPlan {
 /// let poses = corner.map(|[x, y]| Isometry3::translation(x, y, 0.0));
 /// let plan = smooth::plan(&poses, &smooth::SmoothOptions::new(0.001, limits))?;
 /// assert!(plan.certificate().holds());
-/// assert!(plan.passes()[0].deviation <= 0.001);
+/// assert!(plan.crossings()[0].deviation <= 0.001);
 /// assert!(plan.duration() <= plan.exact_stop());
 /// # Ok::<(), smooth::SmoothError>(())
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
+    options.check(poses)?;
+    match fitted(poses, &options.finite()) {
+        Some(fitted) if poses.len() > BOTH => Ok(fitted),
+        Some(fitted) => {
+            let plan = by_spline(poses, options)?;
+            let better = fitted.duration() < plan.duration();
+            Ok(if better { fitted } else { plan })
+        }
+        None => by_spline(poses, options),
+    }
+}
+
+/// Dense lists up to this length are planned in both ways.
+const BOTH: usize = 64;
+
+/// The certified motion along a fitted curve, where the list is dense in poses.
+fn fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<SmoothPlan> {
+    let motion = dense::plan(poses, options)?;
+    let exact_stop = exact_stop::duration(poses, &options.limits);
+    let mut whole = certify(&motion.spans, poses, options);
+    whole.0.lower_bound = lower_bound(poses, options);
+    let good = whole.0.holds() && motion.duration() <= exact_stop;
+    good.then(|| SmoothPlan::new(poses, motion, whole, exact_stop))
+}
+
+/// The motion by time-optimal splines, window by window.
+fn by_spline(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     let plan = Windows::new(poses, options)?.finish();
     // A motion within half of the tolerance is within all of it. A second motion is cheap if poses
     // are close to each other and fit in one window.

@@ -32,6 +32,30 @@ impl Span {
         self.start + self.duration
     }
 
+    /// Lays the span elsewhere: what it says is seen from `frame` until now.
+    pub(crate) fn place(&mut self, frame: &Isometry3<f64>) {
+        for coefficient in &mut self.point {
+            *coefficient = frame.rotation * *coefficient;
+        }
+        self.point[0] += frame.translation.vector;
+        self.base = frame.rotation * self.base;
+    }
+
+    /// The same way from its end to its start, in a motion of `total` (s).
+    pub(crate) fn reversed(&self, total: f64) -> Self {
+        let turns = self.turns.iter().map(|turn| Turn {
+            axis: turn.axis,
+            angle: poly::reversed(&turn.angle, self.duration),
+        });
+        Self {
+            start: total - self.end(),
+            duration: self.duration,
+            point: poly::reversed(&self.point, self.duration),
+            base: self.base,
+            turns: turns.collect(),
+        }
+    }
+
     /// Position, velocity, acceleration and jerk at local time `t`.
     pub(crate) fn motion(&self, t: f64) -> [Vector3<f64>; 4] {
         poly::quartic(&self.point, t)
@@ -139,6 +163,28 @@ mod tests {
             );
         }
         assert_relative_eq!(b.pose.rotation, span.rotation(t), epsilon = 1e-14);
+    }
+
+    /// A span that is reversed or laid elsewhere has the same poses.
+    #[test]
+    fn reversed_and_placed() {
+        let span = span();
+        let back = span.reversed(5.0);
+        assert_relative_eq!(back.start, 2.0, epsilon = 1e-15);
+        for t in [0.0, 0.4, 2.0] {
+            let (there, here) = (span.at(t), back.at(2.0 - t));
+            assert_relative_eq!(there.pose, here.pose, epsilon = 1e-12);
+            assert_relative_eq!(there.linear[0], -here.linear[0], epsilon = 1e-12);
+            assert_relative_eq!(there.angular[1], here.angular[1], epsilon = 1e-12);
+        }
+        let frame = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.3, -0.2, 0.9));
+        let mut placed = span.clone();
+        placed.place(&frame);
+        assert_relative_eq!(
+            placed.at(0.7).pose,
+            frame * span.at(0.7).pose,
+            epsilon = 1e-12
+        );
     }
 
     /// The control forms interpolate the motion at the ends of any interval.

@@ -4,14 +4,14 @@ use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
 use super::bound::bound;
-use super::certificate::{ActiveSpan, Limit, LimitPeak, order, root};
 use super::grid::Bounded;
 use super::gridpoints::ToolGridpoint;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
-use crate::wide::Wide;
+use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
 use crate::{Path, ToolLimits};
+use simd::Build;
 
 /// A limit counts as active from this ratio on.
 const ACTIVE: f64 = 0.97;
@@ -35,10 +35,7 @@ pub(super) struct Audit {
 
 impl Audit {
     /// Bounds every limit over every piece.
-    pub(super) fn new<P: Path<N>, const N: usize>(
-        bounded: Bounded<'_, P, N>,
-        pieces: &Pieces<N>,
-    ) -> Self {
+    pub(super) fn new<const N: usize>(bounded: Bounded<'_, N>, pieces: &Pieces<N>) -> Self {
         let joint = [
             bounded.joint.velocity,
             bounded.joint.acceleration,
@@ -74,9 +71,9 @@ impl Audit {
     }
 
     /// Adds the ratios of the tool over one piece.
-    fn push_tool<P: Path<N>, const N: usize>(
+    fn push_tool<const N: usize>(
         &mut self,
-        path: &P,
+        path: &dyn Path<N>,
         law: &Piece<1>,
         tool: &[Option<(Limit, f64)>; 6],
     ) {
@@ -199,7 +196,7 @@ struct JointBounds<const N: usize> {
     narrow: [SVector<f64, N>; 3],
     /// Whether all limits of an order are finite.
     all: [bool; 3],
-    wide: Wide,
+    build: Build,
 }
 
 impl<const N: usize> JointBounds<N> {
@@ -208,14 +205,14 @@ impl<const N: usize> JointBounds<N> {
             narrow: limits.map(|limit| limit.map(|x| 1.0 / x)),
             all: limits.map(|limit| limit.iter().all(|x| x.is_finite())),
             limits,
-            wide: Wide::detect(),
+            build: Build::detect(),
         }
     }
 
     /// Adds the ratio of each finite limit over a piece.
     fn push(&self, piece: &Piece<N>, ratios: &mut Vec<f64>) {
         let narrow = &self.narrow;
-        let mut hulls = self.wide.run(Hulls { piece, narrow });
+        let mut hulls = self.build.run(Hulls { piece, narrow });
         for (order, hull) in hulls.iter_mut().enumerate() {
             if hull.loose {
                 for j in 0..N {
@@ -255,7 +252,7 @@ impl<const N: usize> JointBounds<N> {
 }
 
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
-fn tool_norms<P: Path<N>, const N: usize>(path: &P, law: &Piece<1>, t: f64) -> [f64; 6] {
+fn tool_norms<const N: usize>(path: &dyn Path<N>, law: &Piece<1>, t: f64) -> [f64; 6] {
     let at = law.sample(t);
     let reparametrization = [
         at.position[0],

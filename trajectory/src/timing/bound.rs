@@ -1,6 +1,6 @@
 //! Bounds of polynomials over an interval, for all times.
 
-use crate::smooth::poly::bernstein;
+use crate::poly::bernstein;
 
 /// An upper bound of `|sum_k coefficients[k] t^k|` over `0 <= t <= duration`, exact to `tolerance`
 /// where it is above `floor`; at most five coefficients.

@@ -3,7 +3,7 @@
 use super::reachability::ReachabilityPass;
 use super::reparametrization::Reparametrization;
 use super::{Boundary, TimingOptions};
-use crate::{JointLimits, ToolLimits};
+use crate::{JointLimits, Path, ToolLimits};
 
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
@@ -22,9 +22,10 @@ pub(super) struct Grid {
 }
 
 /// A path with everything that bounds it.
-pub(super) struct Bounded<'a, P, const N: usize> {
-    /// The path.
-    pub path: &'a P,
+#[derive(Clone, Copy)]
+pub(super) struct Bounded<'a, const N: usize> {
+    /// The path. Not a type parameter: all that computes a law is compiled once per joint count.
+    pub path: &'a dyn Path<N>,
     /// Limits of the joints.
     pub joint: &'a JointLimits<N>,
     /// Limits of the tool.
@@ -32,14 +33,6 @@ pub(super) struct Bounded<'a, P, const N: usize> {
     /// What is asked.
     pub options: &'a TimingOptions,
 }
-
-impl<P, const N: usize> Clone for Bounded<'_, P, N> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<P, const N: usize> Copy for Bounded<'_, P, N> {}
 
 /// Added to a smooth speed so that it begins like a given moving start; it fades out within the
 /// time in which accelerations build up.

@@ -79,7 +79,7 @@ impl ToolGridpoint {
 
 impl<'a, const N: usize> Gridpoints<'a, N> {
     /// Looks at the path at the places of `grid`.
-    pub(super) fn new<P: Path<N>>(bounded: Bounded<'_, P, N>, grid: &'a Grid) -> Self {
+    pub(super) fn new(bounded: Bounded<'_, N>, grid: &'a Grid) -> Self {
         let (path, nodes) = (bounded.path, &grid.nodes);
         let count = nodes.len() - 1;
         let limited = bounded.tool.limited();
@@ -144,7 +144,7 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
 
 impl Grid {
     /// The path at `w`; its third derivatives from the given side: -1 before, 0 at, 1 after.
-    pub(super) fn place<const N: usize>(&self, path: &impl Path<N>, w: f64, side: f64) -> Place<N> {
+    pub(super) fn place<const N: usize>(&self, path: &dyn Path<N>, w: f64, side: f64) -> Place<N> {
         let reparametrization = self.reparametrization.at(w);
         let end = path.end();
         let mut point: PathPoint<N> = path.at(reparametrization[0].clamp(0.0, end));

@@ -2,9 +2,7 @@
 
 use nalgebra::SVector;
 use realtime::Piece;
-
-use super::simd::{Packed, groups};
-use crate::wide::{Four, Op};
+use simd::{F4, Four, Op, groups};
 
 /// Ratios below this need no better bound than the hull: they are far from the limit.
 pub(super) const FLOOR: f64 = 0.9;
@@ -46,18 +44,18 @@ impl<const N: usize> Op for Hulls<'_, N> {
         let [velocity, acceleration, jerk] = &mut hulls;
         let [n1, n2, n3] = self.narrow;
         let [_, c1, c2, c3, c4, c5] = &self.piece.coefficients;
-        let t = Packed::splat(simd, self.piece.duration);
+        let t = F4::splat(simd, self.piece.duration);
         let t2 = t * t;
         let (t3, t4) = (t2 * t, t2 * t2);
         for at in groups(N) {
             let (c1, c2) = (
-                Packed::some(simd, c1.as_slice(), at),
-                Packed::some(simd, c2.as_slice(), at),
+                F4::some(simd, c1.as_slice(), at),
+                F4::some(simd, c2.as_slice(), at),
             );
             let (c3, c4, c5) = (
-                Packed::some(simd, c3.as_slice(), at),
-                Packed::some(simd, c4.as_slice(), at),
-                Packed::some(simd, c5.as_slice(), at),
+                F4::some(simd, c3.as_slice(), at),
+                F4::some(simd, c4.as_slice(), at),
+                F4::some(simd, c5.as_slice(), at),
             );
             let (a, b, c) = (c2 * t, c3 * t2, c4 * t3);
             let near = c1 + a + b * 0.5;
@@ -81,10 +79,10 @@ impl<const N: usize> Hull<N> {
         &mut self,
         narrow: &SVector<f64, N>,
         at: usize,
-        points: [Packed<S>; M],
+        points: [F4<S>; M],
     ) {
-        let simd = points[0].simd();
-        let narrow = Packed::some(simd, narrow.as_slice(), at);
+        let simd = points[0].build();
+        let narrow = F4::some(simd, narrow.as_slice(), at);
         let ends = points[0].abs().max(points[M - 1].abs());
         let mut most = ends;
         for point in &points[1..M - 1] {
@@ -93,8 +91,8 @@ impl<const N: usize> Hull<N> {
         let (most, over) = (most * narrow, (most - ends) * narrow);
         most.put(&mut self.most, at);
         over.put(&mut self.over, at);
-        let below = Packed::splat(simd, FLOOR) - most;
-        let exact = Packed::splat(simd, TOLERANCE) - over;
+        let below = F4::splat(simd, FLOOR) - most;
+        let exact = F4::splat(simd, TOLERANCE) - over;
         self.loose |= below.max(exact).least() < 0.0;
     }
 }
@@ -102,7 +100,7 @@ impl<const N: usize> Hull<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wide::Wide;
+    use simd::Build;
 
     /// Against the derivatives at many places: bounded everywhere, met at the ends; the same in
     /// both builds, for more and fewer joints than a register holds.
@@ -114,13 +112,13 @@ mod tests {
             coefficients,
         };
         let narrow = [0.5, 0.1, 0.02].map(SVector::repeat);
-        let hulls = |wide: Wide| {
-            wide.run(Hulls {
+        let hulls = |build: Build| {
+            build.run(Hulls {
                 piece: &piece,
                 narrow: &narrow,
             })
         };
-        let (hulls, plain) = (hulls(Wide::detect()), hulls(Wide::plain()));
+        let (hulls, plain) = (hulls(Build::detect()), hulls(Build::Plain));
         let samples = (0..=1000).map(|i| piece.sample(0.7 * f64::from(i) / 1000.0));
         let samples: Vec<_> = samples
             .map(|s| [s.velocity, s.acceleration, s.jerk])

@@ -9,11 +9,12 @@
 //! part of its curvature, which is the convex inner approximation by its tangent.
 
 use super::band::{self, Band};
+use super::evaluate::{Evaluate, Multipliers, Turn, Worth};
 use super::newton_system::AssembleNewton;
 use super::problem::Problem;
-use super::state::{Evaluate, Multipliers, State, Turn, Worth};
+use super::state::State;
 use super::step_length::{Measure, StepLength};
-use crate::wide::Wide;
+use simd::Build;
 
 /// An iterate of the law with the multipliers of its rows. It can solve all problems over one grid,
 /// one after the other.
@@ -32,17 +33,17 @@ pub(super) struct Interior {
     idle: f64,
     idle_multiplier: f64,
     worth: Worth,
-    wide: Wide,
+    build: Build,
 }
 
 impl Interior {
     /// Memory for laws of `problem`; the law is 1 everywhere.
     pub(super) fn new(problem: &Problem) -> Self {
-        Self::with(problem, Wide::detect())
+        Self::with(problem, Build::detect())
     }
 
     /// The same in the given build.
-    pub(super) fn with(problem: &Problem, wide: Wide) -> Self {
+    pub(super) fn with(problem: &Problem, build: Build) -> Self {
         let count = problem.unknowns();
         let state = State::new(problem);
         Self {
@@ -59,7 +60,7 @@ impl Interior {
                 steep: f64::INFINITY,
                 time: f64::INFINITY,
             },
-            wide,
+            build,
         }
     }
 
@@ -70,7 +71,7 @@ impl Interior {
 
     /// Computes the value of every row.
     fn evaluate(&mut self, problem: &Problem) {
-        self.worth = self.wide.run(Evaluate {
+        self.worth = self.build.run(Evaluate {
             problem,
             x: &self.x,
             state: &mut self.state,
@@ -158,13 +159,13 @@ impl Interior {
             Turn::Advance(factor) => self.idle_multiplier + factor * (mu - self.idle_multiplier),
         };
         let state = &mut self.state;
-        let total = self.wide.run(Multipliers { state, turn });
+        let total = self.build.run(Multipliers { state, turn });
         total + self.idle * self.idle_multiplier
     }
 
     /// Finds the Newton step and those of the multipliers, and how far they may go.
     fn newton(&mut self, problem: &Problem, mu: f64) -> StepLength {
-        self.wide.run(AssembleNewton {
+        self.build.run(AssembleNewton {
             problem,
             x: &self.x,
             state: &mut self.state,
@@ -181,7 +182,7 @@ impl Interior {
         let known = problem.cells() + 2;
         band::solve(&mut self.matrix[..known], &mut self.step[..known]);
         self.step[known..].fill(0.0);
-        self.wide.run(Measure {
+        self.build.run(Measure {
             problem,
             x: &self.x,
             step: &self.step,

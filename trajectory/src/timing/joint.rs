@@ -5,8 +5,7 @@ use realtime::{Piece, Sample};
 
 use super::gridpoints::Gridpoint;
 use super::problem::Spot;
-use super::simd::{Packed, groups};
-use crate::wide::{Four, Op};
+use simd::{F4, Four, Op, groups};
 
 /// The motion of the joints at a gridpoint, where the law is `spot`.
 pub(super) struct Motion<'a, const N: usize> {
@@ -24,15 +23,15 @@ impl<const N: usize> Op for Motion<'_, N> {
         let Spot { a, b, c } = self.spot;
         let root = a.sqrt();
         let [a, b, c, root] = [
-            Packed::splat(simd, a),
-            Packed::splat(simd, b),
-            Packed::splat(simd, c),
-            Packed::splat(simd, root),
+            F4::splat(simd, a),
+            F4::splat(simd, b),
+            F4::splat(simd, c),
+            F4::splat(simd, root),
         ];
         for at in groups(N) {
-            let q1 = Packed::some(simd, first.as_slice(), at);
-            let q2 = Packed::some(simd, second.as_slice(), at);
-            let q3 = Packed::some(simd, third.as_slice(), at);
+            let q1 = F4::some(simd, first.as_slice(), at);
+            let q2 = F4::some(simd, second.as_slice(), at);
+            let q3 = F4::some(simd, third.as_slice(), at);
             (q1 * root).put(sample.velocity.as_mut_slice(), at);
             (q2 * a + q1 * b).put(sample.acceleration.as_mut_slice(), at);
             let jerk = (q3 * a + q2 * b * 3.0 + q1 * c) * root;
@@ -61,10 +60,10 @@ impl<const N: usize> Op for Join<'_, N> {
         let mut piece = Piece::hold(self.start.position, self.duration);
         let [_, c1, c2, c3, c4, c5] = &mut piece.coefficients;
         let (start, end) = (self.start, self.end);
-        let t = Packed::splat(simd, self.duration);
+        let t = F4::splat(simd, self.duration);
         let inverse = t.inverse();
         let (square, cube) = (t * t, inverse * inverse * inverse);
-        let mut off = Packed::splat(simd, 0.0);
+        let mut off = F4::splat(simd, 0.0);
         for at in groups(N) {
             let [p, v, a, j] = sample(simd, start, at);
             let [p1, v1, a1, j1] = sample(simd, end, at);
@@ -84,7 +83,7 @@ impl<const N: usize> Op for Join<'_, N> {
             let first = third * 6.0;
             let last = first + fourth * 24.0 + fifth * 60.0;
             let worst = (first - j).abs().max((last - j1).abs());
-            let narrow = Packed::some(simd, self.narrow.as_slice(), at);
+            let narrow = F4::some(simd, self.narrow.as_slice(), at);
             off = (worst * narrow).max(off);
         }
         (piece, off.largest())
@@ -93,19 +92,19 @@ impl<const N: usize> Op for Join<'_, N> {
 
 /// Position, velocity, acceleration and jerk of the joints from `at` on.
 #[inline(always)]
-fn sample<S: Four, const N: usize>(simd: S, sample: &Sample<N>, at: usize) -> [Packed<S>; 4] {
+fn sample<S: Four, const N: usize>(simd: S, sample: &Sample<N>, at: usize) -> [F4<S>; 4] {
     [
-        Packed::some(simd, sample.position.as_slice(), at),
-        Packed::some(simd, sample.velocity.as_slice(), at),
-        Packed::some(simd, sample.acceleration.as_slice(), at),
-        Packed::some(simd, sample.jerk.as_slice(), at),
+        F4::some(simd, sample.position.as_slice(), at),
+        F4::some(simd, sample.velocity.as_slice(), at),
+        F4::some(simd, sample.acceleration.as_slice(), at),
+        F4::some(simd, sample.jerk.as_slice(), at),
     ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wide::Wide;
+    use simd::Build;
 
     fn check<const N: usize>() {
         let numbers = |x: f64| SVector::<f64, N>::from_fn(|j, _| (x + 1.7 * j as f64).sin());
@@ -117,24 +116,24 @@ mod tests {
         let (one, two) = (gridpoint(0.3), gridpoint(4.1));
         let [start, end] = [(&one, 1.1, 0.2), (&two, 0.8, -0.3)].map(|(gridpoint, a, b)| {
             let spot = Spot { a, b, c: 0.4 };
-            let sample = Wide::detect().run(Motion { gridpoint, spot });
-            assert_eq!(sample, Wide::plain().run(Motion { gridpoint, spot }));
+            let sample = Build::detect().run(Motion { gridpoint, spot });
+            assert_eq!(sample, Build::Plain.run(Motion { gridpoint, spot }));
             let [q1, q2, _] = gridpoint.joint;
             assert!((sample.velocity - q1 * a.sqrt()).amax() < 1e-15);
             assert!((sample.acceleration - (q2 * a + q1 * b)).amax() < 1e-15);
             sample
         });
         let narrow = &SVector::repeat(0.01);
-        let join = |wide: Wide| {
-            wide.run(Join {
+        let join = |build: Build| {
+            build.run(Join {
                 duration: 0.37,
                 start: &start,
                 end: &end,
                 narrow,
             })
         };
-        let (piece, off) = join(Wide::detect());
-        assert_eq!((piece, off), join(Wide::plain()));
+        let (piece, off) = join(Build::detect());
+        assert_eq!((piece, off), join(Build::Plain));
         let wanted = Piece::hermite(0.37, &start, &end);
         for (found, wanted) in piece.coefficients.iter().zip(&wanted.coefficients) {
             assert!((found - wanted).amax() <= 1e-13 * wanted.amax());

@@ -32,7 +32,7 @@ impl LawProblem {
     /// # Errors
     /// As [`time_path`](super::time_path).
     pub fn new<const N: usize>(
-        path: &impl Path<N>,
+        path: &dyn Path<N>,
         joint: &JointLimits<N>,
         tool: &ToolLimits,
         options: &TimingOptions,
@@ -124,7 +124,7 @@ pub(super) fn swaying(cells: usize) -> Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wide::Wide;
+    use simd::Build;
 
     /// The wide build and that for every processor give the same bits, whatever is left over in
     /// the last block.
@@ -132,8 +132,8 @@ mod tests {
     fn both_builds_find_the_same_law() {
         for cells in [8, 9, 10, 11, 60] {
             let problem = swaying(cells);
-            let [wide, plain] = [Wide::detect(), Wide::plain()].map(|wide| {
-                let mut interior = Interior::with(&problem, wide);
+            let [wide, plain] = [Build::detect(), Build::Plain].map(|build| {
+                let mut interior = Interior::with(&problem, build);
                 interior.slow_down(&problem);
                 interior.solve(&problem, 1e-6, 0.3, MOST_STEPS);
                 interior

@@ -2,7 +2,6 @@
 
 use super::grid::Bounded;
 use super::{Boundary, TimingOptions};
-use crate::Path;
 
 /// The least time (s) from rest to rest over a distance under a velocity, acceleration and jerk
 /// limit, in consistent units; infinite limits have no effect.
@@ -39,7 +38,7 @@ pub fn least_time(distance: f64, [v, a, j]: [f64; 3]) -> f64 {
 
 /// The least time of any motion from rest to rest between the ends of the path: the largest of
 /// those of each joint and of the tool along its chord. 0 for a moving start.
-pub(super) fn chord_bound<P: Path<N>, const N: usize>(bounded: Bounded<'_, P, N>) -> f64 {
+pub(super) fn chord_bound<const N: usize>(bounded: Bounded<'_, N>) -> f64 {
     let TimingOptions { start, .. } = bounded.options;
     if matches!(start, Boundary::Moving { .. }) {
         return 0.0;

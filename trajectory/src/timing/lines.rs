@@ -1,7 +1,7 @@
 //! The rows of a problem with their states, slot by slot in memory order.
 
+use super::block::Lane;
 use super::problem::{Basis, Problem};
-use super::simd::Lane;
 use super::state::{ConstraintRow, Norm, State};
 
 /// The remaining rows of a problem, with their states.

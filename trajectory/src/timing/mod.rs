@@ -7,8 +7,10 @@
 
 mod audit;
 mod band;
+mod block;
 mod bound;
 mod certificate;
+mod evaluate;
 mod grid;
 mod gridpoints;
 mod hull;
@@ -26,13 +28,14 @@ mod reach;
 mod reachability;
 mod reparametrization;
 mod rows;
-mod simd;
+mod search;
+
 mod state;
 mod step_length;
 mod tighten;
 
-pub use certificate::{ActiveSpan, Limit, LimitPeak, TimeCertificate};
-pub(crate) use certificate::{order as limit_order, root as limit_root};
+pub use crate::limit::{ActiveSpan, Limit, LimitPeak};
+pub use certificate::TimeCertificate;
 pub use law::{Law, LawProblem};
 pub use least::least_time;
 pub use options::{Boundary, TimingOptions};
@@ -61,7 +64,7 @@ pub struct Timed<const N: usize> {
 /// [`TimingError`] when a limit or an option is not positive, when the path is not finite or has
 /// a corner, or when a moving start cannot be continued.
 pub fn time_path<const N: usize>(
-    path: &impl Path<N>,
+    path: &dyn Path<N>,
     joint: &JointLimits<N>,
     tool: &ToolLimits,
     options: &TimingOptions,
@@ -112,8 +115,8 @@ pub fn time_path<const N: usize>(
 
 /// The best law after the reachability pass. A moving start near the limits may need finer cells
 /// than the whole law.
-fn draft<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
+fn draft<const N: usize>(
+    bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
 ) -> Result<tighten::Draft<N>, TimingError> {
     let mut options = *bounded.options;
@@ -125,7 +128,7 @@ fn draft<P: Path<N>, const N: usize>(
             bounded.path.end(),
             &options,
         );
-        match tighten::best(bounded, &Gridpoints::new(bounded, &grid)) {
+        match search::best(bounded, &Gridpoints::new(bounded, &grid)) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }

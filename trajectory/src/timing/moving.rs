@@ -4,13 +4,13 @@
 //! are widened to contain the first guess; the iterate moves to the centre of the feasible set; the
 //! limits are narrowed to what it needs; and so on until they are the true ones.
 
-use super::certificate::Limit;
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::problem::Problem;
 use super::tighten::{Draft, MOST_STEPS, tighten};
-use crate::{Path, TimingError};
+use crate::TimingError;
+use crate::limit::Limit;
 
 /// Times that limits are narrowed.
 const NARROWINGS: usize = 60;
@@ -22,8 +22,8 @@ const ROUNDS: usize = 10;
 const ROUNDING: f64 = 1e-6;
 
 /// The fastest law found over `grid` that meets every bound as it is.
-pub(super) fn best<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
+pub(super) fn best<const N: usize>(
+    bounded: Bounded<'_, N>,
     gridpoints: &Gridpoints<'_, N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {

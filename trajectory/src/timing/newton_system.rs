@@ -1,41 +1,42 @@
 //! The Newton system of a law: what each row adds to it.
 
 use super::band::Band;
+use super::block::{LANE, Lane, dot};
+use super::evaluate::{Spots, vector};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
-use super::simd::{LANE, Lane, Packed, dot};
-use super::state::{ConstraintRow, Norm, Spots, State, vector};
-use crate::wide::{Four, Op};
+use super::state::{ConstraintRow, Norm, State};
+use simd::{F4, Four, Op};
 
 /// Gradient and curvature at a place, over `a`, `b`, `c` there.
 #[derive(Clone, Copy)]
 struct NewtonBlock<S: Four> {
     simd: S,
-    aa: Packed<S>,
-    ab: Packed<S>,
-    ac: Packed<S>,
-    bb: Packed<S>,
-    bc: Packed<S>,
-    cc: Packed<S>,
-    ga: Packed<S>,
-    gb: Packed<S>,
-    gc: Packed<S>,
+    aa: F4<S>,
+    ab: F4<S>,
+    ac: F4<S>,
+    bb: F4<S>,
+    bc: F4<S>,
+    cc: F4<S>,
+    ga: F4<S>,
+    gb: F4<S>,
+    gc: F4<S>,
 }
 
 /// Weight of a row's curvature and force of its gradient, for `g² <= 1` with centring `mu`.
 #[inline(always)]
-fn weigh<S: Four>(simd: S, row: &ConstraintRow, mu: Packed<S>) -> (Packed<S>, Packed<S>) {
-    let g = Packed::load(simd, &row.g);
+fn weigh<S: Four>(simd: S, row: &ConstraintRow, mu: F4<S>) -> (F4<S>, F4<S>) {
+    let g = F4::load(simd, &row.g);
     let twice = g + g;
-    let pull = twice / (Packed::splat(simd, 1.0) - g * g);
-    let curve = Packed::splat(simd, 2.0) + twice * pull;
-    (Packed::load(simd, &row.multiplier) * curve, mu * pull)
+    let pull = twice / (F4::splat(simd, 1.0) - g * g);
+    let curve = F4::splat(simd, 2.0) + twice * pull;
+    (F4::load(simd, &row.multiplier) * curve, mu * pull)
 }
 
 impl<S: Four> NewtonBlock<S> {
     #[inline(always)]
     fn zero(simd: S) -> Self {
-        let zero = Packed::splat(simd, 0.0);
+        let zero = F4::splat(simd, 0.0);
         Self {
             simd,
             aa: zero,
@@ -52,7 +53,7 @@ impl<S: Four> NewtonBlock<S> {
 
     /// The block as a function of the law `x` further to the left.
     #[inline(always)]
-    fn moved(&self, x: Packed<S>) -> Self {
+    fn moved(&self, x: F4<S>) -> Self {
         let (y, twice) = (x * x, x + x);
         let (aa, ab, ac) = (self.aa, self.ab, self.ac);
         let ab2 = twice * aa + ab;
@@ -85,12 +86,9 @@ impl<S: Four> NewtonBlock<S> {
 
     /// Adds acceleration rows `[p, q]` with centring `mu`.
     #[inline(always)]
-    fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[ConstraintRow], mu: Packed<S>) {
+    fn accelerations(&mut self, lines: &[[Lane; 2]], rows: &[ConstraintRow], mu: F4<S>) {
         for (line, row) in lines.iter().zip(rows) {
-            let (p, q) = (
-                Packed::load(self.simd, &line[0]),
-                Packed::load(self.simd, &line[1]),
-            );
+            let (p, q) = (F4::load(self.simd, &line[0]), F4::load(self.simd, &line[1]));
             let (weight, force) = weigh(self.simd, row, mu);
             let (wp, wq) = (weight * p, weight * q);
             self.aa += wq * q;
@@ -103,7 +101,7 @@ impl<S: Four> NewtonBlock<S> {
 
     /// Adds jerk rows `[x, y, z]` as if they were `|x a + y b + z c| <= 1`.
     #[inline(always)]
-    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[ConstraintRow], mu: Packed<S>) {
+    fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[ConstraintRow], mu: F4<S>) {
         for (line, row) in lines.iter().zip(rows) {
             let [x, y, z] = vector(self.simd, line);
             let (weight, force) = weigh(self.simd, row, mu);
@@ -125,8 +123,8 @@ impl<S: Four> NewtonBlock<S> {
     #[inline(always)]
     fn rooted(&self, spot: Spots<S>) -> Self {
         let (a, root) = (spot.a, spot.a.sqrt());
-        let half = Packed::splat(self.simd, 0.5) / a;
-        let row = [Packed::splat(self.simd, 1.5), spot.b * half, spot.c * half];
+        let half = F4::splat(self.simd, 0.5) / a;
+        let row = [F4::splat(self.simd, 1.5), spot.b * half, spot.c * half];
         let [x, y, z] = self.times(row);
         Self {
             simd: self.simd,
@@ -144,11 +142,11 @@ impl<S: Four> NewtonBlock<S> {
 
     /// Adds a row bounded in norm, with the derivatives of its vector to `a`, `b`, `c`.
     #[inline(always)]
-    fn norm(&mut self, [ra, rb, rc]: [[Packed<S>; 3]; 3], row: &Norm, mu: Packed<S>) {
+    fn norm(&mut self, [ra, rb, rc]: [[F4<S>; 3]; 3], row: &Norm, mu: F4<S>) {
         let g = vector(self.simd, &row.g);
-        let twice = Packed::splat(self.simd, 2.0) / (Packed::splat(self.simd, 1.0) - dot(g, g));
+        let twice = F4::splat(self.simd, 2.0) / (F4::splat(self.simd, 1.0) - dot(g, g));
         let (ta, tb, tc) = (dot(g, ra), dot(g, rb), dot(g, rc));
-        let flat = Packed::load(self.simd, &row.multiplier) * 2.0;
+        let flat = F4::load(self.simd, &row.multiplier) * 2.0;
         let (steep, force) = (flat * twice, mu * twice);
         self.aa += flat * dot(ra, ra) + steep * ta * ta;
         self.ab += flat * dot(ra, rb) + steep * ta * tb;
@@ -163,33 +161,33 @@ impl<S: Four> NewtonBlock<S> {
 
     /// Adds the cap `cap a <= 1` and the time `weight / sqrt(a)`.
     #[inline(always)]
-    fn value(&mut self, value: &[Lane; 2], row: &ConstraintRow, a: Packed<S>, mu: Packed<S>) {
+    fn value(&mut self, value: &[Lane; 2], row: &ConstraintRow, a: F4<S>, mu: F4<S>) {
         let (weight, cap) = (
-            Packed::load(self.simd, &value[0]),
-            Packed::load(self.simd, &value[1]),
+            F4::load(self.simd, &value[0]),
+            F4::load(self.simd, &value[1]),
         );
-        let g = Packed::load(self.simd, &row.g);
-        let pull = cap / (Packed::splat(self.simd, 1.0) - g);
+        let g = F4::load(self.simd, &row.g);
+        let pull = cap / (F4::splat(self.simd, 1.0) - g);
         let slope = weight / (a * a.sqrt());
-        self.aa += slope * 0.75 / a + Packed::load(self.simd, &row.multiplier) * pull * cap;
+        self.aa += slope * 0.75 / a + F4::load(self.simd, &row.multiplier) * pull * cap;
         self.ga += mu * pull - slope * 0.5;
     }
 
     /// Adds a slot of values.
     #[inline(always)]
-    fn values(&mut self, slot: Values<'_>, mu: Packed<S>) {
+    fn values(&mut self, slot: Values<'_>, mu: F4<S>) {
         let simd = self.simd;
         self.accelerations(slot.joints.0, slot.joints.1, mu);
         for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let still = [Packed::splat(simd, 0.0); 3];
+            let still = [F4::splat(simd, 0.0); 3];
             self.norm([vector(simd, q), vector(simd, p), still], norm, mu);
         }
     }
 
     /// The share of a jerk slot.
     #[inline(always)]
-    fn of_jerks(slot: Jerks<'_>, spot: Spots<S>, mu: Packed<S>) -> Self {
-        let simd = spot.a.simd();
+    fn of_jerks(slot: Jerks<'_>, spot: Spots<S>, mu: F4<S>) -> Self {
+        let simd = spot.a.build();
         let mut share = Self::zero(simd);
         share.jerks(slot.joints.0, slot.joints.1, mu);
         for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
@@ -203,9 +201,9 @@ impl<S: Four> NewtonBlock<S> {
     /// unknowns of the cell, three of the right-hand side.
     #[inline(always)]
     fn entries(&self, basis: &Basis) -> [Lane; 9] {
-        let lane = |x: &Lane| Packed::load(self.simd, x);
+        let lane = |x: &Lane| F4::load(self.simd, x);
         let (left, right, inverse) = (lane(&basis.left), lane(&basis.right), lane(&basis.inverse));
-        let zero = Packed::splat(self.simd, 0.0);
+        let zero = F4::splat(self.simd, 0.0);
         let a = [lane(&basis.first), lane(&basis.second), zero];
         let b = [zero - left, left, zero];
         let c = [
@@ -221,21 +219,21 @@ impl<S: Four> NewtonBlock<S> {
         ];
         let force = [self.ga, self.gb, self.gc];
         [
-            dot(rows[0], columns[0]).lane(),
-            dot(rows[0], columns[1]).lane(),
-            dot(rows[0], columns[2]).lane(),
-            dot(rows[1], columns[1]).lane(),
-            dot(rows[1], columns[2]).lane(),
-            dot(rows[2], columns[2]).lane(),
-            dot(force, columns[0]).lane(),
-            dot(force, columns[1]).lane(),
-            dot(force, columns[2]).lane(),
+            dot(rows[0], columns[0]).array(),
+            dot(rows[0], columns[1]).array(),
+            dot(rows[0], columns[2]).array(),
+            dot(rows[1], columns[1]).array(),
+            dot(rows[1], columns[2]).array(),
+            dot(rows[2], columns[2]).array(),
+            dot(force, columns[0]).array(),
+            dot(force, columns[1]).array(),
+            dot(force, columns[2]).array(),
         ]
     }
 
     /// The curvature times a column.
     #[inline(always)]
-    fn times(&self, column: [Packed<S>; 3]) -> [Packed<S>; 3] {
+    fn times(&self, column: [F4<S>; 3]) -> [F4<S>; 3] {
         [
             dot([self.aa, self.ab, self.ac], column),
             dot([self.ab, self.bb, self.bc], column),
@@ -261,11 +259,11 @@ impl Op for AssembleNewton<'_> {
     fn run<S: Four>(self, simd: S) {
         self.matrix.fill([0.0; 3]);
         self.step.fill(0.0);
-        let mu = Packed::splat(simd, self.mu);
+        let mu = F4::splat(simd, self.mu);
         let (mut lines, blocks) = Lines::all(self.problem, self.state);
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
-            let width = Packed::load(simd, &basis.width);
+            let width = F4::load(simd, &basis.width);
             let half = width * 0.5;
             let middle = left.moved(half);
             let (mut total, mut inner) = (NewtonBlock::zero(simd), NewtonBlock::zero(simd));
@@ -315,14 +313,14 @@ fn scatter(entries: &[Lane; 9], first: usize, matrix: &mut [[f64; 3]], step: &mu
 
 #[cfg(test)]
 mod tests {
+    use super::super::evaluate::{Evaluate, Multipliers, Turn};
     use super::super::law::swaying;
-    use super::super::state::{Evaluate, Multipliers, Turn};
     use super::*;
-    use crate::wide::Wide;
+    use simd::Build;
 
     /// Time and barrier of the law `x`; the right-hand side is their descent direction.
     fn barrier(problem: &Problem, x: &[f64], state: &mut State, mu: f64) -> f64 {
-        let worth = Wide::plain().run(Evaluate { problem, x, state });
+        let worth = Build::Plain.run(Evaluate { problem, x, state });
         let mut logs = 0.0;
         for row in state.acceleration.iter().chain(&state.jerk) {
             logs += row.g.iter().map(|g| (1.0 - g * g).ln()).sum::<f64>();
@@ -349,13 +347,13 @@ mod tests {
         barrier(&problem, &x, &mut state, mu);
         let turn = Turn::Balance(mu);
         let multipliers = &mut state;
-        Wide::plain().run(Multipliers {
+        Build::Plain.run(Multipliers {
             state: multipliers,
             turn,
         });
         let mut matrix = vec![[0.0; 3]; x.len()];
         let mut step = vec![0.0; x.len()];
-        Wide::detect().run(AssembleNewton {
+        Build::detect().run(AssembleNewton {
             problem: &problem,
             x: &x,
             state: &mut state,

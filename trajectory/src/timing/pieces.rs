@@ -7,8 +7,7 @@ use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints};
 use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
-use crate::Path;
-use crate::wide::Wide;
+use simd::Build;
 
 /// The jerk of a piece may differ from that of the law by this fraction of the limit.
 const JERK_FIT: f64 = 2e-3;
@@ -38,9 +37,9 @@ struct State<const N: usize> {
 
 impl<const N: usize> State<N> {
     /// The motion at a gridpoint, where the law is `spot`.
-    fn new(wide: Wide, gridpoint: &Gridpoint<N>, spot: Spot) -> Self {
+    fn new(build: Build, gridpoint: &Gridpoint<N>, spot: Spot) -> Self {
         let root = spot.a.sqrt();
-        let joint = wide.run(Motion { gridpoint, spot });
+        let joint = build.run(Motion { gridpoint, spot });
         let one = |x: f64| SVector::<f64, 1>::from_element(x);
         let [u, u1, u2, u3] = gridpoint.reparametrization;
         let law = Sample {
@@ -54,18 +53,18 @@ impl<const N: usize> State<N> {
 }
 
 /// Makes pieces out of one law.
-pub(super) struct Maker<'a, P, const N: usize> {
-    bounded: Bounded<'a, P, N>,
+pub(super) struct Maker<'a, const N: usize> {
+    bounded: Bounded<'a, N>,
     gridpoints: &'a Gridpoints<'a, N>,
     /// One over the jerk limits.
     narrow: SVector<f64, N>,
-    wide: Wide,
+    build: Build,
     out: Pieces<N>,
 }
 
-impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
+impl<'a, const N: usize> Maker<'a, N> {
     /// For laws over the grid of `gridpoints`.
-    pub(super) fn new(bounded: Bounded<'a, P, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
+    pub(super) fn new(bounded: Bounded<'a, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
         let count = 2 * gridpoints.grid.nodes.len();
         let out = Pieces {
             joint: Vec::with_capacity(count),
@@ -77,7 +76,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
             bounded,
             gridpoints,
             narrow: bounded.joint.jerk.map(|x| 1.0 / x),
-            wide: Wide::detect(),
+            build: Build::detect(),
             out,
         }
     }
@@ -87,9 +86,9 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         let nodes = &self.gridpoints.grid.nodes;
         for k in 0..problem.cells() {
             let (spot, gridpoints) = (problem.spot(k, x), self.gridpoints);
-            let start = State::new(self.wide, gridpoints.left(k), spot);
+            let start = State::new(self.build, gridpoints.left(k), spot);
             let end = State::new(
-                self.wide,
+                self.build,
                 gridpoints.right(k),
                 spot.moved(problem.widths[k]),
             );
@@ -108,7 +107,7 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
         depth: usize,
     ) {
         let duration = passage(start.spot, w1 - w0);
-        let (joint, jerk_off) = self.wide.run(Join {
+        let (joint, jerk_off) = self.build.run(Join {
             duration,
             start: &start.joint,
             end: &end.joint,
@@ -126,11 +125,11 @@ impl<'a, P: Path<N>, const N: usize> Maker<'a, P, N> {
             let middle = 0.5 * (w0 + w1);
             let spot = start.spot.moved(middle - w0);
             let state = if depth == DEPTH {
-                State::new(self.wide, self.gridpoints.middle(k), spot)
+                State::new(self.build, self.gridpoints.middle(k), spot)
             } else {
                 let grid = self.gridpoints.grid;
                 State::new(
-                    self.wide,
+                    self.build,
                     &grid.place(self.bounded.path, middle, 0.0).0,
                     spot,
                 )

@@ -1,6 +1,6 @@
 //! The time law as an optimisation problem over a grid of cells.
 
-use super::simd::{LANE, Lane};
+use super::block::{LANE, Lane};
 
 /// Jerk places in a cell: both ends and the middle.
 const JERK_SLOTS: usize = 3;

@@ -1,7 +1,7 @@
 //! The fastest law under velocity and acceleration limits alone, by reachability.
 
-use super::simd::{LANE, Lane};
-use crate::wide::{Four, Op, Wide};
+use super::block::{LANE, Lane};
+use simd::{Build, Four, Op};
 
 /// A path on a grid with its limits, ready for [`ReachGrid::solve`]: `a = (du/dt)^2` and
 /// `b = d²u/dt²` have to meet `a <= cap` and `|p b + q a| <= 1` for each row `(p, q)`, at both ends
@@ -103,7 +103,7 @@ impl ReachGrid {
     /// unknowns; it is solved by Newton steps on the concave gap between the bounds of `b`.
     pub fn solve(&self, first: f64, last: f64) -> Vec<f64> {
         let mut top = self.cap.clone();
-        Wide::detect().run(Passes {
+        Build::detect().run(Passes {
             grid: self,
             top: &mut top,
             ends: (first, last),

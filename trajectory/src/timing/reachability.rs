@@ -54,7 +54,7 @@ impl ReachabilityPass {
     /// # Errors
     /// [`TimingError`] for paths that are not finite, have a corner, or limits that bound nothing.
     pub(super) fn new<const N: usize>(
-        path: &impl Path<N>,
+        path: &dyn Path<N>,
         joint: &JointLimits<N>,
         tool: &ToolLimits,
         options: &TimingOptions,
@@ -126,7 +126,7 @@ fn clock(at: &[f64], a: &[f64]) -> Vec<f64> {
 }
 
 /// Knots, places between them, and more of them near ends at rest.
-fn places<const N: usize>(path: &impl Path<N>) -> Result<Vec<f64>, TimingError> {
+fn places<const N: usize>(path: &dyn Path<N>) -> Result<Vec<f64>, TimingError> {
     let end = path.end();
     if !(end > 0.0 && end.is_finite()) {
         return Err(TimingError::EmptyPath { end });
@@ -168,7 +168,7 @@ struct Bends<const N: usize> {
 
 impl<const N: usize> Bends<N> {
     /// Looks at `path`.
-    fn new(path: &impl Path<N>, at: &[f64], limits: &ToolLimits) -> Result<Self, TimingError> {
+    fn new(path: &dyn Path<N>, at: &[f64], limits: &ToolLimits) -> Result<Self, TimingError> {
         let limited = limits.limited();
         let mut bends = Self {
             joints: Vec::with_capacity(at.len()),
@@ -213,7 +213,7 @@ fn finite<const N: usize>(point: PathPoint<N>, u: f64) -> Result<PathPoint<N>, T
 }
 
 /// Searches for jumps of the first two derivatives at knots, relative to their `sizes`.
-fn corners<const N: usize>(path: &impl Path<N>, sizes: [f64; 4]) -> Result<(), TimingError> {
+fn corners<const N: usize>(path: &dyn Path<N>, sizes: [f64; 4]) -> Result<(), TimingError> {
     let end = path.end();
     let [_, first, second, third] = sizes;
     let second = second + 4.0 * first / end;

@@ -2,13 +2,13 @@
 
 use nalgebra::{SVector, Vector3};
 
+use super::block::{LANE, Lane};
 use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
 use super::reachability::{joint_ratio, speed_cap};
-use super::simd::{LANE, Lane};
 use super::{Boundary, TimingOptions};
-use crate::{JointLimits, Path, ToolLimits};
+use crate::{JointLimits, ToolLimits};
 
 /// Limits as factors: what rows are multiplied by.
 struct Rows<'a, const N: usize> {
@@ -21,7 +21,7 @@ struct Rows<'a, const N: usize> {
     jerk: SVector<f64, N>,
 }
 
-impl<P: Path<N>, const N: usize> Bounded<'_, P, N> {
+impl<const N: usize> Bounded<'_, N> {
     /// The problem over the places of `gridpoints`.
     pub(super) fn problem(&self, gridpoints: &Gridpoints<'_, N>) -> Problem {
         let tool = self.tool;

@@ -1,10 +1,11 @@
 //! How far a Newton step may go.
 
+use super::block::{LANE, Lane, combine, dot};
+use super::evaluate::{Spots, vector};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::Problem;
-use super::simd::{LANE, Lane, Packed, combine, dot};
-use super::state::{ConstraintRow, Norm, Spots, State, vector};
-use crate::wide::{Four, Op};
+use super::state::{ConstraintRow, Norm, State};
+use simd::{F4, Four, Op};
 
 /// Reciprocals of the largest factors of a step: of the law and of the multipliers.
 #[derive(Clone, Copy, Debug)]
@@ -17,19 +18,19 @@ pub(super) struct StepLength {
 #[derive(Clone, Copy)]
 struct Strides<S: Four> {
     simd: S,
-    mu: Packed<S>,
-    primal: Packed<S>,
-    dual: Packed<S>,
+    mu: F4<S>,
+    primal: F4<S>,
+    dual: F4<S>,
 }
 
 impl<S: Four> Strides<S> {
     /// Adds a row that changes by `d`, and writes the step of its multiplier.
     #[inline(always)]
-    fn row(&mut self, row: &mut ConstraintRow, d: Packed<S>) {
-        let one = Packed::splat(self.simd, 1.0);
+    fn row(&mut self, row: &mut ConstraintRow, d: F4<S>) {
+        let one = F4::splat(self.simd, 1.0);
         let (g, m) = (
-            Packed::load(self.simd, &row.g),
-            Packed::load(self.simd, &row.multiplier),
+            F4::load(self.simd, &row.g),
+            F4::load(self.simd, &row.multiplier),
         );
         let gd = g * d;
         let slack = one - g * g;
@@ -44,10 +45,10 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a row bounded in norm that changes by `d`.
     #[inline(always)]
-    fn norm(&mut self, row: &mut Norm, d: [Packed<S>; 3]) {
-        let one = Packed::splat(self.simd, 1.0);
+    fn norm(&mut self, row: &mut Norm, d: [F4<S>; 3]) {
+        let one = F4::splat(self.simd, 1.0);
         let g = vector(self.simd, &row.g);
-        let m = Packed::load(self.simd, &row.multiplier);
+        let m = F4::load(self.simd, &row.multiplier);
         let slack = one - dot(g, g);
         let (half, square) = (dot(g, d), dot(d, d));
         let inverse = slack.inverse();
@@ -61,12 +62,12 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a cap of `a`, which changes by `da`.
     #[inline(always)]
-    fn value(&mut self, cap: &Lane, row: &mut ConstraintRow, (a, da): (Packed<S>, Packed<S>)) {
-        let one = Packed::splat(self.simd, 1.0);
-        let d = Packed::load(self.simd, cap) * da;
-        let m = Packed::load(self.simd, &row.multiplier);
-        let inverse = (one - Packed::load(self.simd, &row.g)).inverse();
-        let fall = Packed::splat(self.simd, 0.0) - da / a;
+    fn value(&mut self, cap: &Lane, row: &mut ConstraintRow, (a, da): (F4<S>, F4<S>)) {
+        let one = F4::splat(self.simd, 1.0);
+        let d = F4::load(self.simd, cap) * da;
+        let m = F4::load(self.simd, &row.multiplier);
+        let inverse = (one - F4::load(self.simd, &row.g)).inverse();
+        let fall = F4::splat(self.simd, 0.0) - da / a;
         self.primal = (d * inverse).max(fall).max(self.primal);
         let new = (self.mu + m * d) * inverse;
         (new - m).store(&mut row.change);
@@ -78,10 +79,7 @@ impl<S: Four> Strides<S> {
     fn values(&mut self, slot: Values<'_>, d: Spots<S>) {
         let simd = self.simd;
         for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
-            self.row(
-                row,
-                Packed::load(simd, p) * d.b + Packed::load(simd, q) * d.a,
-            );
+            self.row(row, F4::load(simd, p) * d.b + F4::load(simd, q) * d.a);
         }
         for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
             let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
@@ -99,11 +97,7 @@ impl<S: Four> Strides<S> {
         let b = root * (d.b + half * at.b);
         let c = root * (d.c + half * at.c);
         for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
-            let (x, y, z) = (
-                Packed::load(simd, x),
-                Packed::load(simd, y),
-                Packed::load(simd, z),
-            );
+            let (x, y, z) = (F4::load(simd, x), F4::load(simd, y), F4::load(simd, z));
             self.row(row, x * a + y * b + z * c);
         }
         for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
@@ -128,10 +122,10 @@ impl Op for Measure<'_> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) -> StepLength {
-        let least = Packed::splat(simd, 1e-9);
+        let least = F4::splat(simd, 1e-9);
         let mut step_lengths = Strides {
             simd,
-            mu: Packed::splat(simd, self.mu),
+            mu: F4::splat(simd, self.mu),
             primal: least,
             dual: least,
         };
@@ -139,7 +133,7 @@ impl Op for Measure<'_> {
         for (i, (basis, value, cap)) in blocks.enumerate() {
             let left = Spots::left(simd, basis, &self.x[LANE * i..]);
             let change = Spots::left(simd, basis, &self.step[LANE * i..]);
-            let width = Packed::load(simd, &basis.width);
+            let width = F4::load(simd, &basis.width);
             let half = width * 0.5;
             let (middle, further) = (left.moved(half), change.moved(half));
             step_lengths.value(&value[0][1], &mut cap[0], (left.a, change.a));

@@ -1,24 +1,17 @@
-//! Computes the final law of a problem: solves, bounds between the gridpoints, tightens the rows
-//! that are exceeded there, solves again.
+//! The pieces of a law with their bounds, and the rows tightened where these are exceeded between
+//! the gridpoints.
 
 use super::audit::Audit;
-use super::certificate::{Limit, order};
+use super::block::{LANE, Lane};
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
 use super::interior::Interior;
 use super::pieces::{Maker, Pieces};
 use super::problem::Problem;
-use super::simd::{LANE, Lane};
-use crate::{Path, TimingError};
+use crate::limit::{Limit, order};
 
 /// Newton steps after which the best law so far is used.
 pub(super) const MOST_STEPS: usize = 60;
-/// Newton steps after rows were tightened.
-const FEW_STEPS: usize = 12;
-/// Times that rows are tightened.
-const ROUNDS: usize = 2;
-/// Time that need not be gained back by another round.
-const ENOUGH: f64 = 1.0005;
 
 /// A law with its pieces and their bounds.
 #[derive(Clone, Debug)]
@@ -27,13 +20,14 @@ pub(super) struct Draft<const N: usize> {
     pub(super) audit: Audit,
     pub(super) iterations: usize,
     pub(super) cells: usize,
-    duration: f64,
+    /// How long it takes once it is stretched to meet every bound (s).
+    pub(super) duration: f64,
 }
 
 impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
-    pub(super) fn new<P: Path<N>>(
-        bounded: Bounded<'_, P, N>,
+    pub(super) fn new(
+        bounded: Bounded<'_, N>,
         (gridpoints, problem): (&Gridpoints<'_, N>, &Problem),
         interior: &Interior,
     ) -> Self {
@@ -48,44 +42,6 @@ impl<const N: usize> Draft<N> {
             cells: problem.cells(),
             duration,
         }
-    }
-}
-
-/// The fastest law found over `grid` once it is stretched to meet every bound.
-pub(super) fn best<P: Path<N>, const N: usize>(
-    bounded: Bounded<'_, P, N>,
-    gridpoints: &Gridpoints<'_, N>,
-) -> Result<Draft<N>, TimingError> {
-    let mut problem = bounded.problem(gridpoints);
-    if problem.moving {
-        return super::moving::best(bounded, gridpoints, problem);
-    }
-    let gap = bounded.options.gap;
-    let mut interior = Interior::new(&problem);
-    interior.slow_down(&problem);
-    interior.solve(&problem, gap, 0.3, MOST_STEPS);
-    let mut last = Draft::new(bounded, (gridpoints, &problem), &interior);
-    let mut best = None;
-    for _ in 0..ROUNDS {
-        if last.audit.stretch < ENOUGH {
-            break;
-        }
-        tighten(&mut problem, &last, 1.0);
-        best = Some(faster(best, last));
-        interior.slow_down(&problem);
-        interior.solve(&problem, gap, 0.02, FEW_STEPS);
-        last = Draft::new(bounded, (gridpoints, &problem), &interior);
-    }
-    let mut best = faster(best, last);
-    best.iterations = interior.iterations;
-    Ok(best)
-}
-
-/// The faster of two drafts, the first if they are equal.
-fn faster<const N: usize>(first: Option<Draft<N>>, second: Draft<N>) -> Draft<N> {
-    match first {
-        Some(first) if first.duration <= second.duration => first,
-        _ => second,
     }
 }
 

@@ -24,7 +24,8 @@ use crate::{input, output, robot};
 #[derive(Args, Debug)]
 pub(crate) struct Motion {
     /// JSON file with cases: P positions in mm, Q unit quaternions w,x,y,z or null, tol in mm,
-    /// V, A, J limits of the tool in mm/s, mm/s2, mm/s3; the first pose is the start
+    /// V, A, J limits of the tool in mm/s, mm/s2, mm/s3; the first pose is the start. Motion times
+    /// to hold against may stand in reference_s, in s by the name of the case
     #[arg(value_name = "FILE.json")]
     file: PathBuf,
     /// Plan for this robot: shipped, or a folder with robot.urdf and robot.toml
@@ -52,6 +53,11 @@ struct Case {
     poses: usize,
     motion_s: Option<f64>,
     exact_stop_s: Option<f64>,
+    /// Motion time of the file's `reference_s`, and the motion over it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference_ratio: Option<f64>,
     planning_s: f64,
     first_motion_s: f64,
     deviation_ratio: f64,
@@ -72,7 +78,7 @@ impl Motion {
         let mut cases = Vec::with_capacity(suite.cases.0.len());
         for (name, case) in &suite.cases.0 {
             let row = measure(case, robot.as_ref())?;
-            cases.push(named(name, row));
+            cases.push(named(name, row, suite.reference_s.get(name).copied()));
         }
         let report = MotionReport {
             schema: 1,
@@ -132,8 +138,14 @@ fn measure(case: &serde_json::Value, robot: Option<&Robot>) -> Result<Measure, F
     Ok(best)
 }
 
-fn named(name: &str, row: Measure) -> Case {
+fn named(name: &str, row: Measure, reference: Option<f64>) -> Case {
+    let over = row
+        .motion
+        .zip(reference)
+        .map(|(motion, reference)| motion / reference);
     Case {
+        reference_s: reference,
+        reference_ratio: over,
         name: name.to_owned(),
         poses: row.poses,
         motion_s: row.motion,
@@ -157,11 +169,13 @@ fn table(report: &MotionReport) -> io::Result<()> {
     let width = width.max().unwrap_or(0).max(4);
     writeln!(
         out,
-        "{:width$} {:>6} {:>9} {:>9} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}  certified",
+        "{:width$} {:>6} {:>9} {:>9} {:>6} {:>9} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}  certified",
         "case",
         "poses",
         "motion s",
         "stop s",
+        "ratio",
+        "ref. s",
         "ratio",
         "plan ms",
         "deviation",
@@ -188,10 +202,12 @@ fn table(report: &MotionReport) -> io::Result<()> {
         };
         writeln!(
             out,
-            "{:width$} {:6} {motion:9.4} {stop:9.4} {:6.3} {:9.2} {:9.4} {:8.4} {:8.4} {:8.4} {:8.4}  {certified}",
+            "{:width$} {:6} {motion:9.4} {stop:9.4} {:6.3} {:>9} {:>6} {:9.2} {:9.4} {:8.4} {:8.4} {:8.4} {:8.4}  {certified}",
             case.name,
             case.poses,
             motion / stop,
+            or_dash(case.reference_s, 4),
+            or_dash(case.reference_ratio, 3),
             case.planning_s * 1e3,
             case.deviation_ratio,
             case.corridor_ratio,
@@ -201,6 +217,11 @@ fn table(report: &MotionReport) -> io::Result<()> {
         )?;
     }
     Ok(())
+}
+
+/// A number with so many decimals, or a dash.
+fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
 fn bars(report: &MotionReport) -> Vec<Bar> {

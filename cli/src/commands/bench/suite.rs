@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::fmt;
 
 use measure::Trial;
@@ -11,6 +12,9 @@ use trajectory::ToolLimits;
 pub(super) struct Suite {
     /// The cases in the order of the file.
     pub(super) cases: Cases,
+    /// Motion times (s) to hold against, by the name of the case.
+    #[serde(default)]
+    pub(super) reference_s: BTreeMap<String, f64>,
 }
 
 /// Cases with their names; each can have an error without the others.
@@ -122,7 +126,7 @@ mod tests {
 
     #[test]
     fn cases_keep_their_order_and_faults_stay_with_their_case() {
-        let text = r#"{"about": "x", "cases": {
+        let text = r#"{"about": "x", "reference_s": {"z": 0.5}, "cases": {
             "z": {"P": [[0,0,0],[100,0,0]], "Q": null, "tol": 1, "V": 500, "A": 5000, "J": 1e5},
             "a": {"P": [[0,0]], "tol": 1, "V": 500, "A": 5000, "J": 1e5},
             "b": {"P": [[0,0,0]], "tol": -1, "V": 500, "A": 5000, "J": 1e5},
@@ -130,6 +134,7 @@ mod tests {
         let suite: Suite = serde_json::from_str(text).unwrap();
         let names: Vec<_> = suite.cases.0.iter().map(|case| case.0.as_str()).collect();
         assert_eq!(names, ["z", "a", "b", "c"]);
+        assert_eq!(suite.reference_s["z"], 0.5);
         let trials: Vec<_> = suite.cases.0.iter().map(|case| trial(&case.1)).collect();
         let first = trials[0].as_ref().unwrap();
         assert_eq!(first.poses[1].translation.x, 0.1);

@@ -1,6 +1,6 @@
 //! Symmetric positive definite systems with a narrow band.
 
-use crate::wide::{Four, LANES, Op, Wide};
+use simd::{Build, Four, LANES, Op};
 
 /// A symmetric band matrix, lower half, by columns: entry `[c][k]` is row
 /// `c + k`, column `c`. `B` is a multiple of [`LANES`], and the last
@@ -8,7 +8,7 @@ use crate::wide::{Four, LANES, Op, Wide};
 #[derive(Clone, Debug)]
 pub(crate) struct Band<const B: usize> {
     pub(crate) columns: Vec<[f64; B]>,
-    wide: Wide,
+    build: Build,
 }
 
 /// Diagonals that stay zero.
@@ -27,7 +27,7 @@ impl<const B: usize> Band<B> {
         const { assert!(B.is_multiple_of(LANES) && B + PANEL + LANES < ROOM) };
         Self {
             columns: vec![[0.0; B]; size],
-            wide: Wide::detect(),
+            build: Build::detect(),
         }
     }
 
@@ -43,13 +43,13 @@ impl<const B: usize> Band<B> {
     /// # Source
     /// G. Golub, C. Van Loan, "Matrix Computations", 4th edition 2013, 4.3.5.
     pub(crate) fn factor(&mut self) -> bool {
-        self.wide.run(Factor(&mut self.columns))
+        self.build.run(Factor(&mut self.columns))
     }
 
     /// Solves with the factor, in place, for `M` right-hand sides at once, each
     /// followed by `B` zeros or more.
     pub(crate) fn solve<const M: usize>(&self, x: [&mut [f64]; M]) {
-        self.wide.run(Solve(&self.columns, x));
+        self.build.run(Solve(&self.columns, x));
     }
 }
 
@@ -273,7 +273,7 @@ mod tests {
         for (got, wanted) in x[0].iter().zip(&other) {
             assert!((got - wanted).abs() < 1e-12, "{got} here, {wanted} by faer");
         }
-        band.wide = Wide::plain();
+        band.build = Build::Plain;
         assert_eq!(x, solve(band));
         for m in 0..2 {
             for (got, wanted) in x[m].iter().zip(&wanted[m]) {

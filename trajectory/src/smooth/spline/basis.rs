@@ -86,7 +86,7 @@ mod tests {
         for (got, wanted) in first.iter().zip([p, v, a / 2.0, j / 6.0]) {
             assert_relative_eq!(*got, wanted, epsilon = 1e-12);
         }
-        let end = crate::smooth::poly::quartic(&first, h);
+        let end = crate::poly::quartic(&first, h);
         for (k, factor) in [1.0, 1.0, 2.0, 6.0].iter().enumerate() {
             assert_relative_eq!(end[k], next[k] * factor, epsilon = 1e-10);
         }

@@ -395,7 +395,7 @@ fn correct(
 /// # Source
 /// M.-J. Kim, M.-S. Kim, S. Y. Shin, "A general construction scheme for unit
 /// quaternion curves with simple high order derivatives", SIGGRAPH 1995.
-fn turns(control: &[UnitQuaternion<f64>], h: f64) -> Vec<Turn> {
+pub(crate) fn turns(control: &[UnitQuaternion<f64>], h: f64) -> Vec<Turn> {
     let mut result = Vec::with_capacity(4);
     for j in 1..5 {
         let axis = body_turn(&control[j - 1], &control[j]);

@@ -15,5 +15,7 @@ mod project;
 mod solve;
 mod start;
 
-pub(crate) use build::{Moving, Request, plan};
+pub(crate) use band::Band;
+pub(crate) use basis::{START, power};
+pub(crate) use build::{Moving, Request, plan, turns};
 pub(crate) use solve::Effort;

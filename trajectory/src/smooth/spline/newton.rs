@@ -3,7 +3,7 @@
 use super::band::Band;
 use super::basis::{FIRST, SECOND, THIRD, weights};
 use super::problem::{Point, Problem, Room, part, sample_weights, square};
-use crate::wide::{Four, Op, Wide};
+use simd::{Build, Four, Op};
 
 /// Gradient and Hessian of the barrier: a band for the control points, one
 /// border column for `z`. `B` is `5 D` and the spare diagonals of [`Band`].
@@ -146,7 +146,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         self.band.clear();
         self.sides.fill([0.0; 2]);
         (self.gradient_z, self.hessian_z) = (t, 0.0);
-        Wide::detect().run(Norms {
+        Build::detect().run(Norms {
             system: self,
             problem,
             point,

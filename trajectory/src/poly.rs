@@ -52,6 +52,23 @@ where
     result
 }
 
+/// Power form of the polynomial at `end - t`.
+pub(crate) fn reversed<T, const M: usize>(power: &[T; M], end: f64) -> [T; M]
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let mut shifted = *power;
+    for low in 0..M.saturating_sub(1) {
+        for k in (low..M - 1).rev() {
+            shifted[k] = shifted[k] + shifted[k + 1] * end;
+        }
+    }
+    for value in shifted.iter_mut().skip(1).step_by(2) {
+        *value = *value * -1.0;
+    }
+    shifted
+}
+
 /// Both halves of a polynomial in Bernstein form (de Casteljau).
 pub(crate) fn halve<T, const M: usize>(control: &[T; M]) -> ([T; M], [T; M])
 where

@@ -1,21 +1,39 @@
-//! A coordinate frame: the columns of its rotation and its origin.
+//! Rigid transforms: a coordinate frame as the columns of its rotation and its origin.
 
-use crate::arith::{Arith, Plain, V4};
-use crate::wide::F4;
+use crate::f4::F4;
+use crate::four::{Four, Plain};
+use crate::v4::V4;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::ops::Mul;
 
-/// Columns of a rotation and a position.
+/// A rigid transform: the columns of a rotation, and a position.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
-    pub(crate) x: V4,
-    pub(crate) y: V4,
-    pub(crate) z: V4,
-    pub(crate) p: V4,
+pub struct Frame {
+    /// The x axis.
+    pub x: V4,
+    /// The y axis.
+    pub y: V4,
+    /// The z axis.
+    pub z: V4,
+    /// The origin (m).
+    pub p: V4,
 }
 
 impl Frame {
-    pub(crate) fn from_isometry(pose: &Isometry3<f64>) -> Self {
+    /// The frame with these axes and this origin (m).
+    #[inline]
+    pub fn from_columns([x, y, z, p]: [[f64; 3]; 4]) -> Self {
+        let column = |[x, y, z]: [f64; 3]| V4::new(x, y, z);
+        Self {
+            x: column(x),
+            y: column(y),
+            z: column(z),
+            p: column(p),
+        }
+    }
+
+    /// The frame of a pose.
+    pub fn from_isometry(pose: &Isometry3<f64>) -> Self {
         let r = pose.rotation.to_rotation_matrix();
         let column = |j: usize| V4::new(r[(0, j)], r[(1, j)], r[(2, j)]);
         let t = &pose.translation.vector;
@@ -28,7 +46,8 @@ impl Frame {
     }
 
     /// The inverse: the outer frame, expressed in this one.
-    pub(crate) fn inverse(&self) -> Self {
+    #[must_use]
+    pub fn inverse(&self) -> Self {
         let [x, y, z, p] = [self.x.0, self.y.0, self.z.0, self.p.0];
         let along = |v: [f64; 4]| -(v[0] * p[0] + v[1] * p[1] + v[2] * p[2]);
         Self {
@@ -39,8 +58,9 @@ impl Frame {
         }
     }
 
+    /// The pose of the frame.
     #[inline(always)]
-    pub(crate) fn isometry(&self) -> Isometry3<f64> {
+    pub fn isometry(&self) -> Isometry3<f64> {
         let [x, y, z, _] = self.p.0;
         Isometry3::from_parts(Translation3::new(x, y, z), self.rotation())
     }
@@ -97,6 +117,7 @@ const HALF_TURNS: [([f64; 3], [f64; 4]); 4] = [
 impl Mul for Frame {
     type Output = Self;
 
+    #[inline]
     fn mul(self, right: Self) -> Self {
         Moving::of(Plain, &self).times(&right).frame()
     }
@@ -104,23 +125,30 @@ impl Mul for Frame {
 
 /// Sine and cosine of an angle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Turn {
-    pub(crate) sin: f64,
-    pub(crate) cos: f64,
+pub struct Turn {
+    /// Its sine.
+    pub sin: f64,
+    /// Its cosine.
+    pub cos: f64,
 }
 
-/// A frame that is moved along a chain, in registers.
+/// A rigid transform in registers, for example a frame that is moved along a chain.
 #[derive(Clone, Copy)]
-pub(crate) struct Moving<A: Arith> {
-    pub(crate) x: F4<A>,
-    pub(crate) y: F4<A>,
-    pub(crate) z: F4<A>,
-    pub(crate) p: F4<A>,
+pub struct Moving<S: Four> {
+    /// The x axis.
+    pub x: F4<S>,
+    /// The y axis.
+    pub y: F4<S>,
+    /// The z axis.
+    pub z: F4<S>,
+    /// The origin (m).
+    pub p: F4<S>,
 }
 
-impl<A: Arith> Moving<A> {
+impl<S: Four> Moving<S> {
+    /// A frame, in registers.
     #[inline(always)]
-    pub(crate) fn of(a: A, frame: &Frame) -> Self {
+    pub fn of(a: S, frame: &Frame) -> Self {
         Self {
             x: F4::new(a, frame.x.0),
             y: F4::new(a, frame.y.0),
@@ -129,20 +157,47 @@ impl<A: Arith> Moving<A> {
         }
     }
 
+    /// A transform given by the columns of its rotation and its origin (m).
+    #[inline(always)]
+    pub fn of_columns(a: S, columns: [[f64; 3]; 4]) -> Self {
+        let [x, y, z, p] = columns.map(|[x, y, z]| F4::new(a, [x, y, z, 0.0]));
+        Self { x, y, z, p }
+    }
+
     /// `self * local`: the pose of `local` in the frame that `self` is in.
     #[inline(always)]
-    pub(crate) fn times(self, local: &Frame) -> Self {
+    #[must_use]
+    pub fn times(self, local: &Frame) -> Self {
+        let column = |V4([x, y, z, _]): V4| [x, y, z];
+        self.times_columns(&[
+            column(local.x),
+            column(local.y),
+            column(local.z),
+            column(local.p),
+        ])
+    }
+
+    /// The same with a transform given by its columns.
+    #[inline(always)]
+    #[must_use]
+    pub fn times_columns(self, [x, y, z, p]: &[[f64; 3]; 4]) -> Self {
         Self {
-            x: self.direction(local.x),
-            y: self.direction(local.y),
-            z: self.direction(local.z),
-            p: self.direction(local.p) + self.p,
+            x: self.direction(*x),
+            y: self.direction(*y),
+            z: self.direction(*z),
+            p: self.point(*p),
         }
+    }
+
+    /// A point (m) given in this frame.
+    #[inline(always)]
+    pub fn point(self, p: [f64; 3]) -> F4<S> {
+        self.direction(p) + self.p
     }
 
     /// A direction given in this frame.
     #[inline(always)]
-    fn direction(self, V4([x, y, z, _]): V4) -> F4<A> {
+    pub fn direction(self, [x, y, z]: [f64; 3]) -> F4<S> {
         let a = self.p.build();
         let first = self.y.fma(F4::splat(a, y), self.x * x);
         self.z.fma(F4::splat(a, z), first)
@@ -150,7 +205,8 @@ impl<A: Arith> Moving<A> {
 
     /// This frame turned about its z axis, and then about its new x axis.
     #[inline(always)]
-    pub(crate) fn turned(self, about_z: Turn, about_x: Turn) -> Self {
+    #[must_use]
+    pub fn turned(self, about_z: Turn, about_x: Turn) -> Self {
         let number = |x: f64| F4::splat(self.p.build(), x);
         let Self { x, y, z, p } = self;
         // Values that are computed last are added last.
@@ -168,7 +224,8 @@ impl<A: Arith> Moving<A> {
 
     /// This frame moved along its own x and y axis, m.
     #[inline(always)]
-    pub(crate) fn shifted(self, [x, y]: [f64; 2]) -> Self {
+    #[must_use]
+    pub fn shifted(self, [x, y]: [f64; 2]) -> Self {
         let a = self.p.build();
         let along = self.x.fma(F4::splat(a, x), self.p);
         Self {
@@ -177,8 +234,9 @@ impl<A: Arith> Moving<A> {
         }
     }
 
+    /// The transform in memory.
     #[inline(always)]
-    pub(crate) fn frame(self) -> Frame {
+    pub fn frame(self) -> Frame {
         Frame {
             x: V4(self.x.array()),
             y: V4(self.y.array()),

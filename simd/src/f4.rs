@@ -1,144 +1,233 @@
-//! Four numbers at once, in each build of the arithmetic.
+//! Four numbers with operators, and masks of them.
 //!
 //! [`F4`] has the usual operators and is one register in the SIMD build. It contains the proof of
 //! the build, so that its operations cannot be used on another processor.
 
-use crate::four::Four;
-use std::ops::{Add, BitAnd, BitXor, Div, Mul, Neg, Sub};
+use crate::four::{Four, LANES};
+use std::ops::{Add, AddAssign, BitAnd, BitXor, Div, Mul, Neg, Sub};
 
 /// Four numbers.
 #[derive(Clone, Copy)]
-pub(crate) struct F4<A: Four> {
-    a: A,
-    v: A::F,
+pub struct F4<S: Four> {
+    a: S,
+    v: S::F,
 }
 
-/// Four booleans.
+/// Four booleans, one per number.
 #[derive(Clone, Copy)]
-pub(crate) struct B4<A: Four> {
-    a: A,
-    v: A::B,
+pub struct Mask<S: Four> {
+    a: S,
+    v: S::B,
 }
 
 /// The first three of four vectors as rows: first numbers, second, third.
 #[inline(always)]
-pub(crate) fn transposed<A: Four>(columns: [F4<A>; 4]) -> [F4<A>; 3] {
+pub fn transposed<S: Four>(columns: [F4<S>; 4]) -> [F4<S>; 3] {
     let [x, y, z, w] = columns;
     let [first, second, third] = x.a.transposed([x.v, y.v, z.v, w.v]);
     [x.with(first), x.with(second), x.with(third)]
 }
 
-impl<A: Four> F4<A> {
+impl<S: Four> F4<S> {
+    /// Four numbers.
     #[inline(always)]
-    pub(crate) fn new(a: A, x: [f64; 4]) -> Self {
+    pub fn new(a: S, x: [f64; 4]) -> Self {
         Self { a, v: a.pack(x) }
     }
 
+    /// The same number four times.
     #[inline(always)]
-    pub(crate) fn splat(a: A, x: f64) -> Self {
-        Self::new(a, [x; 4])
+    pub fn splat(a: S, x: f64) -> Self {
+        Self { a, v: a.splat(x) }
+    }
+
+    /// The first four numbers of a slice; zeros where it is shorter than that.
+    #[inline(always)]
+    pub fn load(a: S, from: &[f64]) -> Self {
+        Self { a, v: a.load(from) }
+    }
+
+    /// Four numbers from `at` on, or all and zeros where there are fewer than four; see [`groups`].
+    #[inline(always)]
+    pub fn some(a: S, all: &[f64], at: usize) -> Self {
+        if all.len() >= LANES {
+            return Self::load(a, &all[at..at + LANES]);
+        }
+        let mut lanes = [0.0; LANES];
+        lanes[..all.len()].copy_from_slice(all);
+        Self::load(a, &lanes)
+    }
+
+    /// Writes what [`F4::some`] reads.
+    #[inline(always)]
+    pub fn put(self, all: &mut [f64], at: usize) {
+        if all.len() >= LANES {
+            self.a.store(self.v, &mut all[at..at + LANES]);
+            return;
+        }
+        let (lanes, count) = (self.array(), all.len());
+        all.copy_from_slice(&lanes[..count]);
+    }
+
+    /// Writes the numbers to memory.
+    #[inline(always)]
+    pub fn store(self, to: &mut [f64; LANES]) {
+        self.a.store(self.v, to);
     }
 
     /// The proof of the build of these numbers.
     #[inline(always)]
-    pub(crate) fn build(self) -> A {
+    pub fn build(self) -> S {
         self.a
     }
 
+    /// The four numbers.
     #[inline(always)]
-    pub(crate) fn array(self) -> [f64; 4] {
+    pub fn array(self) -> [f64; 4] {
         self.a.unpack(self.v)
     }
 
     #[inline(always)]
-    fn with(self, v: A::F) -> Self {
+    fn with(self, v: S::F) -> Self {
         Self { a: self.a, v }
     }
 
     /// `self * y + z`.
     #[inline(always)]
-    pub(crate) fn fma(self, y: Self, z: Self) -> Self {
+    #[must_use]
+    pub fn fma(self, y: Self, z: Self) -> Self {
         self.with(self.a.mul_add(self.v, y.v, z.v))
     }
 
     /// `z - self * y`.
     #[inline(always)]
-    pub(crate) fn taken_from(self, y: Self, z: Self) -> Self {
+    #[must_use]
+    pub fn taken_from(self, y: Self, z: Self) -> Self {
         self.with(self.a.mul_less(self.v, y.v, z.v))
     }
 
+    /// The smaller of each pair; `y` where one of them is not a number.
     #[inline(always)]
-    pub(crate) fn min(self, y: Self) -> Self {
+    #[must_use]
+    pub fn min(self, y: Self) -> Self {
         self.with(self.a.min(self.v, y.v))
     }
 
+    /// The larger of each pair; `y` where one of them is not a number.
     #[inline(always)]
-    pub(crate) fn max(self, y: Self) -> Self {
+    #[must_use]
+    pub fn max(self, y: Self) -> Self {
         self.with(self.a.max(self.v, y.v))
     }
 
+    /// The square root of each number.
     #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
+    #[must_use]
+    pub fn sqrt(self) -> Self {
         self.with(self.a.sqrt(self.v))
     }
 
+    /// The largest integer that is at most the number.
     #[inline(always)]
-    pub(crate) fn floor(self) -> Self {
+    #[must_use]
+    pub fn floor(self) -> Self {
         self.with(self.a.floor(self.v))
     }
 
+    /// The magnitude of each number.
     #[inline(always)]
-    pub(crate) fn abs(self) -> Self {
+    #[must_use]
+    pub fn abs(self) -> Self {
         self.with(self.a.abs(self.v))
     }
 
-    /// The size of these numbers with the signs of `y`.
+    /// The magnitude of these numbers with the signs of `y`.
     #[inline(always)]
-    pub(crate) fn signed(self, y: Self) -> Self {
+    #[must_use]
+    pub fn signed(self, y: Self) -> Self {
         self.with(self.a.signed(self.v, y.v))
     }
 
     /// The second, third, first and fourth number.
     #[inline(always)]
-    pub(crate) fn next(self) -> Self {
+    #[must_use]
+    pub fn next(self) -> Self {
         self.with(self.a.next(self.v))
     }
 
     /// Whether the bit is set that is `BELOW` places below the sign bit.
     #[inline(always)]
-    pub(crate) fn bit<const BELOW: i32>(self) -> B4<A> {
+    pub fn bit<const BELOW: i32>(self) -> Mask<S> {
         let a = self.a;
-        B4 {
+        Mask {
             a,
             v: a.bit::<BELOW>(self.v),
         }
     }
 
+    /// `self <= y`; false if either is not a number.
     #[inline(always)]
-    pub(crate) fn le(self, y: Self) -> B4<A> {
+    pub fn le(self, y: Self) -> Mask<S> {
         let a = self.a;
-        B4 {
+        Mask {
             a,
             v: a.le(self.v, y.v),
         }
     }
 }
 
-impl<A: Four> B4<A> {
+impl<S: Four> F4<S> {
+    /// One over each number.
+    #[inline(always)]
+    #[must_use]
+    pub fn inverse(self) -> Self {
+        Self::splat(self.a, 1.0) / self
+    }
+
+    /// The sum of the four.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        self.a.sum(self.v)
+    }
+
+    /// The largest of the four.
+    #[inline(always)]
+    pub fn largest(self) -> f64 {
+        let [a, b, c, d] = self.array();
+        a.max(b).max(c.max(d))
+    }
+
+    /// The least of the four.
+    #[inline(always)]
+    pub fn least(self) -> f64 {
+        let [a, b, c, d] = self.array();
+        a.min(b).min(c.min(d))
+    }
+}
+
+/// Where groups of four of `count` numbers begin; the last group takes some once more where the
+/// numbers do not fill it.
+#[inline(always)]
+pub fn groups(count: usize) -> impl Iterator<Item = usize> {
+    let last = count.saturating_sub(LANES);
+    (0..count.div_ceil(LANES)).map(move |group| (LANES * group).min(last))
+}
+
+impl<S: Four> Mask<S> {
     /// `yes` where true, otherwise `no`.
     #[inline(always)]
-    pub(crate) fn select(self, yes: F4<A>, no: F4<A>) -> F4<A> {
+    pub fn select(self, yes: F4<S>, no: F4<S>) -> F4<S> {
         yes.with(self.a.select(self.v, yes.v, no.v))
     }
 
     /// Bit `i` is boolean `i`.
     #[inline(always)]
-    pub(crate) fn bits(self) -> u8 {
+    pub fn bits(self) -> u8 {
         self.a.bits(self.v)
     }
 }
 
-impl<A: Four> BitAnd for B4<A> {
+impl<S: Four> BitAnd for Mask<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -146,12 +235,12 @@ impl<A: Four> BitAnd for B4<A> {
         let a = self.a;
         Self {
             a,
-            v: a.both(self.v, o.v),
+            v: a.and(self.v, o.v),
         }
     }
 }
 
-impl<A: Four> BitXor for B4<A> {
+impl<S: Four> BitXor for Mask<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -159,12 +248,12 @@ impl<A: Four> BitXor for B4<A> {
         let a = self.a;
         Self {
             a,
-            v: a.either(self.v, o.v),
+            v: a.xor(self.v, o.v),
         }
     }
 }
 
-impl<A: Four> Add for F4<A> {
+impl<S: Four> Add for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -173,7 +262,14 @@ impl<A: Four> Add for F4<A> {
     }
 }
 
-impl<A: Four> Sub for F4<A> {
+impl<S: Four> AddAssign for F4<S> {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+
+impl<S: Four> Sub for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -182,7 +278,7 @@ impl<A: Four> Sub for F4<A> {
     }
 }
 
-impl<A: Four> Mul for F4<A> {
+impl<S: Four> Mul for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -191,7 +287,7 @@ impl<A: Four> Mul for F4<A> {
     }
 }
 
-impl<A: Four> Div for F4<A> {
+impl<S: Four> Div for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -200,7 +296,7 @@ impl<A: Four> Div for F4<A> {
     }
 }
 
-impl<A: Four> Neg for F4<A> {
+impl<S: Four> Neg for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -209,7 +305,7 @@ impl<A: Four> Neg for F4<A> {
     }
 }
 
-impl<A: Four> Mul<f64> for F4<A> {
+impl<S: Four> Mul<f64> for F4<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -221,7 +317,7 @@ impl<A: Four> Mul<f64> for F4<A> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arith::{Arith, Build, Op};
+    use crate::{Build, Op};
 
     /// Every operation on four numbers, in the order of the trait.
     struct All([f64; 4], [f64; 4]);
@@ -229,7 +325,7 @@ mod tests {
     impl Op for All {
         type Output = (Vec<[f64; 4]>, [u8; 4]);
 
-        fn run<A: Arith>(self, a: A) -> Self::Output {
+        fn run<S: Four>(self, a: S) -> Self::Output {
             let (x, y) = (F4::new(a, self.0), F4::new(a, self.1));
             let (less, not) = (x.le(y), y.le(x));
             let numbers = [
@@ -252,7 +348,7 @@ mod tests {
             let mut numbers = numbers.map(F4::array).to_vec();
             numbers.extend(transposed([x, y, -x, -y]).map(F4::array));
             let odd = x.bit::<11>();
-            let bits = [less, less & not, less ^ not, odd].map(B4::bits);
+            let bits = [less, less & not, less ^ not, odd].map(Mask::bits);
             (numbers, bits)
         }
     }

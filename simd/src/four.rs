@@ -1,31 +1,48 @@
-//! Operations on four numbers, in each build of the arithmetic.
+//! What a build does with four numbers at once.
 
-use crate::arith::{Fused, Plain};
+/// Numbers in a [`Four::F`].
+pub const LANES: usize = 4;
 
-/// Operations of a build on four numbers at once.
-pub(crate) trait Four: Copy {
+/// What a build does with four numbers at once.
+pub trait Four: Copy {
     /// Four numbers.
     type F: Copy;
     /// Four booleans.
     type B: Copy;
 
+    /// `a * b + c` of single numbers, fused or not.
+    fn fma(self, a: f64, b: f64, c: f64) -> f64;
+    /// Four numbers from memory.
     fn pack(self, x: [f64; 4]) -> Self::F;
+    /// The four numbers.
     fn unpack(self, x: Self::F) -> [f64; 4];
+    /// The same number four times.
+    fn splat(self, x: f64) -> Self::F;
+    /// `x + y`.
     fn add(self, x: Self::F, y: Self::F) -> Self::F;
+    /// `x - y`.
     fn sub(self, x: Self::F, y: Self::F) -> Self::F;
+    /// `x y`, number by number.
     fn mul(self, x: Self::F, y: Self::F) -> Self::F;
+    /// `x / y`, number by number.
     fn div(self, x: Self::F, y: Self::F) -> Self::F;
-    /// `x y + z`.
+    /// `x y + z`, fused or not.
     fn mul_add(self, x: Self::F, y: Self::F, z: Self::F) -> Self::F;
-    /// `z - x y`.
+    /// `z - x y`, fused or not.
     fn mul_less(self, x: Self::F, y: Self::F, z: Self::F) -> Self::F;
+    /// The smaller of each pair; `y` where one of them is not a number.
     fn min(self, x: Self::F, y: Self::F) -> Self::F;
+    /// The larger of each pair; `y` where one of them is not a number.
     fn max(self, x: Self::F, y: Self::F) -> Self::F;
+    /// The square root of each number.
     fn sqrt(self, x: Self::F) -> Self::F;
+    /// The largest integer that is at most the number.
     fn floor(self, x: Self::F) -> Self::F;
+    /// The magnitude of each number.
     fn abs(self, x: Self::F) -> Self::F;
+    /// `-x`.
     fn neg(self, x: Self::F) -> Self::F;
-    /// The size of `x` with the sign of `y`.
+    /// The magnitude of `x` with the sign of `y`.
     fn signed(self, x: Self::F, y: Self::F) -> Self::F;
     /// The second, third, first and fourth number.
     fn next(self, x: Self::F) -> Self::F;
@@ -33,14 +50,42 @@ pub(crate) trait Four: Copy {
     fn transposed(self, columns: [Self::F; 4]) -> [Self::F; 3];
     /// `x <= y`; false if either is NaN.
     fn le(self, x: Self::F, y: Self::F) -> Self::B;
+    /// `yes` where the mask is true, otherwise `no`.
     fn select(self, mask: Self::B, yes: Self::F, no: Self::F) -> Self::F;
-    fn both(self, x: Self::B, y: Self::B) -> Self::B;
-    fn either(self, x: Self::B, y: Self::B) -> Self::B;
+    /// Where both are true.
+    fn and(self, x: Self::B, y: Self::B) -> Self::B;
+    /// Where exactly one is true.
+    fn xor(self, x: Self::B, y: Self::B) -> Self::B;
     /// Whether the bit is set that is `BELOW` places below the sign bit.
     fn bit<const BELOW: i32>(self, x: Self::F) -> Self::B;
     /// Bit `i` is boolean `i`.
     fn bits(self, x: Self::B) -> u8;
+
+    /// The first four numbers of a slice; zeros where it is shorter than that.
+    #[inline(always)]
+    fn load(self, x: &[f64]) -> Self::F {
+        self.pack(x.first_chunk().copied().unwrap_or_default())
+    }
+
+    /// Writes them to the first four places of a slice that has them.
+    #[inline(always)]
+    fn store(self, x: Self::F, to: &mut [f64]) {
+        if let Some(to) = to.first_chunk_mut() {
+            *to = self.unpack(x);
+        }
+    }
+
+    /// The sum of the four: the first two, the last two, and then both.
+    #[inline(always)]
+    fn sum(self, x: Self::F) -> f64 {
+        let [a, b, c, d] = self.unpack(x);
+        (a + b) + (c + d)
+    }
 }
+
+/// Separate multiply and add: every processor.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
 
 /// A build without SIMD registers computes one lane after the other.
 macro_rules! lane_by_lane {
@@ -49,6 +94,15 @@ macro_rules! lane_by_lane {
             type F = [f64; 4];
             type B = [bool; 4];
 
+            #[inline(always)]
+            fn fma(self, a: f64, b: f64, c: f64) -> f64 {
+                let fma: fn(f64, f64, f64) -> f64 = $fma;
+                fma(a, b, c)
+            }
+            #[inline(always)]
+            fn splat(self, x: f64) -> [f64; 4] {
+                [x; 4]
+            }
             #[inline(always)]
             fn pack(self, x: [f64; 4]) -> [f64; 4] {
                 x
@@ -132,11 +186,11 @@ macro_rules! lane_by_lane {
                 std::array::from_fn(|i| if mask[i] { yes[i] } else { no[i] })
             }
             #[inline(always)]
-            fn both(self, x: [bool; 4], y: [bool; 4]) -> [bool; 4] {
+            fn and(self, x: [bool; 4], y: [bool; 4]) -> [bool; 4] {
                 [x[0] & y[0], x[1] & y[1], x[2] & y[2], x[3] & y[3]]
             }
             #[inline(always)]
-            fn either(self, x: [bool; 4], y: [bool; 4]) -> [bool; 4] {
+            fn xor(self, x: [bool; 4], y: [bool; 4]) -> [bool; 4] {
                 [x[0] ^ y[0], x[1] ^ y[1], x[2] ^ y[2], x[3] ^ y[3]]
             }
             #[inline(always)]
@@ -153,113 +207,4 @@ macro_rules! lane_by_lane {
 
 lane_by_lane!(Plain, |x, y, z| x * y + z);
 #[cfg(not(target_arch = "x86_64"))]
-lane_by_lane!(Fused, |x, y, z| x.mul_add(y, z));
-
-#[cfg(target_arch = "x86_64")]
-impl Four for Fused {
-    type F = std::arch::x86_64::__m256d;
-    type B = std::arch::x86_64::__m256d;
-
-    #[inline(always)]
-    fn pack(self, x: [f64; 4]) -> Self::F {
-        pulp::cast(x)
-    }
-    #[inline(always)]
-    fn unpack(self, x: Self::F) -> [f64; 4] {
-        pulp::cast(x)
-    }
-    #[inline(always)]
-    fn add(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_add_pd(x, y)
-    }
-    #[inline(always)]
-    fn sub(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_sub_pd(x, y)
-    }
-    #[inline(always)]
-    fn mul(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_mul_pd(x, y)
-    }
-    #[inline(always)]
-    fn div(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_div_pd(x, y)
-    }
-    #[inline(always)]
-    fn mul_add(self, x: Self::F, y: Self::F, z: Self::F) -> Self::F {
-        self.0.fma._mm256_fmadd_pd(x, y, z)
-    }
-    #[inline(always)]
-    fn mul_less(self, x: Self::F, y: Self::F, z: Self::F) -> Self::F {
-        self.0.fma._mm256_fnmadd_pd(x, y, z)
-    }
-    #[inline(always)]
-    fn min(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_min_pd(x, y)
-    }
-    #[inline(always)]
-    fn max(self, x: Self::F, y: Self::F) -> Self::F {
-        self.0.avx._mm256_max_pd(x, y)
-    }
-    #[inline(always)]
-    fn sqrt(self, x: Self::F) -> Self::F {
-        self.0.avx._mm256_sqrt_pd(x)
-    }
-    #[inline(always)]
-    fn floor(self, x: Self::F) -> Self::F {
-        self.0.avx._mm256_floor_pd(x)
-    }
-    #[inline(always)]
-    fn abs(self, x: Self::F) -> Self::F {
-        self.0.avx._mm256_andnot_pd(self.pack([-0.0; 4]), x)
-    }
-    #[inline(always)]
-    fn neg(self, x: Self::F) -> Self::F {
-        self.0.avx._mm256_xor_pd(self.pack([-0.0; 4]), x)
-    }
-    #[inline(always)]
-    fn signed(self, x: Self::F, y: Self::F) -> Self::F {
-        let (avx, sign) = (self.0.avx, self.pack([-0.0; 4]));
-        avx._mm256_or_pd(avx._mm256_andnot_pd(sign, x), avx._mm256_and_pd(sign, y))
-    }
-    #[inline(always)]
-    fn next(self, x: Self::F) -> Self::F {
-        self.0.avx2._mm256_permute4x64_pd::<0b11_00_10_01>(x)
-    }
-    #[inline(always)]
-    fn transposed(self, [x, y, z, w]: [Self::F; 4]) -> [Self::F; 3] {
-        let avx = self.0.avx;
-        let (xy, zw) = (avx._mm256_unpacklo_pd(x, y), avx._mm256_unpacklo_pd(z, w));
-        let (odd_xy, odd_zw) = (avx._mm256_unpackhi_pd(x, y), avx._mm256_unpackhi_pd(z, w));
-        [
-            avx._mm256_permute2f128_pd::<0x20>(xy, zw),
-            avx._mm256_permute2f128_pd::<0x20>(odd_xy, odd_zw),
-            avx._mm256_permute2f128_pd::<0x31>(xy, zw),
-        ]
-    }
-    #[inline(always)]
-    fn le(self, x: Self::F, y: Self::F) -> Self::B {
-        const LESS_OR_EQUAL: i32 = std::arch::x86_64::_CMP_LE_OQ;
-        self.0.avx._mm256_cmp_pd::<LESS_OR_EQUAL>(x, y)
-    }
-    #[inline(always)]
-    fn select(self, mask: Self::B, yes: Self::F, no: Self::F) -> Self::F {
-        self.0.avx._mm256_blendv_pd(no, yes, mask)
-    }
-    #[inline(always)]
-    fn both(self, x: Self::B, y: Self::B) -> Self::B {
-        self.0.avx._mm256_and_pd(x, y)
-    }
-    #[inline(always)]
-    fn either(self, x: Self::B, y: Self::B) -> Self::B {
-        self.0.avx._mm256_xor_pd(x, y)
-    }
-    #[inline(always)]
-    fn bit<const BELOW: i32>(self, x: Self::F) -> Self::B {
-        // Selections look at the sign only.
-        pulp::cast(self.0.avx2._mm256_slli_epi64::<BELOW>(pulp::cast(x)))
-    }
-    #[inline(always)]
-    fn bits(self, x: Self::B) -> u8 {
-        self.0.avx._mm256_movemask_pd(x) as u8
-    }
-}
+pub(crate) use lane_by_lane;

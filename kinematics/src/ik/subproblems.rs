@@ -4,8 +4,7 @@
 //! A. J. Elias and J. T. Wen, "IK-Geo: unified robot inverse kinematics using
 //! subproblem decomposition", Mech. Mach. Theory 209, 2025: subproblems 1, 3 and 4.
 
-use crate::arith::Arith;
-use crate::wide::{B4, F4};
+use simd::{F4, Four, Mask};
 
 /// Signs that tell the branches of the first choice apart.
 pub(crate) const FIRST: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
@@ -14,12 +13,12 @@ pub(crate) const SECOND: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
 
 /// Sine and cosine of an angle in each lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Angle<A: Arith> {
+pub(crate) struct Angle<A: Four> {
     pub(crate) sin: F4<A>,
     pub(crate) cos: F4<A>,
 }
 
-impl<A: Arith> Angle<A> {
+impl<A: Four> Angle<A> {
     #[inline(always)]
     pub(crate) fn back(self) -> Self {
         Self {
@@ -39,7 +38,7 @@ impl<A: Arith> Angle<A> {
 
     /// The angle, or `held` in the lanes of `free`.
     #[inline(always)]
-    fn unless(self, free: B4<A>, held: Held) -> Self {
+    fn unless(self, free: Mask<A>, held: Held) -> Self {
         let a = self.sin.build();
         Self {
             sin: free.select(F4::splat(a, held.sin), self.sin),
@@ -58,8 +57,8 @@ pub(crate) struct Held {
 impl Held {
     /// Of several angles, rad.
     #[inline(always)]
-    pub(crate) fn all<A: Arith, const M: usize>(a: A, angles: [f64; M]) -> [Self; M] {
-        let (sin, cos) = crate::arith::sin_cos(a, angles);
+    pub(crate) fn all<A: Four, const M: usize>(a: A, angles: [f64; M]) -> [Self; M] {
+        let (sin, cos) = simd::sin_cos(a, angles);
         let mut held = [Self { sin: 0.0, cos: 1.0 }; M];
         for i in 0..M {
             held[i] = Self {
@@ -73,9 +72,9 @@ impl Held {
 
 /// A vector in each lane.
 #[derive(Clone, Copy)]
-pub(crate) struct Vec4<A: Arith>(pub(crate) [F4<A>; 3]);
+pub(crate) struct Vec4<A: Four>(pub(crate) [F4<A>; 3]);
 
-impl<A: Arith> Vec4<A> {
+impl<A: Four> Vec4<A> {
     #[inline(always)]
     pub(crate) fn splat(a: A, v: [f64; 3]) -> Self {
         Self([F4::splat(a, v[0]), F4::splat(a, v[1]), F4::splat(a, v[2])])
@@ -155,7 +154,7 @@ impl<A: Arith> Vec4<A> {
 /// Subproblem 1: the angle about `k` that turns `p` to `q`; `hold` where either lies along `k` and
 /// the angle is free.
 #[inline(always)]
-pub(crate) fn turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
+pub(crate) fn turn_to<A: Four>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
     let (x, y, free) = swept(p, q, k);
     let length = F4::splat(x.build(), 1.0) / x.fma(x, y * y).sqrt();
     let angle = Angle {
@@ -167,7 +166,7 @@ pub(crate) fn turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held)
 
 /// The same for [`angle_of`], which needs no lengths of one.
 #[inline(always)]
-pub(crate) fn last_turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
+pub(crate) fn last_turn_to<A: Four>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: Held) -> Angle<A> {
     let (cos, sin, free) = swept(p, q, k);
     Angle { sin, cos }.unless(free, hold)
 }
@@ -175,7 +174,7 @@ pub(crate) fn last_turn_to<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3], hold: 
 /// Cosine and sine, of any one length, of the angle about `k` between `p` and `q`, and
 /// where there is none.
 #[inline(always)]
-fn swept<A: Arith>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3]) -> (F4<A>, F4<A>, B4<A>) {
+fn swept<A: Four>(p: Vec4<A>, q: Vec4<A>, k: [f64; 3]) -> (F4<A>, F4<A>, Mask<A>) {
     let across = p.crossed_by(k);
     let y = across.dot(q);
     // Not p.q - (k.p)(k.q), which cancels where both lie near k.
@@ -189,15 +188,15 @@ const FREE: f64 = 1e-50;
 
 /// The two solutions of a subproblem: sine and cosine are the middle, plus or minus the offset.
 #[derive(Clone, Copy)]
-pub(crate) struct Pair<A: Arith> {
+pub(crate) struct Pair<A: Four> {
     middle: Angle<A>,
     offset: Angle<A>,
-    free: B4<A>,
+    free: Mask<A>,
     /// Whether there are solutions.
-    pub(crate) real: B4<A>,
+    pub(crate) real: Mask<A>,
 }
 
-impl<A: Arith> Pair<A> {
+impl<A: Four> Pair<A> {
     /// The solutions selected by `sign`; `hold` where any angle is a solution.
     #[inline(always)]
     pub(crate) fn pick(self, sign: [f64; 4], hold: Held) -> Angle<A> {
@@ -213,14 +212,14 @@ impl<A: Arith> Pair<A> {
 /// Equation `x cos + y sin = d`. If both coefficients vanish compared with `scale`, any angle is a
 /// solution. Errors of up to `slack` (relative, squared) count as rounding.
 #[derive(Clone, Copy)]
-pub(crate) struct TrigEquation<A: Arith> {
+pub(crate) struct TrigEquation<A: Four> {
     x: F4<A>,
     y: F4<A>,
     d: F4<A>,
     scale: F4<A>,
 }
 
-impl<A: Arith> TrigEquation<A> {
+impl<A: Four> TrigEquation<A> {
     /// Subproblem 4: the angle about `k` for which `h . turned(p) = d`.
     #[inline(always)]
     pub(crate) fn of(h: Vec4<A>, k: [f64; 3], p: Vec4<A>, d: F4<A>) -> Self {
@@ -268,7 +267,7 @@ impl<A: Arith> TrigEquation<A> {
 
 /// Three angles as numbers, see [`angle_of`].
 #[inline(always)]
-pub(crate) fn angles_of<A: Arith>([x, y, z]: [Angle<A>; 3]) -> [F4<A>; 3] {
+pub(crate) fn angles_of<A: Four>([x, y, z]: [Angle<A>; 3]) -> [F4<A>; 3] {
     [angle_of(x), angle_of(y), angle_of(z)]
 }
 
@@ -296,7 +295,7 @@ const ARC: [f64; 10] = [
 /// L. N. Trefethen, "Approximation Theory and Approximation Practice", 2013, chapter 8:
 /// how many terms are enough.
 #[inline(always)]
-pub(crate) fn angle_of<A: Arith>(angle: Angle<A>) -> F4<A> {
+pub(crate) fn angle_of<A: Four>(angle: Angle<A>) -> F4<A> {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
     let Angle { sin: y, cos: x } = angle;
     let a = y.build();
@@ -324,7 +323,7 @@ pub(crate) fn angle_of<A: Arith>(angle: Angle<A>) -> F4<A> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arith::{Build, Op};
+    use simd::{Build, Op};
 
     /// One arc tangent in a build of the arithmetic.
     struct Arc(f64, f64);
@@ -332,7 +331,7 @@ mod tests {
     impl Op for Arc {
         type Output = f64;
 
-        fn run<A: Arith>(self, a: A) -> f64 {
+        fn run<A: Four>(self, a: A) -> f64 {
             let number = |x| F4::splat(a, x);
             angle_of(Angle {
                 sin: number(self.0),

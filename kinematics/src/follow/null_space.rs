@@ -1,0 +1,114 @@
+//! Null-space motion as linear functions of the joints.
+//!
+//! The null-space motion is given by linear functions of the joints, `c . q = r(u)`, where `c` is
+//! the direction in which the arm can move at the start without moving its tool, and `r` is a
+//! polynomial of `u`. So it has exact derivatives and does not drift. With two redundant joints,
+//! the second function is constant.
+
+use nalgebra::SVector;
+
+/// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
+pub(super) type NullSpacePolynomial = [f64; 6];
+
+/// Null-space motion: up to two linear functions of the joints with their polynomials.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NullSpace<const N: usize> {
+    pub(super) directions: [SVector<f64, N>; 2],
+    pub(super) polynomials: [NullSpacePolynomial; 2],
+    pub(super) from: f64,
+    pub(super) span: f64,
+    pub(super) u: f64,
+    pub(super) still_ends: bool,
+}
+
+impl<const N: usize> NullSpace<N> {
+    /// For arms of up to six joints, which have none.
+    pub(super) fn none() -> Self {
+        Self {
+            directions: [SVector::zeros(); 2],
+            polynomials: [[0.0; 6]; 2],
+            from: 0.0,
+            span: 1.0,
+            u: 0.0,
+            still_ends: false,
+        }
+    }
+
+    /// The direction of a linear function.
+    pub(super) fn direction(&self, k: usize) -> &SVector<f64, N> {
+        &self.directions[k]
+    }
+
+    /// The same, with derivatives taken at `u`.
+    pub(super) fn moved_to(mut self, u: f64) -> Self {
+        self.u = u;
+        self
+    }
+
+    /// Value of each polynomial at `u`.
+    pub(super) fn at(&self, u: f64) -> [f64; 2] {
+        let [w, ..] = self.progress((u - self.from) / self.span);
+        self.polynomials
+            .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c))
+    }
+
+    /// Progress of the polynomials and its first three derivatives at `x` from 0 to 1: `x` itself,
+    /// or a function that starts from rest, accelerates over the first [`EASE`] of the path, is
+    /// linear in the middle and comes to rest over the last [`EASE`].
+    pub(super) fn progress(&self, x: f64) -> [f64; 4] {
+        if !self.still_ends {
+            return [x, 1.0, 0.0, 0.0];
+        }
+        let x = x.clamp(0.0, 1.0);
+        if x <= 0.5 {
+            return eased(x);
+        }
+        let [w, w1, w2, w3] = eased(1.0 - x);
+        [1.0 - w, w1, -w2, w3]
+    }
+
+    /// First to third derivative of each polynomial to `u`, by the chain rule through its progress.
+    pub(super) fn rates(&self) -> [[f64; 3]; 2] {
+        let [w, w1, w2, w3] = self.progress((self.u - self.from) / self.span);
+        self.polynomials.map(|null_space_path| {
+            let mut c = null_space_path;
+            let [r1, r2, r3]: [f64; 3] = std::array::from_fn(|_| {
+                for k in 0..5 {
+                    c[k] = c[k + 1] * (k as f64 + 1.0);
+                }
+                c[5] = 0.0;
+                c.iter().rev().fold(0.0, |sum, c| sum * w + c)
+            });
+            let to_x = [
+                r1 * w1,
+                r2 * w1 * w1 + r1 * w2,
+                r3 * w1 * w1 * w1 + 3.0 * r2 * w1 * w2 + r1 * w3,
+            ];
+            let span = self.span;
+            [
+                to_x[0] / span,
+                to_x[1] / (span * span),
+                to_x[2] / (span * span * span),
+            ]
+        })
+    }
+}
+
+/// Fraction of the path in which a polynomial that begins at rest accelerates.
+const EASE: f64 = 0.2;
+
+/// First half of an eased progress: its rate is `10 t^3 - 15 t^4 + 6 t^5` of what it
+/// becomes, `t` from 0 to 1 over [`EASE`].
+fn eased(x: f64) -> [f64; 4] {
+    let even = 1.0 / (1.0 - EASE);
+    if x >= EASE {
+        return [even * (x - 0.5 * EASE), even, 0.0, 0.0];
+    }
+    let t = x / EASE;
+    [
+        even * EASE * t.powi(4) * (2.5 - 3.0 * t + t * t),
+        even * t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t),
+        even / EASE * 30.0 * (t * (1.0 - t)).powi(2),
+        even / (EASE * EASE) * 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t),
+    ]
+}

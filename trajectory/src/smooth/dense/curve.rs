@@ -1,0 +1,111 @@
+//! A fitted curve as a path for the time law.
+
+use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
+
+use super::fit::Fit;
+use super::places::Units;
+use crate::{JointPoint, Path, PathPoint, ToolPoint};
+
+/// Knot intervals of the fit from one knot that the time law sees to the next.
+const SEEN: usize = 4;
+
+/// A fitted curve of the tool. Its only joint is its parameter, which nothing limits: the time law
+/// follows from the limits of the tool.
+#[derive(Clone, Debug)]
+pub(super) struct Curve<const D: usize> {
+    pub(super) fit: Fit<D>,
+    units: Units,
+    origin: Vector3<f64>,
+    rotation: UnitQuaternion<f64>,
+    knots: Vec<f64>,
+}
+
+impl<const D: usize> Curve<D> {
+    /// The curve of a fit to poses the first of which is `start`.
+    pub(super) fn new(fit: Fit<D>, units: Units, start: &Isometry3<f64>) -> Self {
+        let spans = fit.spans();
+        let mut knots: Vec<f64> = (0..spans).step_by(SEEN).map(|k| k as f64).collect();
+        knots.push(spans as f64);
+        Self {
+            fit,
+            units,
+            origin: start.translation.vector,
+            rotation: start.rotation,
+            knots,
+        }
+    }
+
+    /// Pose at a parameter.
+    pub(super) fn pose(&self, at: f64) -> Isometry3<f64> {
+        let point = self.fit.point(at);
+        let place = self.origin + self.units.place(&point);
+        let turn = if D > 3 {
+            self.units.rotation(&point)
+        } else {
+            self.rotation
+        };
+        Isometry3::from_parts(place.into(), turn)
+    }
+
+    /// Angular velocity to the parameter and its two derivatives, from those of the quaternion
+    /// before it is normalised.
+    ///
+    /// With `p = q conj(q)' ..`: the angular velocity is `w = 2 vec(q' conj(q)) / |q|^2`.
+    fn angular(&self, d: &[SVector<f64, D>; 4]) -> [Vector3<f64>; 3] {
+        let [q, q1, q2, q3] = d.map(|x| self.units.quaternion(&x));
+        let vec = |a: nalgebra::Quaternion<f64>, b: nalgebra::Quaternion<f64>| {
+            (a * b.conjugate()).imag() * 2.0
+        };
+        // v = 2 vec(q' q*), n = |q|^2, w = v / n.
+        let n = [
+            q.norm_squared(),
+            2.0 * q.dot(&q1),
+            2.0 * (q1.norm_squared() + q.dot(&q2)),
+        ];
+        let v = vec(q1, q);
+        let v1 = vec(q2, q);
+        let v2 = vec(q3, q) + vec(q2, q1);
+        let w = v / n[0];
+        let w1 = (v1 - w * n[1]) / n[0];
+        let w2 = (v2 - w1 * (2.0 * n[1]) - w * n[2]) / n[0];
+        [w, w1, w2]
+    }
+}
+
+impl<const D: usize> Path<1> for Curve<D> {
+    fn end(&self) -> f64 {
+        self.fit.spans() as f64
+    }
+
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, u: f64) -> PathPoint<1> {
+        PathPoint {
+            joint: self.joint_at(u),
+            tool: self.tool_at(u),
+        }
+    }
+
+    fn joint_at(&self, u: f64) -> JointPoint<1> {
+        JointPoint {
+            q: [u, 1.0, 0.0, 0.0].map(SVector::<f64, 1>::new),
+        }
+    }
+
+    fn tool_at(&self, u: f64) -> ToolPoint {
+        let d = self.fit.derivatives(u);
+        let place = self.origin + self.units.place(&d[0]);
+        let (turn, angular) = if D > 3 {
+            (self.units.rotation(&d[0]), self.angular(&d))
+        } else {
+            (self.rotation, [Vector3::zeros(); 3])
+        };
+        ToolPoint {
+            pose: Isometry3::from_parts(place.into(), turn),
+            linear: [d[1], d[2], d[3]].map(|x| self.units.place(&x)),
+            angular,
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Lists that are dense in poses: the curve is nearly known, so it is fitted first and then timed.
+//!
+//! A curve of least change of curvature is laid through the balls, in time linear in the list; the
+//! path timing finds its fastest law under the limits of the tool; the curve is fitted again over
+//! that time, which makes it faster; curve and law together become spans, which are certified as
+//! those of any smooth motion. Where the way turns back the motion rests, and where a fit fails the
+//! list is divided at the pose that it misses most.
+//!
+//! All this happens in the frame of the first pose and in one of both directions, so a list that is
+//! laid elsewhere or reversed has the same motion.
+
+mod basis;
+mod chords;
+mod curve;
+mod fit;
+mod places;
+mod section;
+mod spans;
+mod time_parameter;
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use super::choose::Motion;
+use super::crossing::RESOLUTION;
+use super::options::SmoothOptions;
+use crate::line::{Line, body_turn};
+use chords::Chords;
+use places::Units;
+use section::Section;
+
+/// Longest turn from one pose to the next that a straight line of quaternions stands for, rad.
+const TURN: f64 = 0.1;
+/// Fewest poses of a dense list.
+const FEWEST: usize = 16;
+/// A list is dense when most of its legs take less than this share of the braking time.
+const LEG: f64 = 1.0 / 16.0;
+/// Relative difference of leg lengths below which they tell no direction.
+const EVEN: f64 = 1e-6;
+
+/// A motion from rest in the first pose to rest in the last, through a dense list; `None` for other
+/// lists, and where a limit is missing. The options are finite.
+pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
+    let limits = &options.limits;
+    let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
+    if !limited || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
+        return None;
+    }
+    let frame = given[0];
+    let mut poses: Vec<Isometry3<f64>> = given.iter().map(|pose| frame.inv_mul(pose)).collect();
+    let backwards = is_better_reversed(&poses);
+    if backwards {
+        poses.reverse();
+        let last = poses[0].inverse();
+        poses.iter_mut().for_each(|pose| *pose = last * *pose);
+    }
+    let poses = moved(&poses);
+    if !is_dense(&poses, options) {
+        return None;
+    }
+    let far = |pair: &[Isometry3<f64>]| {
+        body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION
+    };
+    let mut motion = if !poses.windows(2).any(far) {
+        sections::<3>(&poses, options)?
+    } else if options.angular_tolerance() > 1e3 * RESOLUTION {
+        sections::<7>(&poses, options)?
+    } else {
+        return None;
+    };
+    let start = if backwards {
+        given[given.len() - 1]
+    } else {
+        frame
+    };
+    motion.spans.iter_mut().for_each(|span| span.place(&start));
+    Some(if backwards { motion.reversed() } else { motion })
+}
+
+/// Whether most legs are short beside the way of braking.
+fn is_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let limits = &options.limits;
+    let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
+    let short = |pair: &&[Isometry3<f64>]| {
+        let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
+        let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
+        (way / limits.speed).max(turn / limits.angular_speed) <= LEG * brake
+    };
+    poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
+}
+
+/// Whether the list is the other one of the two that are the same way there and back: the one that
+/// begins with the longer leg, of the first two that differ seen from both ends.
+fn is_better_reversed(poses: &[Isometry3<f64>]) -> bool {
+    let last = poses.len() - 1;
+    let leg = |i: usize| (poses[i + 1].translation.vector - poses[i].translation.vector).norm();
+    let pairs = (0..last / 2).map(|i| (leg(i), leg(last - 1 - i)));
+    let mut apart = pairs.filter(|(a, b)| (a - b).abs() > EVEN * (a + b));
+    apart.next().is_some_and(|(first, other)| first < other)
+}
+
+/// The poses without repeats, and with more of them where the tool turns far.
+fn moved(given: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+    let mut poses = vec![given[0]];
+    for pose in &given[1..] {
+        let from = poses[poses.len() - 1];
+        if Line::new(from, *pose).is_still() {
+            continue;
+        }
+        let turn = body_turn(&from.rotation, &pose.rotation);
+        let way = pose.translation.vector - from.translation.vector;
+        let parts = (turn.norm() / TURN).ceil().max(1.0);
+        for part in 1..parts as usize {
+            let share = part as f64 / parts;
+            let place = from.translation.vector + way * share;
+            let rotation = from.rotation * UnitQuaternion::from_scaled_axis(turn * share);
+            poses.push(Isometry3::from_parts(place.into(), rotation));
+        }
+        poses.push(*pose);
+    }
+    poses
+}
+
+/// The motion through all sections between places where the way turns back.
+fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
+    let units = Units::new(options);
+    let points = units.points::<D>(poses);
+    let turning = Chords::new(&points).turning_points(&points);
+    let mut motion = Motion {
+        spans: Vec::new(),
+        parts: Vec::new(),
+    };
+    let mut from = 0;
+    for to in turning.into_iter().chain([poses.len() - 1]) {
+        motion.append(Section::<D>::new(&poses[from..=to], options, units).motion()?);
+        from = to;
+    }
+    Some(motion)
+}

@@ -1,0 +1,238 @@
+//! A part of a dense list that begins and ends at rest.
+
+use nalgebra::Isometry3;
+
+use super::chords::Chords;
+use super::curve::Curve;
+use super::fit::Fit;
+use super::places::Units;
+use super::spans;
+use super::time_parameter::TimeParameter;
+use crate::smooth::certificate::{Certificate, certify};
+use crate::smooth::choose::{Motion, Then, corners, from_rest, stretch};
+use crate::smooth::crossing::Crossing;
+use crate::smooth::method::Method;
+use crate::smooth::options::SmoothOptions;
+use crate::smooth::span::Span;
+use crate::timing::Timed;
+use crate::{Boundary, JointLimits, TimingOptions, ToolLimits, time_path};
+
+/// Times that the curve is fitted over the time of the law before.
+const REFITS: usize = 2;
+/// Share of the time that a refit has to gain for another one to be worth while.
+const GAIN: f64 = 1e-3;
+/// Times that a section is fitted with smaller balls where they were missed.
+const ATTEMPTS: usize = 4;
+/// Knots of a fit in a ramp of the acceleration.
+const FIT_KNOTS: f64 = 6.0;
+/// Share of the tolerance that the spans may cut off corners.
+const CUT: f64 = 0.1;
+/// Least number of knots of the spans in a ramp of the acceleration, most of a section.
+const KNOTS_PER_RAMP: f64 = 20.0;
+const MOST_KNOTS: f64 = 1e5;
+/// Sections of so few poses that cannot be fitted are left to the time-optimal spline.
+const FEW: usize = 12;
+/// Times that a section is divided.
+const DEPTH: usize = 10;
+/// Poses around one that was missed whose balls become smaller.
+const NEAR: usize = 3;
+/// A ratio to a limit up to this is met by stretching time; more is not worth it.
+const STRETCH: f64 = 1.15;
+
+/// A part of a dense list that begins and ends at rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section<'a, const D: usize> {
+    poses: &'a [Isometry3<f64>],
+    options: &'a SmoothOptions,
+    units: Units,
+    depth: usize,
+}
+
+/// Why no curve was found.
+#[derive(Clone, Copy, Debug)]
+enum Failure {
+    /// A pose is missed, this one most.
+    Missed(usize),
+    /// The bounds of the motion are far above its limits: orientations that turn about changing
+    /// axes are bounded with room.
+    TooFast,
+}
+
+/// A curve and its time law.
+struct TimedCurve<const D: usize> {
+    curve: Curve<D>,
+    timed: Timed<1>,
+}
+
+impl<'a, const D: usize> Section<'a, D> {
+    /// The section through `poses`.
+    pub(super) fn new(
+        poses: &'a [Isometry3<f64>],
+        options: &'a SmoothOptions,
+        units: Units,
+    ) -> Self {
+        Self {
+            poses,
+            options,
+            units,
+            depth: DEPTH,
+        }
+    }
+
+    /// A motion from rest to rest: fitted, or divided where a fit fails; `None` where the way of
+    /// planning does not suit the list.
+    pub(super) fn motion(self) -> Option<Motion> {
+        let last = self.poses.len() - 1;
+        if last < 2 {
+            return Some(corners(self.poses, self.options));
+        }
+        match self.fitted() {
+            Ok(spans) => {
+                let parts = vec![(Method::Fit, spans.len())];
+                Some(Motion { spans, parts })
+            }
+            Err(Failure::TooFast) => None,
+            Err(_) if last < FEW => Some(from_rest(self.poses, self.options, Then::More)),
+            Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
+            Err(Failure::Missed(worst)) => {
+                let at = worst.clamp(1, last - 1);
+                let part = |poses| Section {
+                    poses,
+                    depth: self.depth - 1,
+                    ..self
+                };
+                let mut motion = part(&self.poses[..=at]).motion()?;
+                motion.append(part(&self.poses[at..]).motion()?);
+                Some(motion)
+            }
+        }
+    }
+
+    /// Certified spans along one curve.
+    fn fitted(&self) -> Result<Vec<Span>, Failure> {
+        let points = self.units.points::<D>(self.poses);
+        let mut radii = vec![1.0; points.len()];
+        let limits = self.limits();
+        let mut best = self.timed(&Chords::new(&points).parameters(&points), &radii, &limits)?;
+        for _ in 0..REFITS {
+            let before = best.timed.certificate.duration;
+            let next = self.timed(&self.time_parameters(&best), &radii, &limits);
+            let Some(next) = next
+                .ok()
+                .filter(|next| next.timed.certificate.duration < before)
+            else {
+                break;
+            };
+            best = next;
+            if best.timed.certificate.duration > before * (1.0 - GAIN) {
+                break;
+            }
+        }
+        let mut worst = self.poses.len() / 2;
+        for _ in 0..ATTEMPTS {
+            let mut spans = self.spans(&best);
+            let (mut certificate, mut crossings) = certify(&spans, self.poses, self.options);
+            let over = certificate.worst_limit();
+            if over > 1.0 && over < STRETCH {
+                stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
+                (certificate, crossings) = certify(&spans, self.poses, self.options);
+            }
+            if certificate.holds() {
+                return Ok(spans);
+            }
+            if certificate.worst_limit() > STRETCH {
+                return Err(Failure::TooFast);
+            }
+            worst = self
+                .narrow(&mut radii, &certificate, &crossings)
+                .unwrap_or(worst);
+            best = self.timed(&best.curve.fit.parameters, &radii, &limits)?;
+        }
+        Err(Failure::Missed(worst))
+    }
+
+    /// The limits of the tool that rule the time law.
+    fn limits(&self) -> ToolLimits {
+        let mut limits = self.options.limits;
+        if D == 3 {
+            limits.angular_speed = f64::INFINITY;
+            limits.angular_acceleration = f64::INFINITY;
+            limits.angular_jerk = f64::INFINITY;
+        }
+        limits
+    }
+
+    /// A curve that passes the poses about at `parameters`, with its law, or the pose at which that
+    /// fails.
+    fn timed(
+        &self,
+        parameters: &[f64],
+        radii: &[f64],
+        limits: &ToolLimits,
+    ) -> Result<TimedCurve<D>, Failure> {
+        let points = self.units.points::<D>(self.poses);
+        let fit = Fit::new(&points, parameters, radii).map_err(Failure::Missed)?;
+        let curve = Curve::new(fit, self.units, &self.poses[0]);
+        let options = TimingOptions {
+            start: Boundary::Rest,
+            end: Boundary::Rest,
+            ..TimingOptions::default()
+        };
+        let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        match time_path(&curve, &free, limits, &options) {
+            Ok(timed) => Ok(TimedCurve { curve, timed }),
+            Err(_) => Err(Failure::Missed(self.poses.len() / 2)),
+        }
+    }
+
+    /// Parameters for the poses that run like the time of a law.
+    fn time_parameters(&self, best: &TimedCurve<D>) -> Vec<f64> {
+        let ramp = self.options.limits.acceleration / self.options.limits.jerk;
+        TimeParameter::new(&best.curve, &best.timed.law, (ramp, ramp / FIT_KNOTS))
+            .map(&best.curve.fit.parameters)
+    }
+
+    /// Spans of the motion along a curve.
+    fn spans(&self, best: &TimedCurve<D>) -> Vec<Span> {
+        let limits = &self.options.limits;
+        let ramp = limits.acceleration / limits.jerk;
+        let cut = (CUT * self.units.length * 4.8 / limits.acceleration).sqrt();
+        let least = best.timed.certificate.duration / MOST_KNOTS;
+        let ends = [&self.poses[0], &self.poses[self.poses.len() - 1]];
+        let spacing = cut.min(ramp / KNOTS_PER_RAMP).max(least);
+        spans::spans(&best.curve, &best.timed.law, ends, spacing)
+    }
+
+    /// Makes the balls smaller where a motion missed them or left the corridor; the pose that is
+    /// worst.
+    fn narrow(
+        &self,
+        radii: &mut [f64],
+        certificate: &Certificate,
+        crossings: &[Crossing],
+    ) -> Option<usize> {
+        let mut worst: Option<(f64, usize)> = None;
+        let mut miss = |index: usize, over: f64| {
+            let near = index.saturating_sub(NEAR)..(index + NEAR + 1).min(radii.len());
+            for radius in &mut radii[near] {
+                *radius *= (0.95 / over).max(0.5);
+            }
+            if worst.is_none_or(|(most, _)| over > most) {
+                worst = Some((over, index));
+            }
+        };
+        for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
+            let far = crossing.deviation / crossing.tolerance;
+            miss(
+                crossing.index,
+                far.max(crossing.angle / crossing.angular_tolerance),
+            );
+        }
+        if certificate.corridor.ratio > 1.0 {
+            let after =
+                crossings.partition_point(|crossing| crossing.time <= certificate.corridor.time);
+            miss(after, certificate.corridor.ratio);
+        }
+        worst.map(|(_, index)| index)
+    }
+}
