@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal};
 use std::path::Path;
 
 use engine::run_loop::Operator;
-use engine::session::{Blame, Note, Session};
+use engine::session::{Blame, Note, RunSample, Session};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -119,8 +119,8 @@ impl Console {
 }
 
 impl Operator for Console {
-    fn observe(&mut self, session: &Session) -> io::Result<()> {
-        self.recording.take(&session.samples())?;
+    fn observe(&mut self, samples: &[RunSample], session: &Session) -> io::Result<()> {
+        self.recording.take(samples)?;
         self.progress.show(&session.status());
         Ok(())
     }

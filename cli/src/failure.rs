@@ -2,6 +2,7 @@ use std::io;
 
 use engine::run_loop::RunLoopError;
 use ipc::IpcError;
+use recorder::RecorderError;
 
 use crate::exit::Exit;
 use crate::printer::Printer;
@@ -77,6 +78,30 @@ impl From<IpcError> for Failure {
         let exit = match error {
             IpcError::BadArmName { .. } => Exit::Usage,
             _ => Exit::NoPeer,
+        };
+        Self::new(exit, error)
+    }
+}
+
+/// The live view.
+impl From<view::ViewError> for Failure {
+    fn from(error: view::ViewError) -> Self {
+        let exit = match error {
+            view::ViewError::Port { .. } => Exit::Usage,
+            view::ViewError::Ipc(_) | view::ViewError::Refused(_) => Exit::NoPeer,
+            view::ViewError::Robot(_) | view::ViewError::Recording(_) => Exit::Unreadable,
+            _ => Exit::Internal,
+        };
+        Self::new(exit, error)
+    }
+}
+
+/// Recordings.
+impl From<recorder::RecorderError> for Failure {
+    fn from(error: recorder::RecorderError) -> Self {
+        let exit = match error {
+            RecorderError::Thread { .. } => Exit::Internal,
+            _ => Exit::Unreadable,
         };
         Self::new(exit, error)
     }

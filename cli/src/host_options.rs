@@ -9,10 +9,21 @@ use servo::ExecutorError;
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::recorder_options::RecorderOptions;
 use crate::simulation::{Kind, Simulation};
+use crate::view_process::ViewProcess;
 
 /// An engine that ends its simulated driver, if it has one.
-pub(crate) type Host = engine::host::Host<Option<Simulation>>;
+pub(crate) type Host = engine::host::Host<Company>;
+
+/// The processes that end with an engine.
+#[derive(Debug, Default)]
+pub(crate) struct Company {
+    /// The simulated driver.
+    pub(crate) _driver: Option<Simulation>,
+    /// The live view.
+    pub(crate) view: Option<ViewProcess>,
+}
 
 /// How an engine is started.
 #[derive(Args, Debug)]
@@ -28,6 +39,11 @@ pub(crate) struct HostOptions {
     /// Python that runs the MuJoCo driver
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: String,
+    #[command(flatten)]
+    pub(crate) recorder: RecorderOptions,
+    /// Show the arm in the browser: prints the address of a live view, see `canter view`
+    #[arg(long)]
+    view: bool,
     /// Run in lock-step with the driver instead of by the clock: faster, with the same result every
     /// time
     #[arg(long)]
@@ -117,7 +133,15 @@ impl HostOptions {
         config.record = true;
         config.on_refusal = on_refusal;
         config.default_length = default_length;
-        let host = Host::start(channels, robot, &config, simulation).map_err(failure)?;
+        let company = Company {
+            _driver: simulation,
+            view: None,
+        };
+        let mut host = Host::start(channels, robot, &config, company).map_err(failure)?;
+        self.recorder.start(&mut host, robot)?;
+        if self.view {
+            host.company.view = Some(ViewProcess::start(&host.arm)?);
+        }
         if let Some(warning) = &host.session.warning {
             tracing::warn!("{warning}");
         }

@@ -2,6 +2,7 @@ use std::io::{self, IsTerminal, Write};
 
 use clap::{Args, ValueEnum};
 use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
+use engine::host::GivenProgram;
 use planner::command_error::ErrorClass;
 use planner::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
 use planner::robot::Robot;
@@ -16,6 +17,13 @@ pub(crate) struct ProgramArgument {
     /// File of canonical commands, text, JSON or XML; `-` is standard input
     #[arg(value_name = "PROGRAM")]
     path: String,
+    #[command(flatten)]
+    reading: ReadingOptions,
+}
+
+/// How a program is read.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ReadingOptions {
     /// Refuse the extensions of the language
     #[arg(long)]
     strict: bool,
@@ -83,6 +91,14 @@ pub(crate) struct ProgramFile {
 }
 
 impl ProgramArgument {
+    /// The program at a path.
+    pub(crate) fn new(path: &str, reading: &ReadingOptions) -> Self {
+        Self {
+            path: path.to_owned(),
+            reading: reading.clone(),
+        }
+    }
+
     /// Reads and checks the program as far as that needs no robot.
     ///
     /// # Errors
@@ -95,21 +111,21 @@ impl ProgramArgument {
             &self.path
         };
         let options = ReadOptions {
-            strict: self.strict,
+            strict: self.reading.strict,
             ..ReadOptions::default()
         };
-        let form = self.form.of(&bytes);
+        let form = self.reading.form.of(&bytes);
         let read = match form {
             Form::Json => crcl::json::read_bytes,
             Form::Xml => crcl::xml::read_bytes,
             Form::Auto | Form::Text => crcl::text::read_bytes,
         };
         let mut reading = read(&bytes, &options);
-        let default_length = self.default_length.into();
+        let default_length = self.reading.default_length.into();
         // Errors after a syntax error may be its consequences.
         if !reading.findings.iter().any(is_unreadable) {
             let options = CheckOptions {
-                strict: self.strict,
+                strict: self.reading.strict,
                 default_length,
             };
             reading
@@ -123,6 +139,28 @@ impl ProgramArgument {
             default_length,
             form,
         })
+    }
+}
+
+impl ProgramFile {
+    /// A program that came with a recording.
+    pub(crate) fn given(given: &GivenProgram) -> Self {
+        let bytes = given.text.as_bytes();
+        let (form, read): (Form, fn(&[u8], &ReadOptions) -> Reading) = match given.form.as_str() {
+            "json" => (Form::Json, crcl::json::read_bytes),
+            "xml" => (Form::Xml, crcl::xml::read_bytes),
+            _ => (Form::Text, crcl::text::read_bytes),
+        };
+        Self {
+            source: Source::from_bytes(&given.name, bytes),
+            reading: read(bytes, &ReadOptions::default()),
+            default_length: match given.default_length.as_str() {
+                "m" => LengthUnit::Meter,
+                "inch" => LengthUnit::Inch,
+                _ => LengthUnit::Millimeter,
+            },
+            form,
+        }
     }
 }
 
@@ -140,6 +178,29 @@ impl ProgramFile {
     /// Unit of length until the program sets one.
     pub(crate) fn default_length(&self) -> LengthUnit {
         self.default_length
+    }
+
+    /// The program as it is told to clients and recordings: the numbers of its commands, and the
+    /// joints that it was planned from.
+    pub(crate) fn given_as(&self, ids: &[u32], start: Option<Vec<f64>>) -> GivenProgram {
+        GivenProgram {
+            form: self.form_name().to_owned(),
+            name: self.name().to_owned(),
+            text: self.text().to_owned(),
+            first: ids.first().copied().unwrap_or(0),
+            last: ids.last().copied().unwrap_or(0),
+            start,
+            default_length: self.length_word().to_owned(),
+        }
+    }
+
+    /// The same in one word.
+    pub(crate) fn length_word(&self) -> &'static str {
+        match self.default_length {
+            LengthUnit::Millimeter => "mm",
+            LengthUnit::Meter => "m",
+            LengthUnit::Inch => "inch",
+        }
     }
 
     /// The name it is reported under.

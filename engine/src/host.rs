@@ -3,20 +3,28 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crcl::ReadOptions;
+use crcl::{LengthUnit, ReadOptions};
 use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
 use servo::ExecutorError;
 
 use crate::control::ControlThread;
-use crate::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
+use crate::flight::{Flight, FlightOptions, Recorded};
+use crate::session::{
+    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
+};
+pub use crate::texts::GivenProgram;
+use crate::texts::Texts;
 
 /// Time between two status reports.
 const REPORT: Duration = Duration::from_millis(100);
 
 /// How many notes are kept for clients that ask.
 const KEPT: usize = 512;
+
+/// How many samples wait for [`Host::samples`] at most: ten minutes at 1 kHz.
+const WAITING: usize = 600_000;
 
 /// How long the notes of one answer may be together (bytes).
 const NOTES: usize = ipc::LONGEST_ANSWER * 3 / 4;
@@ -56,7 +64,15 @@ pub struct Host<D> {
     notes: VecDeque<Value>,
     count: u64,
     shutdown: bool,
-    _driver: D,
+    texts: Texts,
+    rate_hz: f64,
+    default_length: &'static str,
+    flight: Option<Flight>,
+    /// Where the last fault was recorded, in words.
+    recorded: Option<String>,
+    samples: Vec<RunSample>,
+    /// What ends with the engine: its driver, a view.
+    pub company: D,
 }
 
 impl<D> Host<D> {
@@ -83,7 +99,13 @@ impl<D> Host<D> {
             notes: VecDeque::new(),
             count: 0,
             shutdown: false,
-            _driver: driver,
+            texts: Texts::new(robot),
+            rate_hz: config.rate_hz,
+            default_length: length_word(config.default_length),
+            flight: None,
+            recorded: None,
+            samples: Vec::new(),
+            company: driver,
         })
     }
 
@@ -94,6 +116,70 @@ impl<D> Host<D> {
             process: std::process::id(),
         };
         self.ownership.give(client);
+    }
+
+    /// Records from now on. The session must have been started with its samples kept.
+    ///
+    /// # Errors
+    /// The file of the recording cannot be written.
+    pub fn record(
+        &mut self,
+        robot: &Robot,
+        options: &FlightOptions,
+    ) -> Result<(), recorder::RecorderError> {
+        let recorded = Recorded {
+            robot,
+            arm: &self.arm,
+            session: &self.session,
+            rate_hz: self.rate_hz,
+            default_length: self.default_length,
+        };
+        self.flight = Some(Flight::new(recorded, options)?);
+        Ok(())
+    }
+
+    /// Tells clients and recordings which program was given; `certificate` is what was proved of
+    /// its moves, as JSON, where that is known.
+    pub fn tell_program(&mut self, program: GivenProgram, certificate: Option<String>) {
+        if let Some(flight) = &mut self.flight {
+            flight.program(&program, certificate);
+        }
+        self.texts.give(program);
+    }
+
+    /// What was recorded since the last call, for one reader; what is too old is forgotten.
+    #[must_use]
+    pub fn samples(&mut self) -> Vec<RunSample> {
+        self.take_samples();
+        std::mem::take(&mut self.samples)
+    }
+
+    /// Ends the session and then the recording, whose summary it gives. The driver ends with the
+    /// host.
+    ///
+    /// # Errors
+    /// The file of the recording cannot be written.
+    pub fn close(&mut self) -> Result<Option<recorder::Summary>, recorder::RecorderError> {
+        self.session.close();
+        self.take_samples();
+        self.flight.take().map_or(Ok(None), Flight::close)
+    }
+
+    fn take_samples(&mut self) {
+        let fresh = self.session.samples();
+        if let Some(flight) = &mut self.flight {
+            flight.samples(&fresh);
+        }
+        if self.samples.len() > WAITING {
+            self.samples.clear();
+        }
+        self.samples.extend(fresh);
+    }
+
+    /// Where the session is, and where its fault was recorded.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        told(self.session.status(), self.recorded.as_deref())
     }
 
     /// Whether a client has asked for the end.
@@ -114,12 +200,18 @@ impl<D> Host<D> {
         }
         if self.reported.is_none_or(|at| at.elapsed() >= REPORT) {
             self.reported = Some(Instant::now());
-            if let Err(error) = self.channels.status.write(&self.session.status()) {
+            let status = self.status();
+            if let Some(flight) = &mut self.flight {
+                flight.count(&status);
+            }
+            if let Err(error) = self.channels.status.write(&status) {
                 tracing::debug!("{error}");
             }
         }
-        let note = self.session.note(Duration::from_millis(5));
-        if let Some(note) = &note {
+        let mut note = self.session.note(Duration::from_millis(5));
+        self.take_samples();
+        if let Some(note) = &mut note {
+            self.record_note(note);
             self.count += 1;
             self.notes
                 .push_back(json!({"number": self.count, "note": note}));
@@ -130,6 +222,31 @@ impl<D> Host<D> {
         Ok(note)
     }
 
+    /// Records what happened. A fault writes the last minute to a file, and its reason names it.
+    fn record_note(&mut self, note: &mut Note) {
+        let Some(flight) = &mut self.flight else {
+            return;
+        };
+        if let Some(failure) = flight.failure() {
+            tracing::warn!("the recording has ended: {failure}");
+        }
+        flight.note(note);
+        match note {
+            Note::Faulted { reason, .. } => {
+                let words = match flight.fault() {
+                    Some(Ok(path)) => format!("the last minute is in {}", path.display()),
+                    Some(Err(cause)) => format!("the last minute is lost: {cause}"),
+                    None => return,
+                };
+                reason.push_str("; ");
+                reason.push_str(&words);
+                self.recorded = Some(words);
+            }
+            Note::Recovered => self.recorded = None,
+            _ => {}
+        }
+    }
+
     fn serve(&mut self) -> Result<usize, IpcError> {
         let Self {
             session,
@@ -138,15 +255,26 @@ impl<D> Host<D> {
             notes,
             count,
             shutdown,
+            texts,
+            flight,
+            recorded,
+            default_length,
+            rate_hz,
             ..
         } = self;
         channels.requests.serve(|request| {
-            let status = session.status();
+            let status = told(session.status(), recorded.as_deref());
             if let Err(refusal) = ownership.admit(&request, !status.idle) {
                 return refusal;
             }
             match request.ask {
-                Verb::Status => Answer::accept(json!({"status": status, "last_note": *count})),
+                Verb::Status => Answer::accept(json!({
+                    "status": status,
+                    "last_note": *count,
+                    "program": texts.program(),
+                    "period_ns": (1e9 / *rate_hz).round(),
+                })),
+                Verb::Text { of, from } => texts.part(&of, from),
                 Verb::Notes { since } => later(notes, since),
                 Verb::Shutdown => {
                     *shutdown = true;
@@ -156,7 +284,19 @@ impl<D> Host<D> {
                     format,
                     name,
                     program,
-                } => submit(session, &format, &name, &program),
+                } => {
+                    let start = status.idle.then_some(status.setpoint);
+                    let answer = submit(session, &format, &name, &program);
+                    if answer.accepted {
+                        let given = GivenProgram::taken(&answer, (format, name, program), start);
+                        let given = given.in_unit(default_length);
+                        if let Some(flight) = flight {
+                            flight.program(&given, None);
+                        }
+                        texts.give(given);
+                    }
+                    answer
+                }
                 Verb::Jog {
                     space,
                     speeds,
@@ -166,6 +306,24 @@ impl<D> Host<D> {
             }
         })
     }
+}
+
+/// A unit of length in one word.
+fn length_word(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Millimeter => "mm",
+        LengthUnit::Meter => "m",
+        LengthUnit::Inch => "inch",
+    }
+}
+
+/// A status whose fault says where it was recorded.
+fn told(mut status: Status, recorded: Option<&str>) -> Status {
+    if let (Some(fault), Some(words)) = (&mut status.fault, recorded) {
+        fault.push_str("; ");
+        fault.push_str(words);
+    }
+    status
 }
 
 /// The notes after number `since`, as many as one answer holds; the client asks again for more.
@@ -241,7 +399,12 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
     let space = match space {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
-        other => return Answer::refuse(format!("a jog is in joint or tool space, not {other:?}")),
+        "workstation" => JogSpace::Workstation,
+        other => {
+            return Answer::refuse(format!(
+                "a jog is in joint, tool or workstation space, not {other:?}"
+            ));
+        }
     };
     let timeout = Duration::from_millis(timeout_ms);
     match session.jog(Jog {

@@ -13,8 +13,10 @@
 pub mod arm_motion;
 pub mod control;
 pub mod doctor;
+pub mod flight;
 pub mod host;
 pub mod queue;
 mod recent;
 pub mod run_loop;
 pub mod session;
+mod texts;

@@ -8,20 +8,20 @@ use plan::run::MotionFailure;
 use thiserror::Error;
 
 use crate::arm_motion::Mover;
-use crate::host::Host;
+use crate::host::{GivenProgram, Host};
 use crate::queue::Given;
-use crate::session::{Blame, Note, Session, Status};
+use crate::session::{Blame, Note, RunSample, Session, Status};
 
 /// Time limit for a new session with the driver after a fault.
 const RECOVERY: Duration = Duration::from_secs(5);
 
 /// Who watches a run: keeps its recording, is told what happens, and may end it.
 pub trait Operator {
-    /// Looks at the session once in every turn, and takes its samples.
+    /// Looks at the session once in every turn; `samples` are those since the last turn.
     ///
     /// # Errors
     /// The samples cannot be written.
-    fn observe(&mut self, session: &Session) -> io::Result<()>;
+    fn observe(&mut self, samples: &[RunSample], session: &Session) -> io::Result<()>;
 
     /// Something happened.
     fn hear(&mut self, note: &Note);
@@ -66,6 +66,17 @@ pub enum RunLoopError {
     /// The operator's file failed.
     #[error("the samples cannot be written: {0}")]
     Samples(#[source] io::Error),
+}
+
+/// What is left of a run.
+#[derive(Debug)]
+pub struct Finished<O> {
+    /// The operator, who has seen the last sample.
+    pub operator: O,
+    /// Where the session was.
+    pub status: Status,
+    /// What was recorded, if it was, or why its file cannot be written.
+    pub recorded: Result<Option<recorder::Summary>, recorder::RecorderError>,
 }
 
 /// What one turn brought.
@@ -154,8 +165,9 @@ impl<D, O: Operator> RunLoop<D, O> {
             return Ok(Turn::Over(RunEnd::Stopped));
         }
         let note = self.host.turn()?;
+        let samples = self.host.samples();
         self.operator
-            .observe(&self.host.session)
+            .observe(&samples, &self.host.session)
             .map_err(RunLoopError::Samples)?;
         if self.host.is_shut_down() {
             return Ok(Turn::Over(RunEnd::ShutDown));
@@ -190,19 +202,30 @@ impl<D, O: Operator> RunLoop<D, O> {
         false
     }
 
-    /// Ends session and driver; gives the operator, who has seen the last sample, and where the
-    /// session was.
+    /// Tells clients and recordings which program was given; see [`Host::tell_program`].
+    pub fn tell_program(&mut self, program: GivenProgram, certificate: Option<String>) {
+        self.host.tell_program(program, certificate);
+    }
+
+    /// Ends session and driver.
     ///
     /// # Errors
-    /// The operator's file failed.
-    pub fn finish(mut self) -> io::Result<(O, Status)> {
+    /// [`RunLoopError::Samples`].
+    pub fn finish(mut self) -> Result<Finished<O>, RunLoopError> {
         let status = self.host.session.status();
         // The sample of a period is complete when the next state arrives: the last ones are still
         // missing.
-        self.host.session.close();
-        self.operator.observe(&self.host.session)?;
+        let recorded = self.host.close();
+        let samples = self.host.samples();
+        self.operator
+            .observe(&samples, &self.host.session)
+            .map_err(RunLoopError::Samples)?;
         drop(self.host);
-        Ok((self.operator, status))
+        Ok(Finished {
+            operator: self.operator,
+            status,
+            recorded,
+        })
     }
 }
 

@@ -25,10 +25,10 @@ pub enum Verb {
     },
     /// Jog; the arm stops when no further request comes in time.
     Jog {
-        /// `joint` or `tool`.
+        /// `joint`, `tool` or `workstation`.
         space: String,
         /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
-        /// tool frame; all 0 stops.
+        /// tool frame or in the workstation; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,
@@ -40,6 +40,13 @@ pub enum Verb {
         /// Number of the last note that the client has; only later ones are returned.
         since: u64,
     },
+    /// A text of the engine, in parts: the robot's files, or the last program.
+    Text {
+        /// `urdf`, `robot` (robot.toml) or `program`.
+        of: String,
+        /// Where the part begins (bytes): 0, then the `next` of the answer before.
+        from: usize,
+    },
     /// Stop on the path and end the engine.
     Shutdown,
 }
@@ -50,7 +57,7 @@ impl Verb {
     pub fn commands(&self) -> bool {
         match self {
             Self::Submit { .. } | Self::Jog { .. } | Self::Shutdown => true,
-            Self::Status | Self::Notes { .. } => false,
+            Self::Status | Self::Notes { .. } | Self::Text { .. } => false,
         }
     }
 }

@@ -65,6 +65,8 @@ pub struct Robot {
     pub description: String,
     /// Text of the URDF, for viewers and drivers.
     pub urdf: String,
+    /// Text of robot.toml, for recordings and viewers.
+    pub toml: String,
     /// Chain of joints as read from the URDF.
     pub model: Model,
     /// Limits of the joints.

@@ -40,7 +40,10 @@ pub fn arm(name: &str) -> Arm {
 
 /// Lets a process that is about to be started join the domain of this test process.
 pub fn join(command: &mut Command) -> &mut Command {
-    command.env(DOMAIN_VARIABLE, domain().directory())
+    // Recordings of faults go there as well, not into the home of who tests.
+    command
+        .env(DOMAIN_VARIABLE, domain().directory())
+        .env("XDG_STATE_HOME", domain().directory())
 }
 
 /// The domain that the process which started this one has chosen.

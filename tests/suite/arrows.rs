@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 16] = [
+const ARROWS: [(&str, &[&str]); 18] = [
     (
         "cli",
         &[
@@ -22,11 +22,14 @@ const ARROWS: [(&str, &[&str]); 16] = [
             "kinematics",
             "trajectory",
             "ipc",
+            "recorder",
+            "view",
             "scheduling",
             "driver-sim",
             "driver-conformance",
         ],
     ),
+    ("view", &["planner", "crcl", "ipc", "recorder"]),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
@@ -41,6 +44,7 @@ const ARROWS: [(&str, &[&str]); 16] = [
             "trajectory",
             "realtime",
             "ipc",
+            "recorder",
             "scheduling",
         ],
     ),
@@ -55,12 +59,13 @@ const ARROWS: [(&str, &[&str]); 16] = [
     ("simd", &[]),
     ("realtime", &[]),
     ("ipc", &[]),
+    ("recorder", &[]),
     ("scheduling", &[]),
 ];
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 9] = [
+const FENCES: [(&str, &[&str]); 12] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
@@ -68,6 +73,9 @@ const FENCES: [(&str, &[&str]); 9] = [
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
     ("clap", &["cli"]),
+    ("mcap", &["recorder"]),
+    ("tungstenite", &["view"]),
+    ("httparse", &["view"]),
     ("rtrb", &["servo"]),
     ("libc", &["ipc", "scheduling"]),
 ];

@@ -2,13 +2,14 @@ use std::io;
 
 use clap::Args;
 use engine::run_loop::{Operator, RunEnd, RunLoop};
-use engine::session::{Note, Session};
+use engine::session::{Note, RunSample, Session};
 
 use crate::console::tell_json;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{HostOptions, RefusalOption};
 use crate::printer::Printer;
+use crate::recorder_options;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;
 
@@ -58,8 +59,11 @@ impl Engine {
             RunEnd::ShutDown => Exit::Done,
             _ => Exit::Internal,
         };
-        let (desk, _) = running.finish()?;
-        desk.signals.release();
+        let finished = running.finish()?;
+        finished.operator.signals.release();
+        if let Some(summary) = finished.recorded? {
+            recorder_options::report(printer, &summary);
+        }
         Ok(exit)
     }
 }
@@ -72,9 +76,7 @@ struct EngineDesk {
 }
 
 impl Operator for EngineDesk {
-    fn observe(&mut self, session: &Session) -> io::Result<()> {
-        // The recording is not used here; it must not grow.
-        drop(session.samples());
+    fn observe(&mut self, _samples: &[RunSample], _session: &Session) -> io::Result<()> {
         Ok(())
     }
 

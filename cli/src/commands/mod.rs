@@ -20,7 +20,9 @@ mod pause;
 mod plan;
 mod plan_check;
 mod plan_run;
+mod record;
 mod recover;
+mod replay;
 mod resume;
 mod robots;
 mod run;
@@ -31,6 +33,7 @@ mod shutdown;
 mod status;
 mod stop;
 mod verify;
+mod view;
 mod world;
 
 use clap::Subcommand;
@@ -58,7 +61,9 @@ pub(crate) enum Command {
     Override(override_speed::Override),
     Pause(pause::Pause),
     Plan(plan::Plan),
+    Record(record::Record),
     Recover(recover::Recover),
+    Replay(replay::Replay),
     Resume(resume::Resume),
     Robots(robots::Robots),
     World(world::World),
@@ -72,6 +77,7 @@ pub(crate) enum Command {
     Status(status::Status),
     Stop(stop::Stop),
     Verify(verify::Verify),
+    View(view::View),
 }
 
 impl Command {
@@ -93,8 +99,10 @@ impl Command {
             Self::Man(command) => command.run(),
             Self::Override(command) => command.run(),
             Self::Pause(command) => command.run(),
-            Self::Plan(command) => command.run(),
+            Self::Plan(command) => command.run(printer),
+            Self::Record(command) => command.run(printer),
             Self::Recover(command) => command.run(),
+            Self::Replay(command) => command.run(printer),
             Self::Resume(command) => command.run(),
             Self::Robots(command) => command.run(),
             Self::World(command) => command.run(),
@@ -108,6 +116,7 @@ impl Command {
             Self::Status(command) => command.run(),
             Self::Stop(command) => command.run(),
             Self::Verify(command) => command.run(),
+            Self::View(command) => command.run(printer),
         }
     }
 }

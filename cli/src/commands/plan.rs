@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use planner::dry_run::{FailurePolicy, Plan as Planned, PlannedCommand};
+use view::Source;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -13,9 +14,11 @@ use crate::output;
 use crate::output_file::OutputFile;
 use crate::picture;
 use crate::plot;
+use crate::printer::Printer;
 use crate::program::ProgramArgument;
 use crate::robot::RobotOption;
 use crate::samples::{SampleRow, SampleWriter};
+use crate::viewing;
 
 /// Plan a program without moving anything: the dry run
 ///
@@ -42,11 +45,14 @@ pub(crate) struct Plan {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Show the plan in the browser until Ctrl-C: prints the address of a page
+    #[arg(long)]
+    view: bool,
 }
 
 impl Plan {
     /// Plans; prints the plan; writes what was asked for.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let robot = self.robot.load()?;
         let program = self.program.read()?;
         program.report();
@@ -73,6 +79,14 @@ impl Plan {
             fs::write(path, picture)
                 .with_context(|| unwritable(path))
                 .map_err(refused)?;
+        }
+        if self.view {
+            let texts = [program.name(), program.form(), program.text()];
+            let source = Source::Program {
+                robot: Box::new(robot),
+                program: texts.map(str::to_owned),
+            };
+            return viewing::serve(printer, source, None, || false);
         }
         Ok(Exit::Done)
     }

@@ -19,18 +19,18 @@ use crate::console::{Console, SampleOptions, Voice, exit_of};
 use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::HostOptions;
+use crate::host_options::{Company, HostOptions};
 use crate::input;
 use crate::pddl_file::{action_table, is_pddl};
 use crate::plan_report::PlanReport;
 use crate::printer::Printer;
+use crate::recorder_options;
 use crate::robot::{RobotOption, with_joints};
 use crate::signals::SignalThread;
-use crate::simulation::Simulation;
 use crate::world_file::{Database, refused};
 
 /// An engine with its operator.
-type MovingArm = RunLoop<Option<Simulation>, Console>;
+type MovingArm = RunLoop<Company, Console>;
 
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
@@ -343,9 +343,12 @@ fn execute<const N: usize>(
     let blame = arm.as_ref().and_then(MovingArm::blame);
     let off_path = match arm {
         Some(arm) => {
-            let (console, _) = arm.finish()?;
-            let worst = console.recording().worst();
-            console.finish()?;
+            let finished = arm.finish()?;
+            let worst = finished.operator.recording().worst();
+            finished.operator.finish()?;
+            if let Some(summary) = finished.recorded? {
+                recorder_options::report(printer, &summary);
+            }
             Some(worst)
         }
         None => None,

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use engine::run_loop::{RunEnd, RunLoop};
+use engine::run_loop::{Finished, RunEnd, RunLoop};
 use engine::session::Status;
 use planner::dry_run::{FailurePolicy, Plan};
 use planner::robot::Robot;
@@ -10,12 +10,12 @@ use serde_json::json;
 use crate::console::{Console, SampleOptions, Voice, exit_of};
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::{DriverChoice, HostOptions, RefusalOption};
+use crate::host_options::{Company, DriverChoice, HostOptions, RefusalOption};
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
+use crate::recorder_options;
 use crate::robot::RobotOption;
 use crate::signals::SignalThread;
-use crate::simulation::Simulation;
 
 /// Run a program on an arm
 ///
@@ -87,6 +87,9 @@ impl Run {
         let voice = if self.json { Voice::Json } else { Voice::Lines };
         let console = Console::new(printer, signals, &host.session, &samples, voice)?;
         let (exit, summary) = execute(RunLoop::new(host, console), &program, plan, plans)?;
+        if let Some(recorded) = &summary.recorded {
+            recorder_options::report(printer, recorded);
+        }
         printer.line(&if self.json {
             summary.json(exit)
         } else {
@@ -115,19 +118,27 @@ impl Run {
 
 /// Has the program executed as it was planned, after `plans` moves were planned for it.
 fn execute(
-    mut running: RunLoop<Option<Simulation>, Console>,
+    mut running: RunLoop<Company, Console>,
     program: &ProgramFile,
     plan: Plan,
     plans: u64,
 ) -> Result<(Exit, Summary), Failure> {
+    let start = Some(plan.start.clone());
+    // All keys of a plan are texts, so it can be written.
+    let certificate = serde_json::to_string(&plan).ok();
     let ids = running
         .session()
         .execute(program.program(), plan)
         .map_err(|full| Failure::new(Exit::Refused, full))?;
+    running.tell_program(program.given_as(&ids, start), certificate);
     let end = running.wait_for(&ids)?;
     let driver = running.session().driver.clone();
-    let (console, status) = running.finish()?;
-    let summary = Summary {
+    let Finished {
+        operator: console,
+        status,
+        recorded,
+    } = running.finish()?;
+    let mut summary = Summary {
         commands: program.program().commands.len(),
         done: console.done(),
         driver,
@@ -135,8 +146,10 @@ fn execute(
         off_path_m: console.recording().worst(),
         plans: plans + status.plans,
         status,
+        recorded: None,
     };
     console.finish()?;
+    summary.recorded = recorded?;
     let exit = match end {
         // The end was reached, but not every command was executed.
         RunEnd::Done if summary.done < summary.commands => Exit::Refused,
@@ -160,6 +173,8 @@ struct Summary {
     plans: u64,
     /// Where the session was at the end.
     status: Status,
+    /// What was recorded, if it was.
+    recorded: Option<recorder::Summary>,
 }
 
 impl Summary {

@@ -1,4 +1,5 @@
 use std::io::{self, BufReader, Read, Write};
+use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
@@ -6,12 +7,13 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use planner::recorded::{
     CommandVerdict, ProgramVerdict, RecordedSample, RunColumns, verify_program,
 };
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::program::ProgramArgument;
-use crate::robot::RobotOption;
-use crate::{input, output};
+use crate::program::{ProgramArgument, ProgramFile, ReadingOptions};
+use crate::recorded_program::RecordedFile;
+use crate::{input, output, robot};
 
 /// Check a recorded motion against its program, from the samples alone
 ///
@@ -21,13 +23,18 @@ use crate::{input, output};
 /// time, the value and the limit. It has its own kinematics and plans nothing.
 #[derive(Args, Debug)]
 pub(crate) struct Verify {
-    /// CSV file of samples; `-` is standard input
-    #[arg(value_name = "SAMPLES.csv")]
+    /// CSV file of samples, `-` is standard input; or a recording, which has its program and robot
+    #[arg(value_name = "SAMPLES.csv|FILE.mcap")]
     samples: String,
+    /// File of canonical commands, text or JSON; a recording has its own
+    #[arg(value_name = "PROGRAM")]
+    program: Option<String>,
     #[command(flatten)]
-    program: ProgramArgument,
-    #[command(flatten)]
-    robot: RobotOption,
+    reading: ReadingOptions,
+    /// Shipped robot (see `canter robots list`) or a folder with robot.urdf and robot.toml; a
+    /// recording has its own
+    #[arg(short, long, value_name = "R")]
+    robot: Option<String>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -36,14 +43,31 @@ pub(crate) struct Verify {
 impl Verify {
     /// Checks and prints; findings are the exit code [`Exit::Refused`].
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
-        let robot = self.robot.load()?;
-        let program = self.program.read()?;
+        let path = Path::new(&self.samples);
+        if path.to_string_lossy().contains(".mcap") {
+            return self.run_recording(path);
+        }
+        let (Some(robot), Some(program)) = (&self.robot, &self.program) else {
+            let cause = anyhow!("a CSV file needs PROGRAM and --robot; a recording has both");
+            return Err(Failure::new(Exit::Usage, cause));
+        };
+        let robot = robot::load(robot)?;
+        let program = ProgramArgument::new(program, &self.reading).read()?;
         if program.exit() != Exit::Done {
             program.report();
             return Ok(program.exit());
         }
         let rows = read(&self.samples, robot.dof())?;
-        let verdict = verify_program(&robot, program.program(), program.default_length(), &rows);
+        self.judge(&robot, &program, &rows)
+    }
+
+    fn judge(
+        &self,
+        robot: &Robot,
+        program: &ProgramFile,
+        rows: &[RecordedSample],
+    ) -> Result<Exit, Failure> {
+        let verdict = verify_program(robot, program.program(), program.default_length(), rows);
         if self.json {
             output::json(&verdict)?;
         } else {
@@ -54,6 +78,31 @@ impl Verify {
         } else {
             Exit::Refused
         })
+    }
+
+    /// Judges a recording: every program of it, or the one that is given.
+    fn run_recording(&self, path: &Path) -> Result<Exit, Failure> {
+        let recorded = RecordedFile::read(path)?;
+        let robot = match &self.robot {
+            Some(name) => robot::load(name)?,
+            None => recorded.robot()?,
+        };
+        let mut exit = Exit::Done;
+        for given in recorded.programs(self.json)? {
+            let program = match &self.program {
+                Some(path) => ProgramArgument::new(path, &self.reading).read()?,
+                None => ProgramFile::given(&given),
+            };
+            if program.exit() != Exit::Done {
+                program.report();
+                return Ok(program.exit());
+            }
+            let rows = recorded.rows(&given, robot.dof());
+            if self.judge(&robot, &program, &rows)? != Exit::Done {
+                exit = Exit::Refused;
+            }
+        }
+        Ok(exit)
     }
 }
 

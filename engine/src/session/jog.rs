@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::{SVector, UnitQuaternion, Vector3};
 use planner::motion::Direction;
 use thiserror::Error;
 
@@ -13,6 +13,8 @@ pub enum JogSpace {
     Joint,
     /// Along and about the x, y and z axes of the controlled point.
     Tool,
+    /// Along x, y, z and about x, y, z of the workstation, in the controlled point.
+    Workstation,
 }
 
 /// A request to jog the arm.
@@ -56,10 +58,16 @@ pub enum JogError {
 }
 
 /// The direction of a request; `None` if it asks for rest.
-pub(super) fn direction<const N: usize>(jog: &Jog) -> Result<Option<Direction<N>>, JogError> {
+///
+/// `workstation_from_tool` is the orientation of the tool now: a jog along axes of the workstation is
+/// one along the tool's axes, rotated back.
+pub(super) fn direction<const N: usize>(
+    jog: &Jog,
+    workstation_from_tool: &UnitQuaternion<f64>,
+) -> Result<Option<Direction<N>>, JogError> {
     let wanted = match jog.space {
         JogSpace::Joint => N,
-        JogSpace::Tool => 6,
+        JogSpace::Tool | JogSpace::Workstation => 6,
     };
     let speeds = &jog.speeds;
     if speeds.len() != wanted || !speeds.iter().all(|share| (-1.0..=1.0).contains(share)) {
@@ -69,11 +77,37 @@ pub(super) fn direction<const N: usize>(jog: &Jog) -> Result<Option<Direction<N>
     if speeds.iter().all(|share| *share == 0.0) {
         return Ok(None);
     }
+    let back = match jog.space {
+        JogSpace::Workstation => workstation_from_tool.inverse(),
+        _ => UnitQuaternion::identity(),
+    };
     Ok(Some(match jog.space {
         JogSpace::Joint => Direction::Joints(SVector::from_fn(|joint, _| speeds[joint])),
-        JogSpace::Tool => Direction::Tool {
-            linear: Vector3::from_column_slice(&speeds[..3]),
-            angular: Vector3::from_column_slice(&speeds[3..]),
+        JogSpace::Tool | JogSpace::Workstation => Direction::Tool {
+            linear: back * Vector3::from_column_slice(&speeds[..3]),
+            angular: back * Vector3::from_column_slice(&speeds[3..]),
         },
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A jog along an axis of the workstation goes there, however the tool is turned.
+    #[test]
+    fn axes_of_the_workstation_are_turned_into_the_tool() {
+        let turned = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.0);
+        let jog = Jog {
+            space: JogSpace::Workstation,
+            speeds: vec![0.0, 0.0, -0.5, 0.1, 0.0, 0.0],
+            timeout: Duration::from_millis(100),
+        };
+        let Some(Direction::<6>::Tool { linear, angular }) = direction(&jog, &turned).unwrap()
+        else {
+            panic!("no direction");
+        };
+        assert!((turned * linear - Vector3::new(0.0, 0.0, -0.5)).norm() < 1e-12);
+        assert!((turned * angular - Vector3::new(0.1, 0.0, 0.0)).norm() < 1e-12);
+    }
 }

@@ -102,6 +102,8 @@ pub struct RunSample {
     pub command: u32,
     /// Planned time since the command's start, s.
     pub path_time: f64,
+    /// Share of the planned speed.
+    pub time_scaling: f64,
     /// Joint positions published, rad or m.
     pub q: Vec<f64>,
     /// Joint velocities published.

@@ -1,5 +1,7 @@
 //! What a session reports about its commands.
 
+use core::fmt;
+
 use serde::Serialize;
 
 use planner::command_error::CommandError;
@@ -88,4 +90,23 @@ pub enum Note {
     Recovered,
     /// The session is over; nothing follows.
     Closed,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Started { line, name, .. } => write!(f, "line {line}: {name} started"),
+            Self::Done { line, name, .. } => write!(f, "line {line}: {name} done"),
+            Self::Refused {
+                line, name, error, ..
+            } => write!(f, "line {line}: {name} refused: {}", error.message),
+            Self::Message { text } => write!(f, "message: {text}"),
+            Self::Ended { reason } => write!(f, "the program ended with reason {reason}"),
+            Self::Stopped => f.write_str("stopped"),
+            Self::Aborted { dropped } => write!(f, "aborted, {dropped} commands dropped"),
+            Self::Faulted { reason, .. } => write!(f, "fault: {reason}"),
+            Self::Recovered => f.write_str("recovered"),
+            Self::Closed => f.write_str("the session is over"),
+        }
+    }
 }

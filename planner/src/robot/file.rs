@@ -127,6 +127,7 @@ impl Files<'_> {
             name: self.name.to_owned(),
             description: document.description.clone(),
             urdf: self.urdf.to_owned(),
+            toml: self.toml.to_owned(),
             joints,
             tool: self.tool_limits(&document.tool_limits)?,
             workstation_from_base: self

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use nalgebra::UnitQuaternion;
 use planner::motion::Direction;
 use realtime::Segment;
 use servo::Control;
@@ -41,7 +42,7 @@ enum Phase {
 impl<const N: usize> Worker<'_, N> {
     /// Begins, prolongs, changes or ends a jog.
     pub(super) fn jog(&mut self, request: Jog) -> Result<(), JogError> {
-        let direction = direction::<N>(&request)?;
+        let direction = direction::<N>(&request, &self.tool_turn())?;
         let until = Instant::now() + request.timeout.clamp(TIMEOUT.0, TIMEOUT.1);
         if let Some(fault) = &self.fault {
             return Err(JogError::Fault(fault.clone()));
@@ -86,6 +87,12 @@ impl<const N: usize> Worker<'_, N> {
             next: None,
         });
         Ok(())
+    }
+
+    /// Orientation of the tool in the workstation.
+    fn tool_turn(&self) -> UnitQuaternion<f64> {
+        let now = self.remote.measured().setpoint;
+        self.controller.chain().forward(&now).rotation
     }
 
     /// Plans the path from where the arm rests and sends it.
@@ -135,10 +142,13 @@ impl<const N: usize> Worker<'_, N> {
         if jogging.phase != Phase::Waiting || !(now.idle && now.resting) || now.held {
             return;
         }
-        let begun = direction::<N>(&jogging.request).and_then(|direction| match direction {
-            Some(direction) => self.plan_jog(&direction),
-            None => Ok(()),
-        });
+        let begun =
+            direction::<N>(&jogging.request, &self.tool_turn()).and_then(
+                |direction| match direction {
+                    Some(direction) => self.plan_jog(&direction),
+                    None => Ok(()),
+                },
+            );
         if let Some(jogging) = &mut self.jogging {
             jogging.phase = if begun.is_ok() {
                 Phase::Moving

@@ -164,6 +164,7 @@ impl<const N: usize> Worker<'_, N> {
             tick: sample.tick,
             command: sample.command,
             path_time: sample.path_time,
+            time_scaling: sample.time_scaling,
             q: list(&sample.setpoint.position),
             dq: list(&sample.setpoint.velocity),
             ddq: list(&sample.setpoint.acceleration),

@@ -1,0 +1,93 @@
+// Where the arm is, in numbers, and what happened.
+
+import { JOINTS } from './colours.js';
+
+const get = (id) => document.getElementById(id);
+const degrees = (angle) => (angle * 180 / Math.PI).toFixed(2);
+
+/** Roll, pitch and yaw about the fixed axes of a quaternion w, x, y, z. */
+export function rollPitchYaw([w, x, y, z]) {
+  return [
+    Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+    Math.asin(Math.min(Math.max(2 * (w * y - z * x), -1), 1)),
+    Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+  ];
+}
+
+/** The axes z and x of a quaternion w, x, y, z: as programs write them. */
+export function axes([w, x, y, z]) {
+  return {
+    z: [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+    x: [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+  };
+}
+
+export class Readout {
+  setRobot(robot) {
+    this.robot = robot;
+    get('joints').replaceChildren(...robot.joints.map((name, k) => {
+      const line = document.createElement('div');
+      const [label, bar, value] = [document.createElement('span'), document.createElement('i'), document.createElement('span')];
+      label.textContent = `J${k + 1}`;
+      label.title = name;
+      bar.style.setProperty('--mark', JOINTS[k % JOINTS.length]);
+      line.append(label, bar, value);
+      return line;
+    }));
+    const names = ['X', 'Y', 'Z', 'R', 'P', 'Y'];
+    get('pose').replaceChildren(...names.map((name) => {
+      const cell = document.createElement('div');
+      const [label, value] = [document.createElement('b'), document.createElement('span')];
+      label.textContent = name;
+      cell.append(label, value);
+      return cell;
+    }));
+  }
+
+  joints(positions) {
+    for (const [k, line] of [...get('joints').children].entries()) {
+      const [low, high] = [this.robot.lower[k] ?? -Math.PI, this.robot.upper[k] ?? Math.PI];
+      const share = (positions[k] - low) / (high - low);
+      line.children[1].style.setProperty('--at', `${Math.min(Math.max(share, 0), 1) * 100}%`);
+      line.children[2].textContent = `${degrees(positions[k])}\u00b0`;
+    }
+  }
+
+  pose(point, angles) {
+    const texts = [...point.map((value) => `${(value * 1000).toFixed(2)}`), ...angles.map((angle) => `${degrees(angle)}\u00b0`)];
+    for (const [k, cell] of [...get('pose').children].entries()) cell.lastChild.textContent = texts[k];
+  }
+
+  notes(notes) {
+    const list = get('notes');
+    for (const { note } of notes) {
+      const item = document.createElement('li');
+      const [text, kind] = words(note);
+      item.textContent = text;
+      item.dataset.kind = kind;
+      list.append(item);
+    }
+    while (list.children.length > 300) list.firstChild.remove();
+    list.scrollTop = list.scrollHeight;
+  }
+
+  /** A sentence of the page itself. */
+  tell(text) { this.notes([{ note: { event: 'page', text } }]); }
+}
+
+/** A note in words, and its kind. */
+export function words(note) {
+  switch (note.event) {
+    case 'started': return [`${note.line}  ${note.name}, ${note.planned_s.toFixed(2)} s`, ''];
+    case 'done': return [`${note.line}  ${note.name} done`, ''];
+    case 'refused': return [`${note.line}  ${note.name} refused: ${note.error.message}`, 'bad'];
+    case 'message': return [note.text, 'said'];
+    case 'ended': return [`the program ended with reason ${note.reason}`, note.reason > 0 ? 'warn' : ''];
+    case 'stopped': return ['stopped', 'warn'];
+    case 'aborted': return [`aborted, ${note.dropped} commands dropped`, 'warn'];
+    case 'faulted': return [`fault: ${note.reason}`, 'bad'];
+    case 'recovered': return ['recovered', ''];
+    case 'page': return [note.text, 'warn'];
+    default: return [note.event || JSON.stringify(note), ''];
+  }
+}

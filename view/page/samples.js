@@ -1,0 +1,87 @@
+// Every servo period of the last ten minutes, in memory of a fixed largest size.
+
+const CHUNK = 8192;
+const MOST_ROWS = 600000;
+export const COMMAND = 0;
+export const PATH_TIME = 1;
+export const RATE = 2;
+export const LATE = 3;
+export const POINT = 4;
+export const Q = 7;
+
+export class Samples {
+  constructor() { this.clear(0, 0.001); }
+
+  clear(joints, period) {
+    this.joints = joints;
+    this.period = period;
+    this.stride = Q + 4 * joints + 1;
+    this.chunks = [];
+    this.dropped = 0;
+    this.count = 0;
+    this.gaps = 0;
+    this.lastTick = -1;
+    this.newest = null;
+  }
+
+  /** Takes a block of the server; says whether time went back: another place of a recording. */
+  take(buffer) {
+    const head = new DataView(buffer, 0, 24);
+    const joints = head.getUint16(4, true);
+    const width = head.getUint16(6, true);
+    const rows = head.getUint32(8, true);
+    const period = head.getUint32(12, true) * 1e-9;
+    const first = Number(head.getBigUint64(16, true));
+    const back = first <= this.lastTick;
+    if (joints !== this.joints || back) this.clear(joints, period);
+    this.period = period;
+    if (this.lastTick >= 0 && first !== this.lastTick + 1) this.gaps += 1;
+    const numbers = new Float32Array(buffer, 24);
+    for (let row = 0; row < rows; row += 1) {
+      this.push(numbers, row * width, width, first + row);
+    }
+    this.lastTick = first + rows - 1;
+    return back;
+  }
+
+  push(numbers, from, width, tick) {
+    const inChunk = this.count % CHUNK;
+    if (inChunk === 0) this.chunks.push({ ticks: new Float64Array(CHUNK), data: new Float32Array(CHUNK * this.stride) });
+    const chunk = this.chunks[this.chunks.length - 1];
+    const at = inChunk * this.stride;
+    for (let k = 0; k < width; k += 1) chunk.data[at + k] = numbers[from + k];
+    chunk.ticks[inChunk] = tick;
+    this.count += 1;
+    if ((this.chunks.length - 1) * CHUNK > MOST_ROWS) {
+      this.chunks.shift();
+      this.count -= CHUNK;
+      this.dropped += CHUNK;
+    }
+  }
+
+  /** A number of a row, from the oldest that is kept. */
+  at(row, column) {
+    const chunk = this.chunks[Math.floor(row / CHUNK)];
+    return chunk.data[(row % CHUNK) * this.stride + column];
+  }
+
+  tick(row) { return this.chunks[Math.floor(row / CHUNK)].ticks[row % CHUNK]; }
+
+  /** The row at a tick, or the one before it. */
+  rowAt(tick) {
+    let low = 0;
+    let high = this.count - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.tick(middle) <= tick) low = middle; else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** Published positions of the newest row. */
+  newestJoints(measured) {
+    if (this.count === 0) return null;
+    const from = Q + (measured ? 3 * this.joints : 0);
+    return Array.from({ length: this.joints }, (_, joint) => this.at(this.count - 1, from + joint));
+  }
+}

@@ -1,0 +1,22 @@
+//! Where the controlled point is, for any number of joints.
+
+use planner::robot::{Robot, RobotError, vector};
+use planner::with_dof;
+
+/// The controlled point in the workstation (m) at given joints (rad, m).
+pub(crate) type Forward = Box<dyn Fn(&[f64]) -> [f64; 3] + Send>;
+
+/// Forward kinematics of a robot with the end effector that it carries at the start.
+///
+/// # Errors
+/// A robot that cannot be used.
+pub(crate) fn forward(robot: &Robot) -> Result<Forward, RobotError> {
+    with_dof!(robot.dof(), N => of::<N>(robot))
+}
+
+fn of<const N: usize>(robot: &Robot) -> Result<Forward, RobotError> {
+    let chain = robot.chain_with::<N>(robot.mounted)?;
+    Ok(Box::new(move |joints| {
+        chain.forward(&vector(joints)).translation.vector.into()
+    }))
+}

@@ -1,0 +1,32 @@
+//! The live view and pendant: a page in the browser, served by a process of its own.
+//!
+//! The server is a client of the engine like `canter jog`: the arm waits for nothing here. It serves
+//! one page with a WebSocket, to browsers of this machine only; [`Guard`] says who may come in.
+//! [`Source`] is what is shown: a running arm, a recording, or a planned program.
+//!
+//! This crate never moves an arm by itself: what a person asks for goes to the engine, which checks
+//! it. It is no safety function.
+#![forbid(unsafe_code)]
+
+mod blocks;
+mod error;
+mod forward;
+mod guard;
+mod hand;
+mod http;
+mod live;
+mod page;
+mod player;
+mod preview;
+mod request;
+mod scene;
+mod server;
+mod socket;
+mod source;
+mod token;
+
+pub use error::ViewError;
+pub use guard::{Access, Guard, Refusal, Visitor};
+pub use server::{Server, ServerOptions};
+pub use source::Source;
+pub use token::Token;
