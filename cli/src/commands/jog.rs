@@ -50,7 +50,7 @@ enum Axis {
 }
 
 impl Jog {
-    /// Asks again and again, then for rest.
+    /// Asks repeatedly, then for rest.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {

@@ -25,7 +25,7 @@ const TRIES: u32 = 3;
 /// How long the motion to follow takes (s), and how far it goes (rad).
 const SWING: (f64, f64) = (1.0, 0.02);
 
-/// Whether a driver keeps a clause.
+/// Whether a driver follows a clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -44,11 +44,11 @@ pub struct Clause {
     pub name: &'static str,
     /// The verdict.
     pub verdict: Verdict,
-    /// What was seen.
+    /// What was observed.
     pub seen: String,
 }
 
-/// What a test of a driver came to.
+/// The result of testing a driver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {
     /// The driver's name.
@@ -59,10 +59,10 @@ pub struct ConformanceReport {
     pub clauses: Vec<Clause>,
 }
 
-/// What a clause comes to: what was seen, as good or as bad.
+/// The result of a clause: what was observed, as pass or as failure.
 type Seen = Result<String, String>;
 
-/// What [`Seen`] begins with where a driver has nothing to try the clause on.
+/// Prefix of [`Seen`] if a driver has nothing to try the clause on.
 const NOT_TRIED: &str = "not tried: ";
 
 /// A clause and how it is tried.
@@ -115,7 +115,7 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
         ("a stop request stops and latches", |player| {
             player.spoil(|setpoint| setpoint.flags |= SetpointFlags::STOP_REQUEST)
         }),
-        ("in lock-step one state a setpoint", Player::lock_step),
+        ("in lock-step one state per setpoint", Player::lock_step),
         ("goodbye ends the session without a fault", Player::goodbye),
     ];
     clauses.extend(sessions.map(|(name, clause)| judge(name, player.attempt(clause))));
@@ -126,7 +126,7 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
     })
 }
 
-/// What was seen, as a verdict.
+/// Converts what was observed into a verdict.
 fn judge(name: &'static str, seen: Seen) -> Clause {
     let (verdict, seen) = match seen {
         Ok(seen) => match seen.strip_prefix(NOT_TRIED) {
@@ -142,7 +142,7 @@ fn judge(name: &'static str, seen: Seen) -> Clause {
     }
 }
 
-/// An engine that does what a test wants.
+/// An engine that a test controls.
 struct Player {
     link: EngineLink,
     hello: Hello,
@@ -183,7 +183,7 @@ impl Player {
     }
 
     /// Runs a clause; one that fails is tried again, because a machine that stalls for longer than
-    /// the watchdog fails it too. What was seen says which try it was.
+    /// the watchdog fails it too. The observation says which try it was.
     fn attempt(&mut self, clause: Trial) -> Seen {
         let first = self.reopen(clause);
         (2..=TRIES).fold(first, |before, number| match before {
@@ -229,7 +229,7 @@ impl Player {
             ..Setpoint::default()
         };
         for joint in 0..self.joints() {
-            // Towards the middle of the range, so that no end is in the way.
+            // Towards the middle of the range, away from its ends.
             let middle = (self.ack.lower[joint] + self.ack.upper[joint]) / 2.0;
             let sign = if self.ack.position[joint] > middle {
                 -1.0
@@ -276,7 +276,7 @@ impl Player {
             .fold(0.0, f64::max)
     }
 
-    /// Whether the driver has said anything in this session; what it has not is no position.
+    /// Whether the driver has sent a state in this session; without one there is no position.
     fn heard(&self) -> Result<(), String> {
         if self.state.sequence == 0 {
             return Err("it sent no state".to_owned());
@@ -408,7 +408,7 @@ impl Player {
         self.expect(&[DriverState::Fault], &seen)
     }
 
-    /// Setpoints that were sent longer ago than the watchdog, by their own word.
+    /// Setpoints that were sent longer ago than the watchdog, by their time stamp.
     fn outdated(&mut self) -> Seen {
         self.hold(100);
         for _ in 0..100 {
@@ -420,7 +420,7 @@ impl Player {
         self.expect(&[DriverState::Stopping, DriverState::Fault], &reason)
     }
 
-    /// Holds, sends one setpoint that is spoilt, holds again: the driver must have latched.
+    /// Holds, sends one invalid setpoint, holds again: the driver must have latched.
     fn spoil(&mut self, change: impl Fn(&mut Setpoint)) -> Seen {
         self.hold(100);
         let mut setpoint = self.setpoint([0.0; 3]);
@@ -444,7 +444,7 @@ impl Player {
         self.spoil(|setpoint| setpoint.position[0] = upper + 0.1)
     }
 
-    /// A session in step: one state after the handshake, then one for each setpoint.
+    /// A lock-step session: one state after the handshake, then one per setpoint.
     fn lock_step(&mut self) -> Seen {
         const SETPOINTS: usize = 200;
         self.hold(10);
