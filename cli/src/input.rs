@@ -45,7 +45,7 @@ pub(crate) fn text(path: &Path) -> Result<String, Failure> {
     let bytes = bytes(&shown)?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        anyhow!("expected text in UTF-8, but byte {at} is none")
+        anyhow!("expected UTF-8 text, byte {at} is not UTF-8")
     });
     unreadable(&shown, text)
 }

@@ -87,7 +87,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// The next token; after the last one [`Kind::End`] again and again.
+    /// The next token; after the last one always [`Kind::End`].
     pub(crate) fn next(&mut self, findings: &mut Findings) -> Token {
         self.skip_space(findings);
         let start = self.at;

@@ -3,7 +3,7 @@
  *   cargo build --release -p plan --example interpreter
  *   cc controller.c -I plan/include target/release/examples/libinterpreter.a -lpthread -ldl -lm
  *
- * One interpreter in a process. Every function returns 0 when all is well, or one of the codes.
+ * One interpreter per process. Every function returns 0 for success, or one of the codes.
  */
 #ifndef CANTER_INTERPRETER_H
 #define CANTER_INTERPRETER_H
@@ -14,7 +14,7 @@ extern "C" {
 
 enum {
   CANTER_OK = 0,
-  CANTER_END_OF_PLAN = 1,          /* EndCanon (0) was given */
+  CANTER_END_OF_PLAN = 1,          /* EndCanon (0) was sent */
   CANTER_NOT_INITIALISED = 2,
   CANTER_NO_PLAN_OPEN = 3,
   CANTER_PLAN_ALREADY_OPEN = 4,
@@ -28,11 +28,11 @@ enum {
   CANTER_INTERNAL = 12
 };
 
-/* Takes one command as a line of the text language, in metres and radians; returns 0 when it took
- * it. It must not call the functions below. The text is gone when it returns. */
+/* Receives one command as a line of the text language, in metres and radians; returns 0 when it accepts
+ * it. It must not call the functions below. The text is only valid during the call. */
 typedef int (*canter_command)(const char *line, void *user);
 
-/* To be called first: the world database, and who takes the commands. */
+/* To be called first: sets the world database and the function that receives the commands. */
 int canter_configure(const char *world, canter_command command, void *user);
 
 /* Section VII of the specification. plan_type is "PDDL". */
@@ -42,8 +42,8 @@ int InterpExecute(void);
 int InterpClosePlan(void);
 int InterpExit(void);
 
-/* The commands of the last step have been executed: its effects go into the world database. A step
- * whose effects are not written is as if it had not been. */
+/* The commands of the last step have been executed: writes its effects to the world database. A step
+ * whose effects are not written counts as not executed. */
 int canter_commit(void);
 
 #ifdef __cplusplus

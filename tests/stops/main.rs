@@ -57,7 +57,7 @@ enum Way {
     CtrlC,
 }
 
-/// Stops a running engine again and again, through the control channel.
+/// Stops a running engine repeatedly, through the control channel.
 fn stops(burden: Burden, way: Way, count: usize) -> Vec<Taken> {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let mut taken = Vec::new();

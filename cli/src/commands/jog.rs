@@ -49,7 +49,7 @@ enum Axis {
 }
 
 impl Jog {
-    /// Asks again and again, then for rest.
+    /// Asks repeatedly, then for rest.
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let signals = SignalThread::start(printer, "once more to give up")?;
         signals.count_only();

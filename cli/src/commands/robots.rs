@@ -99,7 +99,7 @@ fn import(
     let mut out = io::stdout().lock();
     writeln!(out, "{}: {} joints", folder.display(), robot.dof())?;
     output::note(&format!(
-        "look through {} before the robot moves: what the URDF does not say is a default",
+        "check {} before the robot moves: values that the URDF does not have are defaults",
         folder.join("robot.toml").display()
     ));
     Ok(Exit::Done)

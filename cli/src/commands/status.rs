@@ -28,7 +28,7 @@ pub(crate) struct Status {
 }
 
 impl Status {
-    /// Asks the engine, once or again and again.
+    /// Asks the engine, once or repeatedly.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         loop {
             let body = self.arm.ask(Verb::Status)?.body;

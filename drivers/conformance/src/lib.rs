@@ -14,7 +14,7 @@ use serde::Serialize;
 use clauses::CLAUSES;
 use player::{NOT_TRIED, PERIOD, Player, Seen, WATCHDOG};
 
-/// Whether a driver keeps a clause.
+/// Whether a driver follows a clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -33,11 +33,11 @@ pub struct Clause {
     pub name: &'static str,
     /// The verdict.
     pub verdict: Verdict,
-    /// What was seen.
+    /// What was observed.
     pub seen: String,
 }
 
-/// What a test of a driver came to.
+/// The result of testing a driver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {
     /// The driver's name.
@@ -78,7 +78,7 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
     })
 }
 
-/// What was seen, as a verdict.
+/// Converts what was observed into a verdict.
 fn judge(name: &'static str, seen: Seen) -> Clause {
     let (verdict, seen) = match seen {
         Ok(seen) => match seen.strip_prefix(NOT_TRIED) {

@@ -89,14 +89,14 @@ pub(super) fn limits_agree(robot: &Robot, ack: &HelloAck) -> Check {
         for (what, robot, driver, sign) in allowed {
             if (robot - driver) * sign > ROUNDING * driver.abs().max(1.0) {
                 differences.push(format!(
-                    "joint {}: {what} {robot} where the driver allows {driver}",
+                    "joint {}: {what} {robot}, but the driver allows {driver}",
                     joint + 1
                 ));
             }
         }
     }
     if differences.is_empty() {
-        let seen = "the driver allows all that the robot may".to_owned();
+        let seen = "the driver's limits are at least those of the robot".to_owned();
         return Check::new(NAME, Health::Ok, seen, "");
     }
     let remedy = "lower the limits in the robot's robot.urdf, or raise them in the driver";

@@ -64,7 +64,7 @@ impl Lock {
                 return Ok(Self { path, file });
             }
         }
-        let busy = io::Error::other("the lock file is made and removed again and again");
+        let busy = io::Error::other("the lock file is made and removed repeatedly");
         Err(failed(busy))
     }
 
@@ -155,7 +155,7 @@ fn holder(file: &mut File) -> String {
     let line: String = text.lines().next().unwrap_or_default().into();
     let line: String = line.chars().filter(|c| !c.is_control()).collect();
     if line.is_empty() {
-        "a process that has not yet said its name".into()
+        "a process whose name is not known yet".into()
     } else {
         line
     }

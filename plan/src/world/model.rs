@@ -167,7 +167,7 @@ impl Model {
         for _ in 0..LONGEST_CHAIN {
             let Some(object) = self.objects.get(&current) else {
                 return Err(fail(format!(
-                    "it refers to number {}, which is not there",
+                    "it refers to number {}, which does not exist",
                     current.0
                 )));
             };

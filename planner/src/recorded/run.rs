@@ -35,7 +35,7 @@ pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut
         hold("the growth of planned time", never_back);
         if grown == 0.0 && !begins {
             let still = Measure::at_most(moved, 1e-12, "rad or m");
-            hold("the way while planned time stands", still);
+            hold("the distance while planned time does not grow", still);
         }
     }
 }
