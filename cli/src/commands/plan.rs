@@ -81,7 +81,7 @@ impl Plan {
                 .map_err(refused)?;
         }
         if self.view {
-            let texts = [program.name(), program.form(), program.text()];
+            let texts = [program.name(), program.form_name(), program.text()];
             let source = Source::Program {
                 robot: Box::new(robot),
                 program: texts.map(str::to_owned),

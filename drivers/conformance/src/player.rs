@@ -4,8 +4,8 @@ use core::time::Duration;
 use std::time::Instant;
 
 use ipc::{
-    Clock, DriverState, EngineLink, GRIPPER, Hello, HelloAck, IpcError, Setpoint, SetpointFlags,
-    State, ToolAction,
+    DriverState, EngineLink, GRIPPER, Hello, HelloAck, IpcError, Setpoint, SetpointFlags, State,
+    ToolAction,
 };
 use scheduling::{now_ns, sleep_until_ns};
 
