@@ -42,7 +42,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 fn count() {
-    // A thread that is ending counts no more.
+    // A thread that is ending no longer counts.
     let _ = HEAP_CALLS.try_with(|calls| calls.set(calls.get() + 1));
 }
 
@@ -60,7 +60,7 @@ fn waits() -> u64 {
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
 
-/// Both counters count: a fence that cannot fire is none.
+/// Both counters count: the test must be able to fail.
 #[test]
 fn the_counters_count() {
     let (heap, waited) = (heap_calls(), waits());

@@ -51,8 +51,8 @@ impl Random {
     }
 }
 
-/// Nanoseconds for one input: the inputs are taken in small lots, of each lot the
-/// fastest of several passes counts, so that other work on the machine does not.
+/// Nanoseconds per input: the inputs are divided into small lots, and the fastest of several passes
+/// over a lot counts, so that other work on the machine does not count.
 fn nanoseconds<T>(inputs: &[T], mut work: impl FnMut(&T)) -> f64 {
     const LOT: usize = 50;
     let mut total = 0.0;
@@ -90,7 +90,7 @@ fn forward<const N: usize>(name: &str) -> f64 {
     ours / theirs
 }
 
-/// All branches of one closed form, ns a pose; checks that the source is recovered.
+/// All branches of one closed form, ns per pose; checks that the original joint position is found.
 fn branches<const N: usize>(name: &str) -> f64 {
     let solver = Solver::new(chain::<N>(name));
     let mut random = Random(2);
@@ -118,8 +118,8 @@ fn branches<const N: usize>(name: &str) -> f64 {
     time
 }
 
-/// A UR5e as calibration leaves it, 0.5 mm and 0.05 degrees in every link: all branches
-/// from the near closed form, polished. Prints the time of one branch.
+/// A UR5e with calibration errors of 0.5 mm and 0.05 degrees in every link: all branches from the
+/// approximate closed form, polished. Prints the time per branch.
 fn calibrated() {
     let mut random = Random(7);
     let (mut time, mut count, mut found) = (0.0, 0, 0);
@@ -285,7 +285,7 @@ fn tick<const N: usize>(name: &str, solver: &Solver<N>) -> f64 {
             Translation3::from(pose.translation.vector + axis * 2.5e-4),
             turn * pose.rotation,
         );
-        // Sixteen calls a reading, as the clock itself takes some 25 ns.
+        // Sixteen calls per reading, because reading the clock takes some 25 ns.
         let lot = || {
             let begin = Instant::now();
             for _ in 0..16 {

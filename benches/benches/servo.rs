@@ -24,7 +24,7 @@ use servo::{Control, Event, Executor, ExecutorConfig, Histogram, Remote, Segment
 const N: usize = 6;
 type Joints = SVector<f64, N>;
 
-/// How many times ours and a peer are measured in turns, and how long each is at work (s).
+/// How many times Canter and a peer are measured alternately, and for how long each (s).
 const ROUNDS: usize = 5;
 const ROUND_S: f64 = 2.0;
 
@@ -83,7 +83,7 @@ fn named(arm: &str) -> Arm {
     domain.arm(arm).unwrap()
 }
 
-/// Another process of this bench, ended with the value.
+/// Another process of this benchmark, ended when dropped.
 struct Peer(Child);
 
 impl Peer {
@@ -139,7 +139,7 @@ fn driver(arm: &str) {
     driver_sim::run(options, &STOP).unwrap();
 }
 
-/// What the cycle costs when nothing, and when everything, changes.
+/// Cost of the cycle when nothing changes and when everything changes.
 fn governor() {
     let seven = |value: f64| SVector::<f64, 7>::from_element(value);
     let limits = JointLimits {
@@ -207,14 +207,15 @@ fn processor_seconds() -> f64 {
     tasks.filter_map(run).sum::<f64>() * 1e-9
 }
 
-/// What one round at a rate came to: p50 and p99 of wake-up and of work (ns), share of a core.
+/// Result of one round at a rate: p50 and p99 of wake-up delay and of work (ns), fraction of a
+/// core.
 struct Round {
     wake_up: (u64, u64),
     work: (u64, u64),
     share: f64,
 }
 
-/// A round of ours, and p50 and p99 (ns) of the peer's after it, where there is a peer.
+/// A round of Canter, and p50 and p99 (ns) of the peer's round after it, if there is a peer.
 type Turn = (Round, Option<(u64, u64)>);
 
 /// Moves at a rate for a while.
@@ -246,7 +247,7 @@ fn round(rate: f64, number: usize) -> Round {
     }
 }
 
-/// Rounds in turns with cyclictest at the same rate and priority; each figure is the median of
+/// Rounds alternating with cyclictest at the same rate and priority; each figure is the median of
 /// the rounds, each ratio the median of the rounds' ratios.
 fn wake_up(rate: f64, ratios: &mut Vec<(String, f64)>) {
     let rounds: Vec<Turn> = (0..ROUNDS)
@@ -329,7 +330,7 @@ fn cyclictest(rate: f64) -> Option<(u64, u64)> {
             seen += count;
             seen as f64 >= share * total as f64
         });
-        // Whole microseconds: as if spread evenly over the bucket.
+        // Whole microseconds: counted as evenly distributed over the bucket.
         found.map(|(microseconds, count)| {
             let over = (seen as f64 - share * total as f64) / *count as f64;
             microseconds * 1000 + (1000.0 * (1.0 - over)) as u64
@@ -365,8 +366,8 @@ fn echo_link(arm: &str) {
     }
 }
 
-/// Round trips of a checked setpoint and state, in turns with those of bare messages of that size:
-/// read whole, as a message is that somebody wants, and with a glance at one number of it.
+/// Round trips of a checked setpoint and state, alternating with those of plain messages of that
+/// size: read as a whole, and with only one number read.
 fn ping(ratios: &mut Vec<(String, f64)>) {
     let rounds: Vec<[Vec<u64>; 3]> = (0..ROUNDS)
         .map(|number| {
@@ -453,8 +454,8 @@ fn trips(count: u64, mut trip: impl FnMut(u64)) -> Vec<u64> {
     times
 }
 
-/// How much faster than real time the whole chain runs in step with the simulated driver and with
-/// MuJoCo, beside what it shall be at least.
+/// How much faster than real time the whole chain runs in lock-step with the simulated driver and
+/// with MuJoCo, and the required minimum.
 fn lock_steps(ratios: &mut Vec<(String, f64)>) {
     let arm = arm("step");
     let driver = Peer::start("driver", &arm);
@@ -485,7 +486,8 @@ fn lock_steps(ratios: &mut Vec<(String, f64)>) {
     }
 }
 
-/// How much faster than real time `commands` of about a second run in step with the arm's driver.
+/// How much faster than real time `commands` of about a second run in lock-step with the arm's
+/// driver.
 fn lock_step(arm: &Arm, commands: u32) -> Option<f64> {
     let config = ExecutorConfig {
         clock: Clock::LockStep,

@@ -40,7 +40,7 @@ fn stations(path: &SplinePath<JOINTS>, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The path and the limits of this bench in copp's terms.
+/// The path and the limits of this benchmark in copp's types.
 fn robot(path: &SplinePath<JOINTS>, s: &[f64], jerk: bool) -> Robot<usize> {
     let n = s.len();
     let matrix = |k: usize| {

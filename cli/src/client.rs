@@ -13,18 +13,18 @@ use crate::failure::Failure;
 /// How long an engine may take to answer; it answers between two periods of its main loop.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// After this time an asking client is caught in damaged segments; longer than all that it waits
-/// for by itself.
+/// After this time a client that waits counts as blocked by damaged segments; longer than all its
+/// own time limits.
 pub(crate) const HANG: Duration = Duration::from_secs(15);
 
-/// How long a stop is waited for: a gentle one takes about a third of a second where the joints
-/// can.
+/// How long to wait for a stop: a gentle one takes about a third of a second if the joint limits
+/// allow it.
 const REST: Duration = Duration::from_secs(3);
 
 /// How often the engine is asked whether the arm rests.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// In which domain engine, driver and clients find each other.
+/// The domain in which engine, driver and clients find each other.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct DomainOption {
     /// Directory in which engine, driver and clients find each other, for this user only [default:
@@ -67,7 +67,7 @@ impl ArmOption {
     /// Asks the arm's engine and waits for the answer.
     ///
     /// # Errors
-    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
+    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's reason when it
     /// refuses.
     pub(crate) fn ask(&self, verb: Verb) -> Result<Answer, Failure> {
         let arm = self.open()?;
@@ -77,11 +77,12 @@ impl ArmOption {
         accepted(answer?)
     }
 
-    /// Asks something of the motion under way and waits until it acts; with `rest`, also until the
-    /// arm rests, but no longer than a stop takes. Says on standard output what was reached.
+    /// Sends a request about the current motion and waits until it acts; with `rest`, also until
+    /// the arm rests, but no longer than a stop takes. Prints the state that was reached on
+    /// standard output.
     ///
     /// # Errors
-    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's words when it
+    /// [`Exit::NoPeer`] when no engine answers, [`Exit::Refused`] with the engine's reason when it
     /// refuses.
     pub(crate) fn control(&self, ask: ControlAsk, rest: bool) -> Result<Exit, Failure> {
         let arm = self.open()?;
@@ -104,7 +105,7 @@ impl ArmOption {
         Ok(Exit::Done)
     }
 
-    /// Asks, prints the engine's words, if any, to standard error.
+    /// Asks, and prints the engine's message, if any, to standard error.
     ///
     /// # Errors
     /// As [`Self::ask`].

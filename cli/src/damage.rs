@@ -13,14 +13,14 @@ use signal_hook::consts::SIGBUS;
 
 use crate::exit::Exit;
 
-/// A signal that `signal_hook` has no name for, since one must not return from it.
+/// `signal_hook` has no name for this signal, since a handler must not return from it.
 const SIGSEGV: i32 = 11;
 
 /// What is said in a handler, made before.
 static MESSAGE: OnceLock<String> = OnceLock::new();
 
-/// From now on a crash inside shared memory is told in words, with the exit code of a missing
-/// engine.
+/// From now on a crash inside shared memory is reported with a message and the exit code of a
+/// missing engine.
 pub(crate) fn watch(domain: &Domain) {
     static WATCHED: AtomicBool = AtomicBool::new(false);
     if WATCHED.swap(true, Ordering::Relaxed) {
@@ -51,15 +51,15 @@ fn tell_and_end() {
     signal_hook::low_level::exit(Exit::NoPeer as i32);
 }
 
-/// Says what [`watch`] has prepared, if it has; nothing here allocates or locks.
+/// Prints the text that [`watch`] has prepared, if any; nothing here allocates or locks.
 pub(crate) fn tell() {
     if let Some(message) = MESSAGE.get() {
-        // Nobody is left to hear of a closed standard error.
+        // A closed standard error cannot be reported.
         let _ = rustix::io::write(std::io::stderr().as_fd(), message.as_bytes());
     }
 }
 
-/// Does what damaged segments may let hang; after `patience` the process says so and ends.
+/// Does work that damaged segments may block; after `patience` the process reports it and ends.
 pub(crate) fn bounded<T>(patience: Duration, what: impl FnOnce() -> T) -> T {
     let (done, ended) = channel::<()>();
     thread::spawn(move || {

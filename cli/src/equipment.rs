@@ -5,7 +5,7 @@ use plan::world::{Class, Model, pointing_down};
 use planner::end_effector::{EndEffector, Gripper, ToolChanger};
 use planner::robot::Robot;
 
-/// Opening and closing time of a gripper or tool changer that the world says nothing about (s).
+/// Opening and closing time of a gripper or tool changer if the world has none (s).
 const NOMINAL_S: f64 = 0.2;
 
 /// Gives the robot the end effectors of the world, and the places where they are kept.
@@ -29,8 +29,8 @@ pub(crate) fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanEr
         if on_arm {
             robot.mounted = Some(robot.end_effectors.len());
         }
-        // The engine knows a holder as the place of one end effector; the one on the arm gets a
-        // place that is free.
+        // In the engine a holder belongs to one end effector; the one on the arm gets a free
+        // holder.
         let workstation_from_holder = if on_arm {
             free.pop()
         } else {

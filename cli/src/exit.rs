@@ -2,7 +2,7 @@ use std::process::ExitCode;
 
 /// How a command of `canter` ends, as its process exit code.
 ///
-/// The numbers are a contract with scripts and never change their meaning.
+/// Scripts rely on the numbers: their meaning never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Exit {
@@ -10,7 +10,7 @@ pub(crate) enum Exit {
     Done = 0,
     /// The program has findings, or a command of it was refused before any motion.
     Refused = 1,
-    /// The arguments make no sense.
+    /// The arguments are wrong.
     Usage = 2,
     /// A file cannot be read, parsed or written, or a robot cannot be loaded.
     Unreadable = 3,

@@ -5,7 +5,7 @@ use ipc::IpcError;
 use crate::exit::Exit;
 use crate::printer::Printer;
 
-/// Why a command could not do its work: the exit code and the chain of causes.
+/// Why a command failed: the exit code and the chain of causes.
 #[derive(Debug)]
 pub(crate) struct Failure {
     exit: Exit,
@@ -23,7 +23,7 @@ impl Failure {
 
     /// Writes `canter: error: cause: cause of the cause` to standard error and gives the exit code.
     ///
-    /// A reader of our answer that has gone away (`canter robots list | head -1`) is no failure.
+    /// A closed standard output (`canter robots list | head -1`) is not a failure.
     pub(crate) fn report(&self, printer: &Printer) -> Exit {
         if let Some(error) = self.cause.downcast_ref::<io::Error>()
             && error.kind() == io::ErrorKind::BrokenPipe
@@ -55,7 +55,7 @@ fn chain(cause: &anyhow::Error) -> String {
     text
 }
 
-/// Writing the answer or a file failed; everything else names its exit code itself.
+/// Writing the result or a file failed; every other failure has its own exit code.
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         let named = error
@@ -81,7 +81,7 @@ impl From<IpcError> for Failure {
     }
 }
 
-/// A named file that cannot be written: no mistake of ours.
+/// A named file that cannot be written: not an internal error.
 #[derive(Debug)]
 pub(crate) struct Unwritable(pub(crate) String);
 

@@ -28,7 +28,8 @@ pub(crate) struct HostOptions {
     /// Python that runs the MuJoCo driver
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: String,
-    /// Go in step with the driver instead of by the clock: faster, and the same every time
+    /// Run in lock-step with the driver instead of by the clock: faster, with the same result every
+    /// time
     #[arg(long)]
     lock_step: bool,
 }
@@ -62,9 +63,9 @@ pub(crate) enum DriverChoice {
 /// What happens when a command cannot be executed.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum OnRefusal {
-    /// Stop and forget the rest of the program.
+    /// Stop and drop the rest of the program.
     Abort,
-    /// The command has no effect; go on with the next.
+    /// The command has no effect; continue with the next.
     Skip,
     /// Stop and wait for the operator.
     Hold,
@@ -81,7 +82,7 @@ impl From<OnRefusal> for FailurePolicy {
 }
 
 impl HostOptions {
-    /// Starts driver (if it is ours) and session, opens the channels for clients.
+    /// Starts the driver (unless it is external) and the session, opens the channels for clients.
     ///
     /// # Errors
     /// [`Exit::NoPeer`] without a driver or with another engine on the arm; the driver that was
@@ -124,7 +125,7 @@ impl HostOptions {
     }
 }
 
-/// A fault of the session's start with its exit code.
+/// An error at the start of the session with its exit code.
 fn failure(error: SessionError) -> Failure {
     let exit = match &error {
         SessionError::Robot(_) => Exit::Unreadable,

@@ -10,8 +10,8 @@ use anyhow::{Context, anyhow};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// Largest file that is read into memory as one piece, bytes. A program of a million poses has a
-/// third of it.
+/// Largest file that is read into memory at once, bytes. A program of a million poses has a third
+/// of it.
 const LARGEST: u64 = 256 << 20;
 
 /// Longest line of a table, bytes. Without it a file without line ends would fill the memory.
@@ -68,7 +68,7 @@ pub(crate) fn unreadable<T>(path: &str, result: anyhow::Result<T>) -> Result<T, 
 }
 
 /// Refuses what is not a regular file: opening a pipe would wait for a writer, and a device may
-/// never end. A missing file is left to who opens it.
+/// never end. A missing file is reported when it is opened.
 ///
 /// # Errors
 /// Expected and found, and what to do.
@@ -103,7 +103,7 @@ fn source(path: &str) -> anyhow::Result<Box<dyn Read>> {
     Ok(Box::new(File::open(path)?))
 }
 
-/// Gives what its source gives until a line is too long.
+/// Passes its source through until a line is too long.
 struct ShortLines<R> {
     source: R,
     /// Bytes since the last end of a line.

@@ -48,9 +48,9 @@ use crate::printer::Printer;
 
 /// Executes canonical robot commands: check, plan, run.
 ///
-/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read, parse
-/// or write a file; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard;
-/// 7 driver fault or lost; 8 done, but nobody read the output; 70 internal error.
+/// Exit codes: 0 done; 1 the program has findings or was refused; 2 usage; 3 cannot read, parse or
+/// write a file; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard; 7
+/// driver fault or driver lost; 8 done, but some output was lost; 70 internal error.
 #[derive(Debug, Parser)]
 #[command(name = "canter", version, max_term_width = 100)]
 struct Arguments {
@@ -67,7 +67,7 @@ pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => {
-            // A closed terminal is no reason to fail in another way.
+            // A closed terminal must not change the exit code.
             let _ = message.print();
             let exit = if message.use_stderr() {
                 Exit::Usage
@@ -81,7 +81,7 @@ pub fn main() -> ExitCode {
     let exit = match ran {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => failure.report(&printer),
-        // The panic hook has told where; a panic is our mistake, whatever the input was.
+        // The panic hook has printed where; a panic is an internal error, whatever the input was.
         Err(_) => {
             damage::tell();
             Exit::Internal

@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// Joint positions that the reach is sampled from.
+/// Number of joint positions from which the reach is sampled.
 const REACH_SAMPLES: u32 = 20_000;
 
-/// Where the controlled point is at home, how well it moves there, and where it can go.
+/// The controlled point at home, how well it can move there, and its reach.
 pub(crate) struct Mobility {
     /// Pose of the controlled point in the workstation at home.
     pub(crate) home: Isometry3<f64>,
@@ -22,7 +22,7 @@ pub(crate) struct Mobility {
     reach: ReachMap,
 }
 
-/// Looks at a robot of `N` joints with what it has mounted.
+/// Computes the mobility of a robot of `N` joints with its mounted end effector.
 ///
 /// # Errors
 /// The robot's description is at fault.

@@ -18,7 +18,7 @@ use crate::progress::Progress;
 use crate::recording::Recording;
 use crate::signals::SignalThread;
 
-/// How long the driver may take to agree to go on after a fault.
+/// Time limit for a new session with the driver after a fault.
 const RECOVERY: Duration = Duration::from_secs(5);
 
 /// An engine with its driver, its clients and the signals of the operator.
@@ -57,7 +57,7 @@ impl MovingArm {
         })
     }
 
-    /// How a process ends whose arm had a fault, if it had one.
+    /// The exit code after a fault of the arm, if there was one.
     pub(crate) fn blame(&self) -> Option<Exit> {
         self.blame
     }
@@ -65,7 +65,7 @@ impl MovingArm {
     /// Has commands executed and waits for the last.
     ///
     /// # Errors
-    /// [`MotionFailure`], with `stopped` when the operator wanted it.
+    /// [`MotionFailure`], with `stopped` if the operator stopped the motion.
     fn execute_all(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure> {
         if self.signals.count() > 0 {
             return Err(MotionFailure::stopped());
@@ -100,7 +100,7 @@ impl MovingArm {
         }
     }
 
-    /// Learns of a fault that came between two executions.
+    /// Reads a fault that came between two executions.
     fn read_blame(&mut self) {
         while let Ok(Some(note)) = self.turn() {
             if let Note::Faulted { blame, .. } = note {
@@ -129,7 +129,7 @@ impl MovingArm {
         false
     }
 
-    /// Serves clients and signals, keeps the recording, gives the next thing that happened.
+    /// Serves clients and signals, keeps the recording, returns the next note.
     fn turn(&mut self) -> Result<Option<Note>, MotionFailure> {
         let lost = |error: String| MotionFailure::new(0, error);
         let note = self.host.turn().map_err(|error| lost(error.to_string()))?;
@@ -143,13 +143,14 @@ impl MovingArm {
         Ok(note)
     }
 
-    /// Ends engine and driver, and the file of samples; how far (m) the arm was off its path at
-    /// most.
+    /// Ends engine and driver, and the file of samples; returns the largest distance (m) of the arm
+    /// from its path.
     ///
     /// # Errors
     /// The file cannot be written.
     pub(crate) fn finish(mut self) -> io::Result<f64> {
-        // The sample of a period is complete when the next state came: the last ones are still out.
+        // The sample of a period is complete when the next state arrives: the last ones are still
+        // missing.
         self.host.session.close();
         self.recording.take(&self.host.session.samples())?;
         let worst = self.recording.worst();

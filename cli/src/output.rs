@@ -19,7 +19,7 @@ pub(crate) fn json_to(out: &mut impl Write, value: &impl Serialize) -> io::Resul
     writeln!(out)
 }
 
-/// Writes a line to standard error; nobody is left to be told when that fails.
+/// Writes a line to standard error; a failure to do so cannot be reported.
 pub(crate) fn note(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }

@@ -18,7 +18,7 @@ pub(crate) fn is_pddl(source: &str) -> bool {
             .is_some_and(|(time, _)| time.trim().parse::<f64>().is_ok())
 }
 
-/// What PDDL actions mean: by the table in this file where it knows them, else by our own.
+/// The table of PDDL actions: those in this file first, then the built-in ones.
 ///
 /// # Errors
 /// The file cannot be read, or is no table.

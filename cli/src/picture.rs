@@ -3,7 +3,7 @@ use planner::robot::Robot;
 
 use crate::plot::{Drawing, PlotRow, Span, Target};
 
-/// How many states the curves are drawn through: two a pixel.
+/// Number of states of the curves: two per pixel.
 const STATES: f64 = 1500.0;
 
 /// A planned program as a drawing.

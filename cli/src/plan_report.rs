@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::output;
 
-/// The report of a run. The names are part of the contract with scripts.
+/// The report of a run. Scripts rely on the names.
 #[derive(Debug, Serialize)]
 pub(crate) struct PlanReport {
     /// `stopped` at the end of the plan, `failed`, or `interrupted` by the operator.
@@ -60,7 +60,8 @@ impl PlanReport {
         self.outcome
     }
 
-    /// Writes the report, as JSON or for people; `off_path` is how far (m) the arm was off its path.
+    /// Writes the report, as JSON or as text; `off_path` is the largest distance (m) of the arm
+    /// from its path.
     ///
     /// # Errors
     /// The sink cannot be written.

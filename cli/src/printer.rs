@@ -13,12 +13,11 @@ const CLEAR: &[u8] = b"\r\x1b[2K";
 /// How long the last lines wait for a reader that takes nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Standard output and standard error of a process that moves an arm: what is printed is never
-/// waited for.
+/// Standard output and standard error of a process that moves an arm: printing never waits.
 ///
 /// Each stream has a bounded queue and a thread that writes. What does not fit, or cannot be
-/// written, is dropped and counted; the count is told in the stream as soon as it is read again,
-/// and by [`Printer::finish`].
+/// written, is dropped and counted; the count is printed in the stream as soon as it is read again,
+/// and returned by [`Printer::finish`].
 #[derive(Clone, Debug)]
 pub(crate) struct Printer {
     out: Arc<Stream>,
@@ -52,7 +51,7 @@ struct Queue {
     dropped: u64,
     told: u64,
     json: bool,
-    /// A line that changes stands at the bottom of the terminal.
+    /// The bottom of the terminal shows a line that changes.
     clears: bool,
 }
 
@@ -72,12 +71,12 @@ impl Printer {
         }
     }
 
-    /// Standard output is JSON, one object a line: so is the word about dropped lines.
+    /// Standard output is JSON, one object per line; the message about dropped lines is JSON too.
     pub(crate) fn expect_json(&self) {
         self.out.lock().json = true;
     }
 
-    /// A line that changes is shown at the bottom of the terminal: other lines clear it first.
+    /// The bottom of the terminal shows a line that changes: other lines clear it first.
     pub(crate) fn clear_before_lines(&self) {
         self.out.lock().clears = io::stdout().is_terminal();
         self.err.lock().clears = io::stderr().is_terminal();
@@ -98,7 +97,7 @@ impl Printer {
         self.err.push(format!("{text}\n").into_bytes());
     }
 
-    /// What a terminal shows for a moment: dropped without a word where something waits.
+    /// A temporary line of a terminal: dropped without a message if other lines wait.
     pub(crate) fn show(&self, text: &str) {
         let mut queue = self.err.lock();
         if queue.waiting.is_empty() && !queue.writing {
@@ -106,8 +105,8 @@ impl Printer {
         }
     }
 
-    /// Waits for the readers as long as they read. Gives the number of lines that standard output
-    /// lost, and says so on standard error.
+    /// Waits for the readers as long as they read. Returns the number of lines that standard output
+    /// lost, and prints it on standard error.
     pub(crate) fn finish(&self) -> u64 {
         let lost = self.out.drain();
         if lost > 0 {
@@ -121,7 +120,7 @@ impl Printer {
     }
 }
 
-/// Log lines go the same way.
+/// Log lines are printed in the same way.
 impl Write for Printer {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.err.push(bytes.to_vec());
@@ -234,7 +233,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Waits while the reader reads; gives how many lines were lost in all.
+    /// Waits while the reader reads; returns how many lines were lost in all.
     fn drain(&self) -> u64 {
         let mut queue = self.lock();
         let mut seen = (queue.written, Instant::now());
@@ -264,6 +263,6 @@ fn word_about(dropped: u64, json: bool) -> String {
     if json {
         format!("{{\"event\":\"dropped\",\"lines\":{dropped}}}\n")
     } else {
-        format!("dropped  {dropped} lines that nobody read\n")
+        format!("dropped  {dropped} lines that were not read\n")
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct ProgramArgument {
     /// Refuse the extensions of the language
     #[arg(long)]
     strict: bool,
-    /// Form of the program; JSON is recognised by itself unless told
+    /// Form of the program; without this option JSON is recognised by its first character
     #[arg(long, value_enum, default_value_t = Form::Auto)]
     form: Form,
     /// Unit of length until the program sets one
@@ -43,7 +43,7 @@ enum Form {
 enum Length {
     /// The language's own default.
     Mm,
-    /// For programs that were written in metres without saying so.
+    /// For programs in metres without SetLengthUnits.
     Meter,
     /// Inch.
     Inch,
@@ -59,7 +59,7 @@ impl From<Length> for LengthUnit {
     }
 }
 
-/// A program that was read, with all that is to be said about it so far.
+/// A program that was read, with all findings so far.
 pub(crate) struct ProgramFile {
     source: Source,
     reading: Reading,
@@ -71,7 +71,7 @@ impl ProgramArgument {
     /// Reads and checks the program as far as that needs no robot.
     ///
     /// # Errors
-    /// [`Exit::Unreadable`] when the file cannot be read; faults of the program are findings.
+    /// [`Exit::Unreadable`] when the file cannot be read; errors of the program are findings.
     pub(crate) fn read(&self) -> Result<ProgramFile, Failure> {
         let bytes = input::bytes(&self.path)?;
         let name = if self.path == "-" {
@@ -98,7 +98,7 @@ impl ProgramArgument {
         };
         let mut reading = read(&bytes, &options);
         let default_length = self.default_length.into();
-        // What comes after a fault of form may only be its consequence.
+        // Errors after a syntax error may be its consequences.
         if !reading.findings.iter().any(is_unreadable) {
             let options = CheckOptions {
                 strict: self.strict,
@@ -192,8 +192,8 @@ impl ProgramFile {
             .map_err(|error| Failure::new(Exit::Unreadable, error))
     }
 
-    /// Adds what a robot has against the program. A command that has an error already is not
-    /// mentioned again, and wrong order only where nothing else explains it.
+    /// Adds the errors of the program with a robot. A command that already has an error is not
+    /// reported again; wrong order is reported only if no other error explains it.
     pub(crate) fn add_refusals(&mut self, refusals: &[Refusal]) {
         let explained = self.reading.has_errors();
         let findings = &mut self.reading.findings;
@@ -226,7 +226,7 @@ impl ProgramFile {
     pub(crate) fn report(&self) {
         if !self.reading.findings.is_empty() {
             let look = look(io::stderr().is_terminal());
-            // Nobody is left to be told when standard error is closed.
+            // A closed standard error cannot be reported.
             let _ = write!(io::stderr(), "{}", self.shown(look));
         }
     }
@@ -268,7 +268,7 @@ fn finding(refusal: &Refusal) -> Finding {
     }
 }
 
-/// Whether a finding says that the form of the program is broken, not what it asks for.
+/// Whether a finding is a syntax error.
 fn is_unreadable(finding: &Finding) -> bool {
     const FORM: [&str; 23] = [
         code::BINARY,

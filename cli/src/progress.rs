@@ -7,14 +7,14 @@ use crate::printer::Printer;
 /// How often the line changes.
 const REFRESH: Duration = Duration::from_millis(100);
 
-/// Begins the line anew: to its start, no wrapping, clear.
+/// Starts the line again: to its start, no wrapping, clear.
 const BEGIN: &str = "\r\x1b[?7l\x1b[2K";
 
 /// Ends it: wrapping again.
 const END: &str = "\x1b[?7h";
 
-/// One line at the bottom of a terminal that says what the arm is doing. A terminal that takes
-/// nothing is not waited for.
+/// One line at the bottom of a terminal that shows what the arm is doing. It does not wait for the
+/// terminal.
 pub(crate) struct Progress {
     printer: Option<Printer>,
     shown: Option<Instant>,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::samples::{SampleRow, SampleWriter};
 
-/// What was published and measured: written to a file if there is one, and summed up.
+/// Records what was published and measured: writes it to a file if there is one, and summarises it.
 pub(crate) struct Recording<W: Write> {
     writer: Option<SampleWriter<W>>,
     period: f64,
@@ -17,7 +17,7 @@ pub(crate) struct Recording<W: Write> {
     command: u32,
 }
 
-/// How many published points the measured one is held against: the arm is behind by less.
+/// Number of published points that the measured one is compared with: the arm is behind by less.
 const BEHIND: usize = 100;
 
 impl<W: Write> Recording<W> {
@@ -54,7 +54,7 @@ impl<W: Write> Recording<W> {
             let first = *self.first.get_or_insert(sample.tick);
             self.last = sample.tick;
             self.hold_against_path(sample);
-            // The instant at which a command begins belongs to the one that ends there.
+            // The time at which a command begins belongs to the one that ends there.
             if sample.path_time > 0.0 {
                 self.command = sample.command;
             }
@@ -76,7 +76,7 @@ impl<W: Write> Recording<W> {
         Ok(())
     }
 
-    /// How far the measured point is from the way that was published lately: off the path, not
+    /// Distance of the measured point from the path that was published recently: off the path, not
     /// behind on it.
     fn hold_against_path(&mut self, sample: &RunSample) {
         self.path
@@ -105,7 +105,7 @@ impl<W: Write> Recording<W> {
             .map_or(0.0, |first| (self.last - first) as f64 * self.period)
     }
 
-    /// Largest distance of the measured controlled point from the published way, m.
+    /// Largest distance of the measured controlled point from the published path, m.
     pub(crate) fn worst(&self) -> f64 {
         self.worst
     }

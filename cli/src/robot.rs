@@ -30,13 +30,13 @@ impl RobotOption {
 /// Loads a robot by shipped name or folder.
 ///
 /// # Errors
-/// [`Exit::Unreadable`] with the fault of its files.
+/// [`Exit::Unreadable`] with the error in its files.
 pub(crate) fn load(name: &str) -> Result<Robot, Failure> {
     planner::robot::load(name).map_err(|error| Failure::new(Exit::Unreadable, error))
 }
 
 /// Calls a function generic over the joint count, `name::<N>(arguments)`, with `N` chosen at run
-/// time; gives an internal failure for a count that no robot may have.
+/// time; returns an internal failure for a count that no robot may have.
 macro_rules! with_joints {
     ($dof:expr, $name:ident($($argument:expr),*)) => {
         match $dof {

@@ -16,11 +16,11 @@ use crate::printer::Printer;
 /// How long the rest of the process may take to end after a second signal.
 const LAST_PATIENCE: Duration = Duration::from_secs(4);
 
-/// The thread that obeys SIGINT, SIGTERM and SIGHUP. It does nothing else, so that they act at
+/// The thread that handles SIGINT, SIGTERM and SIGHUP. It does nothing else, so that they act at
 /// once whatever the process is doing.
 ///
-/// The first signal stops the arm on the path, the second as fast as the joints can. Where nothing
-/// moves yet, or any more, a signal ends the process.
+/// The first signal stops the arm on the path, the second as fast as the joints can. If nothing
+/// moves, a signal ends the process.
 #[derive(Debug)]
 pub(crate) struct SignalThread {
     shared: Arc<Shared>,
@@ -64,7 +64,7 @@ impl SignalThread {
         self.shared.set(None);
     }
 
-    /// How many signals came; the arm was told before they were counted.
+    /// Number of signals; the order to the arm is given before a signal is counted.
     pub(crate) fn count(&self) -> usize {
         self.shared.count.load(Ordering::Acquire)
     }
@@ -95,7 +95,7 @@ impl Shared {
             printer.note(&format!("canter: stopping on the path; {word}"));
         }
         if before == 1 {
-            // Whatever the process waits for, it ends; the arm rests by then.
+            // Ends the process whatever it waits for; the arm rests by then.
             let last = Builder::new().spawn(|| {
                 sleep(LAST_PATIENCE);
                 exit(Exit::Stopped as i32);

@@ -26,18 +26,18 @@ pub(crate) enum Kind<'a> {
     },
 }
 
-/// A simulated driver as a process of our own, ended when this is dropped.
+/// A simulated driver as a child process, ended when this is dropped.
 ///
-/// It is in a process group of its own, so that Ctrl-C reaches the engine only, which then stops
-/// the arm with the driver's help. If we die, the end of its standard input tells it.
+/// It is in a separate process group, so that Ctrl-C reaches only the engine, which then stops the
+/// arm through the driver. If this process dies, the driver notices the end of its standard input.
 #[derive(Debug)]
 pub(crate) struct Simulation {
     child: Child,
 }
 
 impl Simulation {
-    /// Starts `canter driver sim` or `canter driver mujoco` for an arm and waits for it: a Python
-    /// takes its time or ends without its packages, and another driver may have the arm.
+    /// Starts `canter driver sim` or `canter driver mujoco` for an arm and waits for it: Python
+    /// starts slowly or ends if packages are missing, and another driver may have the arm.
     ///
     /// # Errors
     /// [`Exit::NoPeer`] when the process cannot be started or ends at once.
@@ -77,7 +77,7 @@ impl Simulation {
         if read.is_ok_and(|length| length > 0) {
             return Ok(());
         }
-        // It has said on standard error why.
+        // It has printed the reason on standard error.
         Err(Failure::new(
             Exit::NoPeer,
             anyhow!("the simulated driver did not start"),
@@ -85,8 +85,8 @@ impl Simulation {
     }
 
     fn end(&mut self) {
-        // A byte asks for an end now; the end of the input alone would leave the driver time to
-        // stop the arm by itself. One that is gone already needs neither.
+        // A byte asks the driver to end now; after the end of the input alone, the driver would
+        // first wait and stop the arm by itself. A driver that has ended needs neither.
         if let Some(mut input) = self.child.stdin.take() {
             let _ = input.write_all(b"q");
         }

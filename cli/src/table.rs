@@ -16,7 +16,8 @@ pub(crate) struct CsvRow {
 /// header and left out. Every row has one finite number for each of the `columns`.
 ///
 /// # Errors
-/// [`Exit::Unreadable`](crate::exit::Exit::Unreadable), with the line, the column, what was expected and what came.
+/// [`Exit::Unreadable`](crate::exit::Exit::Unreadable), with the line, the column, what was
+/// expected and what was found.
 pub(crate) fn read(path: &str, columns: &[&str]) -> Result<Vec<CsvRow>, Failure> {
     let source = input::lines(path)?;
     input::unreadable(path, parse(source, columns))

@@ -44,7 +44,7 @@ pub(crate) fn is_workstation_file(path: &Path) -> bool {
     importer(path).is_some()
 }
 
-/// What an error of a world or a plan means for the process.
+/// The exit code for an error of a world or a plan.
 pub(crate) fn refused(error: PlanError) -> Failure {
     let exit = match error {
         PlanError::Database(_)
@@ -66,8 +66,8 @@ pub(crate) struct Database {
 }
 
 impl Database {
-    /// The database itself, or where `copy` is wanted or `world` is a file, a copy: in the new file
-    /// `keep`, or in one that goes away. The last run of a database is copied as well.
+    /// The database itself, or a copy if `copy` is wanted or `world` is a file: in the new file
+    /// `keep`, or in a temporary one. The last run of a database is copied as well.
     ///
     /// # Errors
     /// [`Exit::Unreadable`]: no such world, or a file of the name `keep` exists. [`Exit::Refused`]:

@@ -23,7 +23,7 @@ pub struct CheckOptions {
 /// - gripper commands without a tool, a tool change with a closed gripper;
 /// - a program that was probably written in metres and is read in millimetres.
 ///
-/// What needs a robot (reach, maximum speed, collisions) is not looked at.
+/// What needs a robot (reach, maximum speed) is not checked.
 ///
 /// ```
 /// use crcl::{CheckOptions, ReadOptions, check, code, text};
@@ -84,7 +84,7 @@ impl Refused<'_> {
                 finding
                     .expected("`InitCanon ()` or the end of the program")
                     .found(format!("`{name}`"))
-                    .help("move EndCanon to the end, or begin anew with `InitCanon ()`")
+                    .help("move EndCanon to the end, or start again with `InitCanon ()`")
                     .note(end, "the program ends here")
             }
         }
@@ -167,7 +167,7 @@ fn judged(strict: bool, code: &'static str, span: Range<usize>, message: &str) -
     }
 }
 
-/// Finds moves that speed or acceleration zero makes impossible; one finding a setting.
+/// Finds moves that speed or acceleration zero makes impossible; one finding per setting.
 fn standstill(commands: &[Located]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let (mut speed, mut acceleration): (Option<&Located>, Option<&Located>) = (None, None);
@@ -203,7 +203,7 @@ fn no_move(located: &Located, quantity: &str, set: &Located) -> Finding {
         )
 }
 
-/// Follows tool changer and gripper as far as the program itself tells their states.
+/// Follows tool changer and gripper as far as the program determines their states.
 fn tools(commands: &[Located]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let (mut released, mut closed): (Option<&Located>, Option<&Located>) = (None, None);
@@ -242,7 +242,7 @@ fn still_closed(located: &Located, closed: &Located) -> Finding {
 /// Finds a program whose points are all so near to each other and to the origin that they are
 /// metres rather than the default millimetres.
 fn metres(commands: &[Located], default_length: LengthUnit) -> Option<Finding> {
-    /// Widest spread (mm) and distance from the origin (mm) that raise the doubt.
+    /// Largest spread (mm) and distance from the origin (mm) that cause the warning.
     const SPREAD: f64 = 5.0;
     const DISTANCE: f64 = 10.0;
     let moves = default_moves(commands);

@@ -9,8 +9,8 @@ use crate::value::{self, ValueError};
 
 /// One command, in raw numbers of the program.
 ///
-/// Lengths, speeds, accelerations and angles are in the units that are in force when the command
-/// is executed; nothing here is converted.
+/// Lengths, speeds, accelerations and angles are in the units that apply when the command is
+/// executed; nothing here is converted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "command", deny_unknown_fields)]
 pub enum Command {
@@ -130,7 +130,7 @@ pub enum Command {
 /// The longest time that a command accepts, s: eleven days.
 pub const LONGEST_S: f64 = 1e6;
 
-/// What an argument means; decides its type, its range and how it is written.
+/// The kind of an argument, which decides its type, its range and how it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ArgumentKind {
     /// A whole number not below zero: why the program ends.
@@ -517,8 +517,8 @@ impl Command {
             .is_some_and(|a| moves.contains(&a.kind))
     }
 
-    /// Checks every value of the command that can be judged without settings and robot: the rule
-    /// that the parser applies, for commands that were made in memory or came over a wire.
+    /// Checks every value of the command that can be checked without settings and robot, by the
+    /// rules of the parser: for commands that were made in memory or received.
     ///
     /// # Errors
     /// The first value that is out of range.
@@ -552,7 +552,7 @@ impl Command {
         }
     }
 
-    /// The name and the value of the argument: the way back from a command to the table.
+    /// The name and the value of the argument: from a command back to the table.
     pub(crate) fn parts(&self) -> (&'static str, Value) {
         match self {
             Self::InitCanon => ("InitCanon", Value::None),

@@ -25,9 +25,9 @@ pub struct Note {
     pub text: String,
 }
 
-/// One fault or doubt about a program: what is wrong, where, and what would put it right.
+/// One error or warning about a program: what is wrong, where, and how to correct it.
 ///
-/// The crate's `render` shows findings for people and for machines.
+/// `render` shows findings as text, `records` as JSON.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// Error or warning.

@@ -48,7 +48,7 @@ pub fn schema() -> serde_json::Value {
     schemars::schema_for!(Document).into()
 }
 
-/// Writes a program in JSON form, one command a line.
+/// Writes a program in JSON form, one command per line.
 ///
 /// Reading it again gives the same commands, provided that all numbers are finite; others become
 /// `null`, which is refused by the reader.
@@ -506,7 +506,7 @@ fn find<'a>(fields: &[Field<'a>], name: &str) -> Option<&'a RawValue> {
         .map(|field| field.value)
 }
 
-/// A JSON value in words, for "what came".
+/// A description of a JSON value, for "found".
 fn describe(raw: &RawValue) -> String {
     let written = raw.get();
     match written.chars().next() {

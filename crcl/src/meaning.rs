@@ -514,7 +514,7 @@ fn shape(node: &Node, source: &str) -> Shape {
     }
 }
 
-/// A value in words, for "what came".
+/// A description of a value, for "found".
 fn describe(node: &Node, source: &str) -> String {
     let written = || clip(source.get(node.span.clone()).unwrap_or_default());
     match (&node.value, shape(node, source)) {

@@ -27,7 +27,7 @@ pub(crate) struct Call {
 pub(crate) enum State {
     /// As it should be.
     Sound,
-    /// A fault was reported, but what is meant is clear enough to look for more.
+    /// An error was reported, but the meaning is clear enough to continue.
     Mended,
     /// Beyond use.
     Broken,
@@ -123,7 +123,7 @@ impl<'a, 'f> Parser<'a, 'f> {
         })
     }
 
-    /// Reports what stands where a command should begin, and goes on to the next command.
+    /// Reports text where a command should begin, and continues with the next command.
     fn not_a_call(&mut self, token: Token) {
         self.bump();
         match token.kind {
@@ -467,7 +467,7 @@ impl<'a, 'f> Parser<'a, 'f> {
             Err((range, help)) => {
                 let start = span.start + 1;
                 let escape = format!(
-                    "`{}` is no escape",
+                    "`{}` is not an escape sequence",
                     self.text(start + range.start..start + range.end)
                 );
                 let at = start + range.start..start + range.end;

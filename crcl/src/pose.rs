@@ -13,15 +13,15 @@ use crate::value::{ValueError, finite, within};
 pub const ORTHOGONALITY: f64 = 1e-7;
 
 /// The largest coordinate that is accepted, in length units of the program. No arm reaches a
-/// thousandth of it, and its square is far from the largest number.
+/// thousandth of it, and its square does not overflow.
 pub const LARGEST_COORDINATE: f64 = 1e9;
 
 /// The largest roll, pitch or yaw that is accepted, in angle units of the program. The digits of a
-/// larger number no longer say where in a turn it is.
+/// larger number no longer determine the angle within a turn.
 pub const LARGEST_ANGLE: f64 = 1e6;
 
-/// Where the controlled point is to be and how it is turned, in raw numbers of the program: the
-/// length and angle units in force when the command is executed give them their meaning.
+/// Position and orientation of the controlled point, in raw numbers of the program: the length and
+/// angle units are those that apply when the command is executed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
 pub enum Pose {
@@ -70,7 +70,7 @@ impl Pose {
         }
     }
 
-    /// Everything about the pose that cannot be meant, with the part it is in.
+    /// All errors of the pose, with the part that each is in.
     pub fn faults(&self) -> Vec<(PosePart, ValueError)> {
         let mut faults = Vec::new();
         let mut keep = |part, result: Result<(), ValueError>| {

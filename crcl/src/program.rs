@@ -72,7 +72,7 @@ pub struct Reading {
     /// it is well formed, and the executor refuses it again when its turn comes. A command that
     /// is not well formed is not.
     pub program: Program,
-    /// What is wrong or doubtful, in the order of the source.
+    /// Errors and warnings, in the order of the source.
     pub findings: Vec<Finding>,
     /// How many findings were not kept.
     pub omitted: Omitted,

@@ -148,7 +148,7 @@ fn draw(report: &FindingsReport, theme: GraphicalTheme, width: usize, shown: &mu
         .with_links(false)
         .with_width(width);
     if handler.render_report(shown, report).is_err() {
-        // Only a label outside the source can bring this about; the finding is not lost.
+        // Only a label outside the source can cause this; the finding is not lost.
         *shown += &plain(report);
     }
 }

@@ -24,14 +24,14 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("SetEndEffector", "here it is OpenGripper and CloseGripper"),
     (
         "StartObjectScan",
-        "scanning for objects is no part of the language here",
+        "scanning for objects is not part of the language here",
     ),
     (
         "StopObjectScan",
-        "scanning for objects is no part of the language here",
+        "scanning for objects is not part of the language here",
     ),
     ("ActuateJoints", "the language does not move single joints"),
-    ("MoveScrew", "screw moves are no part of the language"),
+    ("MoveScrew", "screw moves are not part of the language"),
     (
         "SetRotSpeed",
         "rotation follows the speed of the controlled point",

@@ -89,7 +89,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<&str, Box<Finding>> {
     })
 }
 
-/// Writes a program in text form, one command a line, longer lists over several lines.
+/// Writes a program in text form, one command per line, longer lists over several lines.
 ///
 /// Reading it again gives the same commands, provided that all numbers are finite.
 ///

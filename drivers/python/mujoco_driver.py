@@ -17,7 +17,7 @@ try:
 except ImportError as error:
     sys.exit(f"{error}; {sys.executable} -m pip install mujoco iceoryx2==0.9.3")
 
-# Below this acceleration towards a resting setpoint (rad/s2) the arm is at it.
+# Below this acceleration (rad/s2) the arm counts as being at a setpoint at rest.
 REST = 1e-9
 
 LISTS = {
@@ -39,7 +39,7 @@ class Physics(Robot):
         self.model = model = model_of(text)
         self.data = mujoco.MjData(model)
         self.joints = joints or [model.joint(i).name for i in range(model.njnt)]
-        # Places of the arm's joints; other joints of the model, such as fingers, stay put.
+        # Indexes of the arm's joints; other joints of the model, such as fingers, do not move.
         at = self.at = [int(model.joint(name).qposadr[0]) for name in self.joints]
         n = len(at)
         lists = {name: values for name, values in (lists or {}).items() if values}
@@ -59,7 +59,7 @@ class Physics(Robot):
         self.acceleration = lists.get("acceleration", [10.0] * n)
         self.jerk = lists.get("jerk", [100.0] * n)
         self.frequency, self.period = frequency, 0.0
-        # What all joints of the model shall be at; the arm's change.
+        # Reference of all joints of the model; only those of the arm change.
         self.wanted = [self.data.qpos.tolist(), [0.0] * model.nv, [0.0] * model.nv]
         # Views of MuJoCo's own memory.
         self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
@@ -90,12 +90,12 @@ class Physics(Robot):
             for p, v, a, q, dq in zip(*wanted, self.qpos.tolist(), self.qvel.tolist())
         ]
         if max(wish) < REST and min(wish) > -REST and not any(wanted[1]):
-            # What fades for ever becomes numbers too small to be calculated with quickly.
+            # Decaying values would become denormal numbers, which are slow.
             self.qpos[:], self.qvel[:], wish = wanted[0], 0.0, [0.0] * len(wish)
         self.qacc[:] = wish
         if period != self.period:
             self.period = model.opt.timestep = period
-        # Positions and velocities are those of the last step: what depends on them is known.
+        # Positions and velocities are those of the last step, so values derived from them are current.
         mujoco.mj_inverse(model, data)
         self.applied[:] = self.inverse
         mujoco.mj_step(model, data)

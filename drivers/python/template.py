@@ -1,6 +1,6 @@
-"""A driver for a robot of your own: fill in the four places marked HERE.
+"""A driver for your own robot: fill in the four places marked HERE.
 
-Run it, then let Canter drive it:
+Start it, then run a program:
     python template.py cell/arm
     canter run PROGRAM --robot ur5e --driver external --arm cell/arm
 """
@@ -11,11 +11,11 @@ from canter_driver import Robot, messages, run
 
 
 class MyRobot(Robot):
-    """Six joints that are at once where they shall be."""
+    """Six ideal joints that reach each setpoint at once."""
 
     name = "my robot"
-    # HERE: the ranges (rad), and the most of speed (rad/s), acceleration (rad/s2) and jerk (rad/s3):
-    # at least what the robot's folder has.
+    # HERE: the ranges (rad), and the limits of speed (rad/s), acceleration (rad/s2) and jerk (rad/s3):
+    # at least those of the robot's folder.
     lower = [-6.3] * 6
     upper = [6.3] * 6
     velocity = [3.2] * 6
@@ -28,15 +28,15 @@ class MyRobot(Robot):
         self.gripper = messages.TOOL_OPEN
 
     def measure(self):
-        # HERE: ask the hardware where the joints are.
+        # HERE: read the joint positions and velocities from the hardware.
         return self.position, self.speed
 
     def move(self, position, velocity, acceleration, period):
-        # HERE: tell the hardware; use velocity and acceleration as feed-forward.
+        # HERE: send the reference to the hardware; use velocity and acceleration as feed-forward.
         self.position, self.speed = list(position), list(velocity)
 
     def tool(self, tool, action):
-        # HERE: begin to open or close; `tool_status` tells when it is done.
+        # HERE: begin to open or close; `tool_status` reports when it is done.
         self.gripper = (
             messages.TOOL_OPEN if action == messages.OPEN else messages.TOOL_CLOSED
         )
@@ -46,5 +46,5 @@ class MyRobot(Robot):
 
 
 if __name__ == "__main__":
-    # Until Ctrl-C or SIGTERM: the kit brakes the arm first.
+    # Ends with Ctrl-C or SIGTERM: the kit brakes the arm first.
     run(sys.argv[1] if len(sys.argv) > 1 else "cell/arm", MyRobot())

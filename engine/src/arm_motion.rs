@@ -12,7 +12,7 @@ use planner::way::{Leg, plan_way};
 use crate::queue::Given;
 use crate::recent::Recent;
 
-/// How many predictions and situations are remembered at least.
+/// Number of predictions and situations that are kept, at least.
 const REMEMBERED: usize = 2000;
 
 /// The exact pose of the end of the arm and the tool on it.
@@ -51,12 +51,12 @@ struct Planned<const N: usize> {
     legs: Vec<Leg<N>>,
 }
 
-/// A running engine as a plan uses it: a few commands at a time.
+/// A running engine that executes a few commands at a time, for a plan.
 pub trait Mover {
-    /// Has commands executed and waits for the last.
+    /// Executes commands and waits for the last.
     ///
     /// # Errors
-    /// [`MotionFailure`], with `stopped` when the operator wanted it.
+    /// [`MotionFailure`], with `stopped` if the operator stopped the motion.
     fn execute(&mut self, commands: Vec<Given>) -> Result<(), MotionFailure>;
 
     /// Joint positions of the last setpoint (rad, m).
@@ -78,11 +78,11 @@ pub struct ArmMotion<const N: usize, M> {
 }
 
 impl<const N: usize, M: Mover> ArmMotion<N, M> {
-    /// The arm where it stands, or at its home position where nothing moves; `rate_hz` is the
-    /// servo rate that times are counted in.
+    /// The arm at its present position, or at home if nothing moves it; `rate_hz` is the servo rate
+    /// in which times are counted.
     ///
     /// # Errors
-    /// [`RobotError`], the fault of the robot's description.
+    /// [`RobotError`] when the robot's description is wrong.
     pub fn new(robot: &Robot, rate_hz: f64, mover: Option<M>) -> Result<Self, RobotError> {
         let mut mirror = Controller::new(robot, rate_hz, LengthUnit::Meter)?;
         if let Some(mover) = &mover {
@@ -197,7 +197,7 @@ impl<const N: usize, M: Mover> Motion for ArmMotion<N, M> {
     }
 }
 
-/// Planned legs as a session takes them: numbered lines from 1, executed as they are planned.
+/// Planned legs for a session: numbered from 1, executed as planned.
 fn given<const N: usize>(legs: Vec<Leg<N>>) -> Vec<Given> {
     let (commands, planned): (Vec<_>, Vec<_>) = legs
         .into_iter()

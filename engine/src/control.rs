@@ -13,10 +13,10 @@ use ipc::{Arm, ControlAnswer, ControlAsk, ControlServer, Controlled, IpcError};
 use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 use servo::{Control, Progress, Steering};
 
-/// Time from one look for requests to the next (ns).
+/// Time between two polls for requests (ns).
 const LOOK_NS: u64 = 300_000;
 
-/// Requests that are taken in one look at most.
+/// Largest number of requests per poll.
 const A_LOOK: usize = 32;
 
 /// How long the real-time thread may take to act: many periods.
@@ -25,7 +25,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// How long a new session with the driver may take.
 const RECOVERY: Duration = Duration::from_secs(3);
 
-/// More than the ordinary, less than the real-time thread.
+/// Above ordinary threads, below the real-time thread.
 const REAL_TIME: RealTimeRequest = RealTimeRequest {
     priority: 40,
     processor: None,
@@ -41,11 +41,10 @@ pub struct ControlThread {
 }
 
 impl ControlThread {
-    /// Opens the control channel of `arm` and obeys what comes through it.
+    /// Opens the control channel of `arm` and executes the requests that come through it.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when another engine serves this arm, and everything that can go wrong
-    /// with shared memory or threads.
+    /// [`IpcError::Taken`] when another engine serves this arm; errors of shared memory or threads.
     pub fn start(arm: &Arm, steering: Steering) -> Result<Self, IpcError> {
         let ends = Arc::new(AtomicBool::new(false));
         let (tell, opened) = sync_channel(1);
@@ -100,12 +99,12 @@ fn run(arm: &Arm, steering: &Steering, ends: &AtomicBool, tell: &SyncSender<Resu
     let server = match ControlServer::open(arm) {
         Ok(server) => server,
         Err(error) => {
-            // Whoever asked waits for exactly this answer.
+            // The caller waits for this answer.
             let _ = tell.send(Err(error));
             return;
         }
     };
-    // What is refused is refused to the real-time thread as well, which has told about it.
+    // What is refused here was also refused to the real-time thread, which has reported it.
     let _ = request_real_time(REAL_TIME);
     let _ = tell.send(Ok(()));
     let mut waiting: Vec<Waiting> = Vec::with_capacity(2 * A_LOOK);

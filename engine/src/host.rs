@@ -12,7 +12,7 @@ use servo::{Control, ExecutorError};
 use crate::control::ControlThread;
 use crate::session::{Jog, JogSpace, Note, Session, SessionConfig, SessionError};
 
-/// How often the report for everybody is written.
+/// Time between two status reports.
 const REPORT: Duration = Duration::from_millis(100);
 
 /// How many notes are kept for clients that ask.
@@ -21,7 +21,7 @@ const KEPT: usize = 512;
 /// How long the notes of one answer may be together (bytes).
 const NOTES: usize = ipc::LONGEST_ANSWER * 3 / 4;
 
-/// The channels of an arm's clients: who holds them is the only engine of the arm.
+/// The channels of an arm's clients: only one engine per arm can have them.
 #[derive(Debug)]
 pub struct ClientChannels {
     requests: ClientServer,
@@ -29,20 +29,20 @@ pub struct ClientChannels {
 }
 
 impl ClientChannels {
-    /// Takes the channels of `arm`. Do so before the driver is disturbed.
+    /// Opens the channels of `arm`. Do so before opening a session with the driver.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when another engine has the arm, and what shared memory refuses.
+    /// [`IpcError::Taken`] when another engine has the arm; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let (requests, status) = (ClientServer::open(arm)?, StatusWriter::open(arm)?);
         Ok(Self { requests, status })
     }
 }
 
-/// A running session with its clients, and what keeps its driver alive: a `D` that ends the driver
-/// when it is dropped.
+/// A running session with its clients and its driver: a `D` that ends the driver when it is
+/// dropped.
 ///
-/// Fields are dropped in this order: the session stops the arm while the driver still lives.
+/// Fields are dropped in this order: the session stops the arm while the driver still runs.
 #[derive(Debug)]
 pub struct Host<D> {
     /// The arm.
@@ -87,7 +87,7 @@ impl<D> Host<D> {
         })
     }
 
-    /// Takes the arm for this process: other clients may stop it, not command it.
+    /// Reserves the arm for this process: other clients may stop it, but not command it.
     pub fn own(&mut self, name: &str) {
         let client = Identity {
             name: name.to_owned(),
@@ -101,13 +101,14 @@ impl<D> Host<D> {
         self.shutdown
     }
 
-    /// Serves clients, reports, and waits a little for the next thing that happens.
+    /// Serves clients, reports, and waits a short time for the next note.
     ///
     /// # Errors
     /// [`IpcError`] when shared memory fails.
     pub fn turn(&mut self) -> Result<Option<Note>, IpcError> {
-        // One batch in a turn: whoever floods us does not keep us from the signals. A client that
-        // cannot be reached, or a report that cannot be sent, is no reason to leave a moving arm.
+        // One batch per turn, so that a flood of requests does not delay signals. A client that
+        // cannot be reached, or a report that cannot be sent, must not end the control of a moving
+        // arm.
         if let Err(error) = self.serve() {
             tracing::debug!("{error}");
         }
@@ -141,7 +142,8 @@ impl<D> Host<D> {
         } = self;
         channels.requests.serve(|request| {
             let status = session.status();
-            // Whoever may stop a motion may let it go on; what is executed stays the owner's.
+            // Any client that may stop a motion may resume it; only the owner decides what is
+            // executed.
             let free = matches!(request.ask, Verb::Resume | Verb::Override { .. });
             if !free && let Err(refusal) = ownership.admit(&request, !status.idle) {
                 return refusal;
@@ -236,7 +238,7 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
     }
 }
 
-/// Moves by hand for as long as the client goes on asking.
+/// Jogs for as long as the client sends requests.
 fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Answer {
     let space = match space {
         "joint" => JogSpace::Joint,
@@ -254,7 +256,7 @@ fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Ans
     }
 }
 
-/// Passes on what acts on the motion that is under way, for clients that do not use the control
+/// Executes requests that act on the current motion, for clients that do not use the control
 /// channel.
 fn control(session: &Session, ask: &Verb) -> Answer {
     let control = match ask {

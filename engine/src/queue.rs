@@ -22,7 +22,7 @@ impl From<Located> for Given {
     }
 }
 
-/// A command with its number in the life of the queue.
+/// A command with its number in the queue.
 #[derive(Debug)]
 pub struct Queued {
     /// Number of the command, counted from 1 over the life of the queue.
@@ -72,7 +72,7 @@ impl Queue {
     /// Appends a command that is given after `epoch` aborts, and returns its number.
     ///
     /// # Errors
-    /// [`Full`], and the queue is as before.
+    /// [`Full`]; the queue is then unchanged.
     pub fn push(&mut self, given: Given, epoch: u32) -> Result<u32, Full> {
         if self.commands.len() >= self.capacity {
             return Err(Full {
@@ -103,8 +103,7 @@ impl Queue {
         }
     }
 
-    /// Drops the commands that were given at another age than `epoch`, and returns how many there
-    /// were.
+    /// Drops the commands of other epochs than `epoch`, and returns how many there were.
     pub fn keep(&mut self, epoch: u32) -> usize {
         let before = self.commands.len();
         self.commands.retain(|queued| queued.epoch == epoch);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::Hash;
 
-/// Remembers at least the last `room` entries that were used, and at most twice as many.
+/// Keeps at least the last `room` entries that were used, and at most twice as many.
 #[derive(Debug)]
 pub(crate) struct Recent<K, V> {
     room: usize,

@@ -59,7 +59,7 @@ impl fmt::Display for Arm {
     }
 }
 
-/// A checksum of a robot model, for instance of the text of its URDF; the handshake compares it.
+/// A checksum of a robot model, for example of the text of its URDF; the handshake compares it.
 ///
 /// # Source
 /// Fowler, Noll, Vo, hash FNV-1a, 64 bit.

@@ -13,7 +13,7 @@ use crate::request::Received;
 use crate::ticket::Ticket;
 use crate::{Answer, Arm, Identity, IpcError, Request, RequestId, Verb, room};
 
-/// How long a client waits for the words of an engine that has taken its request.
+/// How long a client waits for the answer of an engine that has taken its request.
 const WORD: Duration = Duration::from_secs(3);
 
 /// A request that waits for its answer.
@@ -32,7 +32,7 @@ impl Client {
     /// Opens the channel of `arm` as a client called `name`.
     ///
     /// # Errors
-    /// Everything that can go wrong with shared memory.
+    /// Errors of shared memory.
     pub fn open(arm: &Arm, name: &str) -> Result<Self, IpcError> {
         let node = join(arm, "client")?;
         let port = text_exchange(&node, arm, "client")?
@@ -60,12 +60,12 @@ impl Client {
     }
 
     /// Asks and waits for the answer up to `timeout`. Without an answer the request is withdrawn:
-    /// nothing was done, and nothing will be.
+    /// it was not executed and will not be.
     ///
     /// # Errors
-    /// [`IpcError::NoAnswer`] when nobody took the request, [`IpcError::NoWord`] when the engine
-    /// took it and then said nothing for three seconds more, [`IpcError::BadText`] when the answer
-    /// cannot be read.
+    /// [`IpcError::NoAnswer`] when no engine took the request, [`IpcError::NoWord`] when the engine
+    /// took it and then did not answer for three more seconds, [`IpcError::BadText`] when the
+    /// answer cannot be read.
     pub fn ask(&self, ask: Verb, timeout: Duration) -> Result<Answer, IpcError> {
         let id = RequestId::new();
         let ticket = ask
@@ -89,7 +89,7 @@ impl Client {
                 waited_ms: timeout.as_millis() as u64,
             });
         }
-        // It has taken the request, so it lives, or did a moment ago.
+        // It has taken the request, so it runs, or did a moment ago.
         let answer = self.wait(&pending, id, WORD)?;
         answer.ok_or(IpcError::NoWord { arm })
     }
@@ -113,7 +113,8 @@ impl Client {
     ) -> Result<Option<Answer>, IpcError> {
         let end = Instant::now() + timeout;
         loop {
-            // Asked before the look: an answer that came just before the end is still read.
+            // The time is checked before polling: an answer that came just before the end is still
+            // read.
             let over = Instant::now() >= end || pending.number_of_server_connections() == 0;
             let answer = pending.receive().map_err(|cause| self.failed(&cause))?;
             match answer {

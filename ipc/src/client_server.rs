@@ -17,11 +17,11 @@ use crate::{Answer, Arm, IpcError, Request, RequestId, room, ticket};
 /// The longest request that is read (bytes).
 const LONGEST: usize = 16 << 20;
 
-/// How many requests are taken in one turn. No client has more than two of them, so that each of
-/// sixteen comes to its turn, however many the others send.
+/// Number of requests per turn. No client has more than two of them, so each of sixteen clients is
+/// served, however many requests the others send.
 const BATCH: usize = 32;
 
-/// How long an answer stays readable when the engine leaves: dropping the channel takes it away.
+/// How long an answer stays readable when the engine ends: dropping the channel removes it.
 const FAREWELL: Duration = Duration::from_millis(200);
 
 /// The engine's end of the client channel. Dropping it waits a moment for the last answer to be
@@ -43,7 +43,7 @@ impl ClientServer {
         let node = join(arm, "engine for clients")?;
         let factory = text_exchange(&node, arm, "client")?;
         ticket::sweep(arm.domain());
-        // All the memory it will ever need: it must not look for more while the arm moves.
+        // All the memory it will ever need: it must not allocate more while the arm moves.
         let server = factory
             .server_builder()
             .initial_max_slice_len(LONGEST_ANSWER)
@@ -71,8 +71,8 @@ impl ClientServer {
         })
     }
 
-    /// Answers what waits with `handle`, at most two requests of each client and 32 in all; says
-    /// how many there were. A request that cannot be read is refused without asking `handle`, one
+    /// Answers the waiting requests with `handle`, at most two per client and 32 in all; returns
+    /// how many there were. A request that cannot be read is refused without calling `handle`; one
     /// that its sender has withdrawn is dropped. Does not wait.
     ///
     /// # Errors
@@ -82,9 +82,10 @@ impl ClientServer {
         while batch.len() < BATCH {
             match self.server.receive() {
                 Ok(Some(request)) => batch.push(request),
-                // As long as they are held, a client that has two waiting makes place for others.
+                // As long as these are held, a client with two waiting requests leaves room for
+                // others.
                 Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => break,
-                // Those that came must be answered first; the next turn meets the fault again.
+                // Received requests must be answered first; the next turn finds the error again.
                 Err(_) if !batch.is_empty() => break,
                 Err(cause) => {
                     return Err(IpcError::Failed {
@@ -99,7 +100,7 @@ impl ClientServer {
             let Some(text) = self.answer(request.payload(), &mut handle) else {
                 continue;
             };
-            // A client that has gone needs no answer; a full memory is the next one's trouble.
+            // A client that has ended needs no answer; full memory is reported to the next one.
             let sent = request.loan_slice_uninit(text.len());
             if sent.is_ok_and(|response| response.write_from_slice(&text).send().is_ok()) {
                 self.answered.set(Some(Instant::now()));
@@ -108,7 +109,7 @@ impl ClientServer {
         Ok(batch.len())
     }
 
-    /// The answer to a request; none when its sender waits for none any more.
+    /// The answer to a request; `None` if its sender no longer waits for it.
     fn answer(&self, bytes: &[u8], handle: &mut impl FnMut(Request) -> Answer) -> Option<Vec<u8>> {
         if bytes.len() > LONGEST {
             return None;

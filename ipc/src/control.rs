@@ -23,7 +23,7 @@ const KIND: &str = "control";
 /// How long a client sleeps between two looks for its answer.
 const LOOK: Duration = Duration::from_micros(100);
 
-/// What is asked of the motion under way.
+/// A request about the current motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ControlAsk {
@@ -40,7 +40,7 @@ pub enum ControlAsk {
         /// With all that the joints have, instead of gently.
         fast: bool,
     },
-    /// Stop on the path and forget what is queued.
+    /// Stop on the path and drop the queue.
     Abort,
     /// Clear the latched fault and open a new session with the driver.
     Recover,
@@ -292,7 +292,7 @@ impl ControlClient {
                 {
                     return Ok(*answer);
                 }
-                // An answer to somebody else.
+                // An answer to another client.
                 Some(_) => {}
                 None if over => break,
                 None => sleep(LOOK),

@@ -11,10 +11,10 @@ use crate::{Domain, IpcError};
 /// The first eight bytes of a segment: version 0.9.3.
 const VERSION: u64 = 0x0009_0003;
 
-/// How old a segment without its first bytes may be: a younger one is in the making.
+/// Age below which a segment without its first bytes counts as being made.
 const MAKING: Duration = Duration::from_secs(1);
 
-/// Looks at the first bytes of every segment of `domain`. What is damaged behind them is not seen.
+/// Checks the first bytes of every segment of `domain`. Damage after them is not detected.
 ///
 /// # Errors
 /// [`IpcError::Damaged`] names the first that iceoryx2 0.9.3 has not made.
@@ -31,7 +31,7 @@ pub(crate) fn look(domain: &Domain) -> Result<(), IpcError> {
     Ok(())
 }
 
-/// What is wrong with a segment. One that cannot be opened is on its way in or out.
+/// What is wrong with a segment. One that cannot be opened is being made or removed.
 fn fault(path: &Path) -> Option<String> {
     let mut file = File::open(path).ok()?;
     let found = file.metadata().ok()?;
@@ -40,7 +40,7 @@ fn fault(path: &Path) -> Option<String> {
         Ok(()) => u64::from_le_bytes(head),
         Err(_) => 0,
     };
-    // A time that is not in the past is young.
+    // A time in the future counts as young.
     let age = found.modified().ok()?.elapsed().unwrap_or_default();
     if version == VERSION || (version == 0 && age < MAKING) {
         return None;

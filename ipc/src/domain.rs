@@ -16,14 +16,14 @@ pub const DOMAIN_VARIABLE: &str = "CANTER_DOMAIN";
 /// The longest path of the directory (bytes); iceoryx2 appends up to 140 and takes 255.
 const LONGEST: usize = 110;
 
-/// Bits of a mode that give anything to anybody but the owner.
+/// Bits of a mode that give rights to other users.
 const OTHERS: u32 = 0o077;
 
 /// Where engine, driver and clients find each other: a directory that belongs to one user alone,
 /// and the prefix of that directory's segments in `/dev/shm`.
 ///
-/// Two processes meet only in the same domain. Each user has one; another directory makes another
-/// domain, for instance for a test run.
+/// Two processes find each other only in the same domain. Each user has one; another directory
+/// makes another domain, for example for a test run.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;
@@ -42,7 +42,7 @@ struct Place {
 }
 
 impl Domain {
-    /// The domain of a process, chosen at its edge: `directory` where one is asked for, else the
+    /// The domain of a process, chosen in its outermost layer: `directory` if given, otherwise the
     /// first of
     ///
     /// 1. the directory that `CANTER_DOMAIN` names,
@@ -50,7 +50,7 @@ impl Domain {
     /// 3. `canter` in `/run/user/UID`,
     /// 4. `/dev/shm/canter-UID`.
     ///
-    /// 2 and 3 count only where that directory is this user's and closed to others.
+    /// 2 and 3 count only if that directory belongs to this user and is closed to others.
     /// `environment` gives the value of a variable: pass `|name| std::env::var_os(name)`.
     ///
     /// # Errors
@@ -76,11 +76,11 @@ impl Domain {
         }
     }
 
-    /// The domain of `directory`, which is made (mode 0700) where it is missing.
+    /// The domain of `directory`, which is made (mode 0700) if it is missing.
     ///
     /// # Errors
-    /// [`IpcError::Domain`] when it is not a directory of this user with mode 0700, when somebody
-    /// else could rename it, or when its path is longer than 110 bytes.
+    /// [`IpcError::Domain`] when it is not a directory of this user with mode 0700, when another
+    /// user could rename it, or when its path is longer than 110 bytes.
     pub fn open(directory: &Path) -> Result<Self, IpcError> {
         let fail = |cause: String, remedy: String| IpcError::Domain {
             directory: directory.to_owned(),
@@ -97,7 +97,7 @@ impl Domain {
             }
             _ => {}
         }
-        // The link itself, not what it points to: who owns a link can turn it.
+        // The link itself, not its target: the owner of a link can change it.
         let found = fs::symlink_metadata(directory).map_err(failed)?;
         if let Some((cause, remedy)) = refusal(&found) {
             return Err(fail(
@@ -140,14 +140,14 @@ impl Domain {
         &self.0.directory
     }
 
-    /// What the names of the segments in `/dev/shm` begin with: `canter_UID_DEVICE_INODE_`, the
-    /// numbers of the directory in hexadecimal digits.
+    /// The prefix of the segment names in `/dev/shm`: `canter_UID_DEVICE_INODE_`, the numbers of
+    /// the directory in hexadecimal digits.
     pub fn prefix(&self) -> &str {
         &self.0.prefix
     }
 }
 
-/// The number of the user that this process acts for.
+/// The effective user number of this process.
 fn effective_user() -> u32 {
     // SAFETY: the call has no preconditions and cannot fail.
     #[expect(
@@ -177,7 +177,7 @@ fn refusal(found: &Metadata) -> Option<(String, &'static str)> {
     })
 }
 
-/// Whether everybody may rename what is in a directory.
+/// Whether everybody may rename entries of a directory.
 fn is_open_to_all(directory: &Path) -> bool {
     const STICKY: u32 = 0o1000;
     const ALL_WRITE: u32 = 0o002;
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(mode & 0o7777, 0o700);
     }
 
-    /// A runtime directory that others may look into, or that is somebody else's, is not used.
+    /// A runtime directory that others may open, or that belongs to another user, is not used.
     #[test]
     fn a_runtime_directory_of_others_does_not_count() {
         let folder = tempfile::tempdir().unwrap();

@@ -30,7 +30,7 @@ pub struct Greeting {
 }
 
 impl Greeting {
-    /// Answers; says whether iceoryx2 took the answer.
+    /// Answers; returns whether iceoryx2 took the answer.
     pub fn answer(self, ack: HelloAck) -> bool {
         self.request.send_copy(ack).is_ok()
     }
@@ -40,8 +40,7 @@ impl DriverLink {
     /// Opens the driver's end of `arm`, after cleaning up behind dead processes.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when a living process has it, and everything that can go wrong with
-    /// shared memory.
+    /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let node = join(arm, "driver")?;
         let fail = |operation, cause: String| IpcError::Failed {
@@ -113,7 +112,7 @@ impl DriverLink {
     /// The newest setpoint, unchecked; older ones are dropped. Does not wait.
     pub fn last_setpoint(&self) -> Option<Setpoint> {
         let mut last = None;
-        // The buffer has an end; an engine that floods it does not hold the driver.
+        // The number is limited, so a flood of setpoints does not block the driver.
         for _ in 0..64 {
             match self.next_setpoint() {
                 Some(setpoint) => last = Some(setpoint),

@@ -27,8 +27,7 @@ impl EngineLink {
     /// Opens the engine's end of `arm`, after cleaning up behind dead processes.
     ///
     /// # Errors
-    /// [`IpcError::Taken`] when a living process has it, and everything that can go wrong with
-    /// shared memory.
+    /// [`IpcError::Taken`] when a running process has it; errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let node = join(arm, "engine")?;
         let fail = |operation, cause: String| IpcError::Failed {
@@ -101,7 +100,7 @@ impl EngineLink {
     ///
     /// # Errors
     /// [`IpcError::NoAnswer`] without a driver, [`IpcError::Refused`] with the driver's reason,
-    /// [`IpcError::BadMessage`] when the answer makes no sense.
+    /// [`IpcError::BadMessage`] when the answer is invalid.
     pub fn greet(&self, hello: &Hello, timeout: Duration) -> Result<HelloAck, IpcError> {
         let end = Instant::now() + timeout;
         let ack = loop {
@@ -174,7 +173,7 @@ impl EngineLink {
     /// The newest state, unchecked; older ones are dropped. Does not wait.
     pub fn last_state(&self) -> Option<State> {
         let mut last = None;
-        // The buffer has an end; a driver that floods it does not hold the cycle.
+        // The number is limited, so a flood of states does not block the cycle.
         for _ in 0..64 {
             match self.next_state() {
                 Some(state) => last = Some(state),

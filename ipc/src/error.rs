@@ -75,7 +75,7 @@ pub enum IpcError {
         /// The cause in iceoryx2's own words.
         cause: String,
     },
-    /// Nobody answered in time.
+    /// No answer in time.
     #[error("{arm}: no {role} answered within {waited_ms} ms")]
     NoAnswer {
         /// The arm.
@@ -139,7 +139,7 @@ pub enum IpcError {
         /// Its reason.
         reason: String,
     },
-    /// A message of the other side makes no sense.
+    /// A message of the other side is invalid.
     #[error("{arm}: {cause}")]
     BadMessage {
         /// The arm.
@@ -164,7 +164,7 @@ pub enum IpcError {
 #[non_exhaustive]
 pub enum MessageError {
     /// Another protocol version.
-    #[error("protocol {found} where {expected} is spoken")]
+    #[error("protocol {found}, expected {expected}")]
     Protocol {
         /// Our version.
         expected: u32,
@@ -172,7 +172,7 @@ pub enum MessageError {
         found: u32,
     },
     /// Another number of joints.
-    #[error("{found} joints where the arm has {expected}")]
+    #[error("{found} joints, expected {expected}")]
     Joints {
         /// Joints of the arm.
         expected: u32,
@@ -190,7 +190,7 @@ pub enum MessageError {
         value: f64,
     },
     /// A number stands for none of the known choices.
-    #[error("{field} is {value}, which means nothing")]
+    #[error("{field} is {value}, which is not a known code")]
     Choice {
         /// The field of the message.
         field: &'static str,
@@ -210,7 +210,7 @@ pub enum MessageError {
         most: u64,
     },
     /// The layout checksum differs.
-    #[error("layout checksum {found:#018x} where {expected:#018x} is used")]
+    #[error("layout checksum {found:#018x}, expected {expected:#018x}")]
     Schema {
         /// Ours.
         expected: u64,

@@ -11,8 +11,8 @@ use crate::{MAX_JOINTS, MessageError, PROTOCOL, schema_checksum};
 pub enum Clock {
     /// Both sides run by `CLOCK_MONOTONIC`.
     Wall = 0,
-    /// Each state releases the next setpoint, each setpoint the next state: as fast as both can,
-    /// and the same every time.
+    /// Each state releases the next setpoint, each setpoint the next state: as fast as both sides
+    /// can, with the same result every time.
     LockStep = 1,
 }
 
@@ -204,7 +204,7 @@ impl HelloAck {
         }
     }
 
-    /// Whether a welcome makes sense for an arm of `joints` joints.
+    /// Checks a welcome for an arm of `joints` joints.
     ///
     /// # Errors
     /// The first thing that is wrong.

@@ -40,8 +40,8 @@ fn configuration(domain: &Domain) -> Result<Config, IpcError> {
     Ok(config)
 }
 
-/// Joins the others: cleans up after dead processes, then makes a node. `role` is shown to those
-/// who find the place taken.
+/// Cleans up after dead processes, then makes a node. `role` is shown to processes that find this
+/// end already taken.
 pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
     set_log_level(LogLevel::Fatal);
     room::look()?;
@@ -66,13 +66,13 @@ pub(crate) fn join(arm: &Arm, role: &str) -> Result<Node<Shared>, IpcError> {
 /// How many processes use a domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeCount {
-    /// Nodes of living processes; a process may have several.
+    /// Nodes of running processes; a process may have several.
     pub alive: usize,
     /// Nodes of dead processes whose segments are still there.
     pub dead: usize,
 }
 
-/// Counts the nodes of living and of dead processes in `domain`, and changes nothing.
+/// Counts the nodes of running and of dead processes in `domain`; changes nothing.
 ///
 /// # Errors
 /// [`IpcError::Failed`] when the list cannot be read.
@@ -105,8 +105,8 @@ pub fn remove_dead_nodes(domain: &Domain) -> Result<(u64, u64), IpcError> {
     Ok((result.cleanups, result.failed_cleanups))
 }
 
-/// Reads what iceoryx2 keeps of every service in `domain`; gives how many there are. Damaged
-/// segments may end the process: ask in one that may end.
+/// Reads iceoryx2's data of every service in `domain`; returns how many there are. Damaged segments
+/// may crash the process: call it in a separate process.
 ///
 /// # Errors
 /// [`IpcError::Damaged`], or [`IpcError::Failed`] when the list cannot be read.
@@ -195,7 +195,7 @@ where
     exchange_for(node, arm, kind, 8, 16)
 }
 
-/// The same as [`exchange`] for many clients: nobody shall find no place to say stop.
+/// The same as [`exchange`] for many clients, so that a stop is always possible.
 pub(crate) fn control_exchange<Q, A>(
     node: &Node<Shared>,
     arm: &Arm,
@@ -254,7 +254,7 @@ pub(crate) fn text_exchange(
         .map_err(|error| exchange_error(service, &error))
 }
 
-/// Who lives in a service, apart from ourselves: the names and process numbers.
+/// The other processes that use a service: names and process numbers.
 pub(crate) fn inhabitants<F>(factory: &F, ourselves: &Node<Shared>) -> String
 where
     F: PortFactory<Service = Shared>,
@@ -279,7 +279,7 @@ where
     }
 }
 
-/// iceoryx2's error in words that say what to do.
+/// iceoryx2's error as a message that says what to do.
 fn topic_error(service: String, error: &PublishSubscribeOpenOrCreateError) -> IpcError {
     use PublishSubscribeOpenError as Open;
     match error {
@@ -310,7 +310,7 @@ fn topic_error(service: String, error: &PublishSubscribeOpenOrCreateError) -> Ip
     }
 }
 
-/// iceoryx2's error in words that say what to do.
+/// iceoryx2's error as a message that says what to do.
 fn exchange_error(service: String, error: &RequestResponseOpenOrCreateError) -> IpcError {
     use RequestResponseOpenError as Open;
     match error {

@@ -6,8 +6,8 @@ use iceoryx2::prelude::Node;
 use crate::node::{Shared, join, topic};
 use crate::{Arm, IpcError, Setpoint, State};
 
-/// Everybody's view of the cyclic messages of an arm. It takes part in nothing: neither engine nor
-/// driver waits for it or hears of it. It stays in the thread that opened it.
+/// Reads the cyclic messages of an arm. It has no effect: engine and driver do not wait for it and
+/// do not know of it. It stays in the thread that opened it.
 #[derive(Debug)]
 pub struct Observer {
     setpoints: Subscriber<Shared, Setpoint, ()>,
@@ -17,10 +17,10 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// Opens a view of `arm`, whether or not engine and driver are there.
+    /// Opens an observer of `arm`, whether or not engine and driver run.
     ///
     /// # Errors
-    /// Everything that can go wrong with shared memory.
+    /// Errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let node = join(arm, "observer")?;
         let fail = |operation, cause: String| IpcError::Failed {
@@ -43,8 +43,8 @@ impl Observer {
         })
     }
 
-    /// The oldest setpoint that was not read yet, unchecked. Does not wait; who reads too seldom
-    /// loses the oldest, which shows in their sequence.
+    /// The oldest setpoint that was not read yet, unchecked. Does not wait; a slow reader loses the
+    /// oldest setpoints, which shows in their sequence.
     pub fn next_setpoint(&self) -> Option<Setpoint> {
         let sample = self.setpoints.receive().ok().flatten()?;
         Some(*sample)

@@ -2,16 +2,16 @@
 
 use crate::{Answer, Identity, Request};
 
-/// Which client commands the arm. A commanding client that is dead, or that has let go, makes
-/// place for the next.
+/// Which client commands the arm. A client can take over when the one before has ended or released
+/// the arm.
 #[derive(Clone, Debug, Default)]
 pub struct Ownership {
     owner: Option<Identity>,
 }
 
 impl Ownership {
-    /// Whether `request` may be obeyed; takes ownership where nobody has it. `busy` says whether
-    /// a program of the owner is still under way: an idle arm belongs to whoever comes.
+    /// Whether `request` may be executed; takes ownership if no client has it. `busy` says whether
+    /// a program of the owner still runs: an idle arm has no owner.
     ///
     /// # Errors
     /// The refusal, with the owner's name.
@@ -33,7 +33,7 @@ impl Ownership {
         }
     }
 
-    /// Gives the arm to `client`, which nobody else has.
+    /// Gives the arm to `client`; it must have no other owner.
     pub fn give(&mut self, client: Identity) {
         self.owner = Some(client);
     }

@@ -9,11 +9,11 @@ use iceoryx2::prelude::{BackpressureStrategy, Node};
 use crate::node::{Shared, join, topic};
 use crate::{Arm, IpcError, Setpoint};
 
-/// As many bytes as a setpoint has, and nothing else.
+/// Plain bytes, as many as a setpoint has.
 type Bytes = [u64; size_of::<Setpoint>() / 8];
 
-/// One end of a bare exchange of messages of a setpoint's size: no checks, no protocol. The
-/// yardstick of `canter doctor` and of the benches.
+/// One end of a plain exchange of messages of a setpoint's size: no checks, no protocol. The
+/// reference of `canter doctor` and of the benchmarks.
 #[derive(Debug)]
 pub struct Probe {
     publisher: Publisher<Shared, Bytes, ()>,
@@ -25,7 +25,7 @@ impl Probe {
     /// Opens the end that asks, or the one that answers.
     ///
     /// # Errors
-    /// Everything that can go wrong with shared memory.
+    /// Errors of shared memory.
     pub fn open(arm: &Arm, asks: bool) -> Result<Self, IpcError> {
         let node = join(arm, "probe")?;
         let (out, back) = if asks {
@@ -59,8 +59,7 @@ impl Probe {
         self.publisher.send_copy([number; _]).is_ok()
     }
 
-    /// The number of the oldest message not read yet, which is read whole, as a message is that
-    /// somebody wants. Does not wait.
+    /// The number of the oldest message not read yet; reads the whole message. Does not wait.
     pub fn receive(&self) -> Option<u64> {
         let sample = self.subscriber.receive().ok().flatten()?;
         let bytes: Bytes = *sample;

@@ -9,7 +9,7 @@ use std::path::Path;
 use crate::room::segments;
 use crate::{Domain, IpcError};
 
-/// A living process that uses a domain's segments.
+/// A running process that uses a domain's segments.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Inhabitant {
     /// Its number.
@@ -18,8 +18,8 @@ pub struct Inhabitant {
     pub command: String,
 }
 
-/// The processes that have a segment of `domain` in their memory, this one aside. It asks the
-/// kernel, not the segments; processes of other users and of other containers are not seen.
+/// The other processes that have a segment of `domain` in their memory. It asks the kernel and does
+/// not read the segments; it does not see processes of other users and other containers.
 pub fn inhabitants_of(domain: &Domain) -> Vec<Inhabitant> {
     let ours = std::process::id();
     let listed = fs::read_dir("/proc").into_iter().flatten().flatten();
@@ -31,7 +31,8 @@ pub fn inhabitants_of(domain: &Domain) -> Vec<Inhabitant> {
 }
 
 fn uses(process: u32, domain: &Domain) -> bool {
-    // One that ended meanwhile, or that is not ours to look at, uses nothing of ours.
+    // A process that ended meanwhile, or that this user may not inspect, uses no segment of this
+    // user.
     let maps = fs::read(format!("/proc/{process}/maps")).unwrap_or_default();
     let wanted = format!("/dev/shm/{}", domain.prefix());
     maps.windows(wanted.len())
@@ -47,10 +48,10 @@ fn inhabitant(process: u32) -> Inhabitant {
     }
 }
 
-/// Removes everything that is in `domain`; gives the number of segments and files.
+/// Removes everything in `domain`; returns the number of segments and files.
 ///
 /// # Errors
-/// [`IpcError::InUse`] while a living process uses a segment, and then nothing is removed;
+/// [`IpcError::InUse`] while a running process uses a segment; then nothing is removed;
 /// [`IpcError::Domain`] when something cannot be removed.
 pub fn repair(domain: &Domain) -> Result<usize, IpcError> {
     let living = inhabitants_of(domain);
@@ -69,7 +70,8 @@ pub fn repair(domain: &Domain) -> Result<usize, IpcError> {
         remedy: "look at who owns its files".to_owned(),
     };
     let mut removed = 0;
-    // The lists first: who comes now begins anew instead of looking for what is about to go.
+    // The lists first: a process that starts now makes new segments instead of opening those that
+    // are being removed.
     for name in ["nodes", "services", "requests"] {
         removed += empty(&domain.directory().join(name)).map_err(fail)?;
     }
@@ -84,7 +86,8 @@ pub fn repair(domain: &Domain) -> Result<usize, IpcError> {
     Ok(removed)
 }
 
-/// Removes a folder of the domain; gives the number of its files. One that is missing is empty.
+/// Removes a folder of the domain; returns the number of its files. A missing folder counts as
+/// empty.
 fn empty(folder: &Path) -> io::Result<usize> {
     let mut count = 0;
     let listed = match fs::read_dir(folder) {

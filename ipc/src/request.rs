@@ -33,19 +33,19 @@ pub enum Verb {
     },
     /// Stop on the path.
     Stop {
-        /// With all that the joints have, instead of gently.
+        /// As fast as the joints can, instead of gently.
         fast: bool,
     },
-    /// Stop on the path and forget what is queued.
+    /// Stop on the path and drop the queue.
     Abort,
     /// Clear a latched fault and open a new session with the driver.
     Recover,
-    /// Move by hand; stops when no further request comes in time.
+    /// Jog; the arm stops when no further request comes in time.
     Jog {
         /// `joint` or `tool`.
         space: String,
-        /// Speeds as shares of the largest, -1..=1: one a joint, or x, y, z, rx, ry, rz of the
-        /// tool's own axes; all 0 stops.
+        /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
+        /// tool frame; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,
@@ -54,7 +54,7 @@ pub enum Verb {
     Status,
     /// What has happened.
     Notes {
-        /// Number of the last note that is known; only later ones are asked for.
+        /// Number of the last note that the client has; only later ones are returned.
         since: u64,
     },
     /// Stop on the path and end the engine.
@@ -62,14 +62,14 @@ pub enum Verb {
 }
 
 impl Verb {
-    /// Whether it may no longer be done when the client has given up waiting. To stop, to pause
-    /// and to forget is done all the same.
+    /// Whether the request is withdrawn when the client stops waiting. Stop, pause and abort are
+    /// executed all the same.
     pub fn can_be_withdrawn(&self) -> bool {
         self.commands()
     }
 
-    /// Whether only the client that commands the arm may ask this. Stopping, pausing and asking
-    /// is everybody's.
+    /// Whether only the client that commands the arm may ask this. Any client may stop, pause and
+    /// ask for the status.
     pub fn commands(&self) -> bool {
         matches!(
             self,
@@ -108,7 +108,7 @@ pub struct Request {
 pub struct Answer {
     /// Whether the engine does it.
     pub accepted: bool,
-    /// One sentence for a person; empty where there is nothing to say.
+    /// One sentence for the user; empty if there is nothing to say.
     pub message: String,
     /// Details for a program.
     pub body: serde_json::Value,
@@ -124,7 +124,7 @@ impl Answer {
         }
     }
 
-    /// As the bytes that go to the sender of request `id`; at most [`LONGEST_ANSWER`].
+    /// The bytes for the sender of request `id`; at most [`LONGEST_ANSWER`].
     pub(crate) fn encode(&self, id: RequestId) -> Result<Vec<u8>, serde_json::Error> {
         let encode = |answer: &Self| serde_json::to_vec(&Reply { id, answer });
         let text = encode(self)?;

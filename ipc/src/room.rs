@@ -16,20 +16,20 @@ use crate::{Domain, IpcError};
 /// Where the segments are.
 const PLACE: &str = "/dev/shm";
 
-/// What must be free before a process makes segments (bytes): the answers of one engine are
-/// 6.2 MiB, what else engine, driver and clients have is small beside it.
+/// Space that must be free before a process makes segments (bytes): the answers of one engine take
+/// 6.2 MiB, everything else of engine, driver and clients is small in comparison.
 pub const ROOM_NEEDED: u64 = 16 << 20;
 
-/// What is free in `/dev/shm` (bytes); none where it is without a limit or cannot be asked.
+/// Free space in `/dev/shm` (bytes); `None` if it has no limit or the limit cannot be read.
 pub fn room_left() -> Option<u64> {
     let found = statvfs(PLACE).ok()?;
     (found.f_blocks > 0).then(|| found.f_bavail.saturating_mul(found.f_frsize))
 }
 
-/// Looks whether there is room for the segments of a process.
+/// Checks that there is space for the segments of a process.
 ///
 /// # Errors
-/// [`IpcError::NoRoom`] with what is needed and what is there.
+/// [`IpcError::NoRoom`] with the space that is needed and the space that is free.
 pub(crate) fn look() -> Result<(), IpcError> {
     match room_left() {
         Some(found) if found < ROOM_NEEDED => Err(IpcError::NoRoom {
@@ -59,7 +59,7 @@ pub(crate) fn segments(domain: &Domain) -> Vec<PathBuf> {
 /// [`IpcError::NoRoom`] when there is too little.
 pub(crate) fn reserve(domain: &Domain) -> Result<(), IpcError> {
     for path in segments(domain) {
-        // One that is gone, or closed already to writing, is nobody's need.
+        // A segment that is gone, or already closed to writing, needs no memory.
         let Ok(file) = OpenOptions::new().read(true).write(true).open(&path) else {
             continue;
         };

@@ -13,15 +13,15 @@ impl SetpointFlags {
     pub const HOLD: u32 = 1;
     /// The engine is stopping on the path.
     pub const STOPPING: u32 = 2;
-    /// The driver shall stop by itself now, within its own limits, and latch.
+    /// The driver must stop by itself now, within its own limits, and latch.
     pub const STOP_REQUEST: u32 = 4;
-    /// The engine leaves: the session ends without a fault. Only together with [`Self::HOLD`].
+    /// The engine ends: the session ends without a fault. Only together with [`Self::HOLD`].
     pub const GOODBYE: u32 = 8;
 }
 
-/// What the joints shall do at one instant. Sent by the engine once in every period.
+/// The wanted state of the joints at one time. The engine sends it once per period.
 ///
-/// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` count, the rest is 0. Times are
+/// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` are used, the rest is 0. Times are
 /// nanoseconds of `CLOCK_MONOTONIC`.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
@@ -33,7 +33,7 @@ pub struct Setpoint {
     pub joints: u32,
     /// The session that the handshake gave.
     pub session: u64,
-    /// Grows by one with each setpoint sent in a session, from 1.
+    /// Counts the setpoints of a session, from 1.
     pub sequence: u64,
     /// The number of the period since the session began; jumps where periods were skipped.
     pub tick: u64,
@@ -43,11 +43,11 @@ pub struct Setpoint {
     pub tick_ns: u64,
     /// Length of a period (ns).
     pub period_ns: u64,
-    /// A driver that has had no setpoint for this long stops by itself and latches (ns).
+    /// After this time without setpoints the driver stops by itself and latches (ns).
     pub watchdog_ns: u64,
-    /// Sequence of the last state that the engine had seen.
+    /// Sequence of the last state that the engine received.
     pub state_sequence: u64,
-    /// Index of the canonical command under way.
+    /// Index of the current canonical command.
     pub command: u32,
     /// Bits of [`SetpointFlags`].
     pub flags: u32,
@@ -57,7 +57,7 @@ pub struct Setpoint {
     pub reserved_word: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,
-    /// Speed along the path as a share of the planned one, 0..=1.
+    /// Speed along the path as a fraction of the planned speed, 0..=1.
     pub time_scaling: f64,
     /// Joint positions (rad, m).
     pub position: [f64; MAX_JOINTS],
@@ -106,8 +106,8 @@ impl Default for Setpoint {
 }
 
 impl Setpoint {
-    /// Whether the message makes sense for an arm of `joints` joints: version, count, finite
-    /// numbers, known choices, sane times. Does not allocate.
+    /// Checks the message for an arm of `joints` joints: version, count, finite numbers, known
+    /// codes, valid times. Does not allocate.
     ///
     /// # Errors
     /// The first thing that is wrong.

@@ -11,7 +11,7 @@ use crate::{MAX_JOINTS, MAX_TOOLS, MessageError, PROTOCOL, ToolFeedback, ToolSta
 pub enum DriverState {
     /// No engine.
     Disconnected = 0,
-    /// The handshake is done, no setpoint has come.
+    /// The handshake is done, no setpoint has arrived.
     Synced = 1,
     /// The first setpoint of the session was the measured position; brakes are off.
     Armed = 2,
@@ -19,7 +19,7 @@ pub enum DriverState {
     Active = 3,
     /// Stops by itself.
     Stopping = 4,
-    /// Stopped by itself. Only a new session leads out of here.
+    /// Stopped by itself. Only a new session leaves this state.
     Fault = 5,
 }
 
@@ -58,15 +58,15 @@ pub enum FaultCode {
     None = 0,
     /// No setpoint within the watchdog time.
     Watchdog = 1,
-    /// A setpoint that makes no sense.
+    /// An invalid setpoint.
     BadSetpoint = 2,
-    /// A setpoint that asks for a jump, or is out of the joint's range, speed or acceleration.
+    /// A setpoint is too far from the last one, or beyond the joint's range, speed or acceleration.
     OutOfRange = 3,
     /// The engine asked for it.
     StopRequest = 4,
     /// The hardware has a fault of its own.
     Hardware = 5,
-    /// The driver itself was stopped for longer than the watchdog time.
+    /// The driver itself did not run for longer than the watchdog time.
     Stalled = 6,
     /// The driver was told to end.
     Ended = 7,
@@ -91,7 +91,7 @@ impl FaultCode {
         }
     }
 
-    /// What happened, in words.
+    /// What happened, as text.
     pub const fn reason(self) -> &'static str {
         match self {
             Self::None => "no fault",
@@ -106,7 +106,7 @@ impl FaultCode {
     }
 }
 
-/// How the joints are. Sent by the driver once in every period, also when it follows nobody.
+/// The measured state of the joints. The driver sends it once per period, also without a session.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("canter.State.1")]
@@ -115,9 +115,9 @@ pub struct State {
     pub protocol: u32,
     /// Number of joints.
     pub joints: u32,
-    /// The session under way; 0 without one.
+    /// The current session; 0 if there is none.
     pub session: u64,
-    /// Grows by one with each state sent by a driver process, from 1.
+    /// Counts the states of a driver process, from 1.
     pub sequence: u64,
     /// When the joints were measured (ns of `CLOCK_MONOTONIC`).
     pub measured_ns: u64,
@@ -149,7 +149,7 @@ pub struct State {
     pub tools: [ToolFeedback; MAX_TOOLS],
     /// Digital inputs, one bit each.
     pub digital_inputs: u64,
-    /// The hardware's own clock (ns); 0 where there is none.
+    /// The hardware's own clock (ns); 0 if there is none.
     pub hardware_ns: u64,
     /// For later; 0.
     pub reserved: [u64; 11],
@@ -184,8 +184,8 @@ impl Default for State {
 }
 
 impl State {
-    /// Whether the message makes sense for an arm of `joints` joints: version, count, finite
-    /// numbers, known choices. Does not allocate.
+    /// Checks the message for an arm of `joints` joints: version, count, finite numbers, known
+    /// codes. Does not allocate.
     ///
     /// # Errors
     /// The first thing that is wrong.
@@ -218,12 +218,12 @@ impl State {
         Ok(())
     }
 
-    /// The driver state, [`DriverState::Fault`] where the number means nothing.
+    /// The driver state; [`DriverState::Fault`] if the number is unknown.
     pub fn driver(&self) -> DriverState {
         DriverState::from_number(self.driver_state).unwrap_or(DriverState::Fault)
     }
 
-    /// The fault, [`FaultCode::Hardware`] where the number means nothing.
+    /// The fault; [`FaultCode::Hardware`] if the number is unknown.
     pub fn fault_code(&self) -> FaultCode {
         FaultCode::from_number(self.fault).unwrap_or(FaultCode::Hardware)
     }

@@ -9,8 +9,8 @@ use crate::node::{Shared, inhabitants, join, text_topic};
 use crate::request::LONGEST_ANSWER;
 use crate::{Arm, IpcError, room};
 
-/// The engine's report to everybody, as JSON. Write it a few times a second: who comes late reads
-/// the next one.
+/// The engine's status report for any process, as JSON. Write it a few times per second: a new
+/// reader gets the next one.
 #[derive(Debug)]
 pub struct StatusWriter {
     service: String,
@@ -85,7 +85,7 @@ impl StatusReader {
     /// Opens the report of `arm` for reading.
     ///
     /// # Errors
-    /// Everything that can go wrong with shared memory.
+    /// Errors of shared memory.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
         let node = join(arm, "status reader")?;
         let service = arm.service("status");

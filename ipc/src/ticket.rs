@@ -18,13 +18,13 @@ use crate::{Domain, IpcError};
 /// The folder of tickets in a domain's directory.
 const FOLDER: &str = "requests";
 
-/// The number of a request, one of its kind in a domain.
+/// The number of a request, unique in a domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RequestId {
     /// The process that asks.
     pub process: u32,
-    /// When it asked (ns since 1970), later than any request of it before.
+    /// Time of the request (ns since 1970), later than all earlier requests of the process.
     pub asked_ns: u64,
 }
 
@@ -77,7 +77,7 @@ impl Ticket {
             Err(cause) if cause.kind() != io::ErrorKind::AlreadyExists => return Err(fail(cause)),
             _ => {}
         }
-        // Locked under another name: nobody sees a ticket that is not locked yet.
+        // Locked under another name, so that no process sees an unlocked ticket.
         let path = id.path(domain);
         let draft = path.with_extension("draft");
         let lock = OpenOptions::new()
@@ -88,7 +88,7 @@ impl Ticket {
             .map_err(fail)?;
         let placed = lock.lock().and_then(|()| fs::rename(&draft, &path));
         if let Err(cause) = placed {
-            // What cannot be placed need not stay; the cause is told.
+            // A file that cannot be renamed is removed; the error is returned.
             let _ = fs::remove_file(&draft);
             return Err(fail(cause));
         }
@@ -115,13 +115,13 @@ pub(crate) fn sweep(domain: &Domain) {
         let path = entry.path();
         let is_draft = path.extension().is_some();
         if !is_draft && !is_locked(&path) {
-            // Somebody else may have done the same.
+            // Another process may have done the same.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// Whether the process that made the file lives.
+/// Whether the process that made the file still runs.
 fn is_locked(path: &Path) -> bool {
     File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
@@ -130,7 +130,7 @@ fn is_locked(path: &Path) -> bool {
 mod tests {
     use super::*;
 
-    /// What sender and engine do with one request, step by step.
+    /// The steps of sender and engine for one request.
     #[derive(Default)]
     struct World {
         ticket: Option<Ticket>,
@@ -156,7 +156,7 @@ mod tests {
         world.dead = true;
     }];
 
-    /// The engine receives a request, and takes it; it is shown the request twice.
+    /// The engine receives a request and takes it; it gets the request twice.
     const ENGINE: [Step; 4] = [receive, take_it, receive, take_it];
 
     fn receive(world: &mut World, _: &Domain, _: RequestId) {

@@ -30,13 +30,13 @@ impl ToolAction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ToolStatus {
-    /// There is no such tool, or the driver does not know.
+    /// There is no such tool, or its status is unknown.
     Unknown = 0,
     /// Open, at rest.
     Open = 1,
     /// Closed, at rest.
     Closed = 2,
-    /// On its way.
+    /// Moving.
     Moving = 3,
     /// The last order failed.
     Failed = 4,
@@ -67,9 +67,9 @@ pub struct ToolCommand {
     pub action: u32,
     /// Wanted opening (m); not used by open and close.
     pub position: f64,
-    /// Fastest allowed motion (m/s); 0 is the tool's own.
+    /// Fastest allowed motion (m/s); 0 means the tool's own value.
     pub velocity: f64,
-    /// Largest allowed force (N); 0 is the tool's own.
+    /// Largest allowed force (N); 0 means the tool's own value.
     pub force: f64,
 }
 

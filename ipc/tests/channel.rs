@@ -122,10 +122,7 @@ fn handshake() {
             .greet(&other, Duration::from_secs(5))
             .unwrap_err()
             .to_string();
-        assert!(
-            refusal.contains("protocol 99 where 1 is spoken"),
-            "{refusal}"
-        );
+        assert!(refusal.contains("protocol 99, expected 1"), "{refusal}");
         done.store(true, Ordering::Relaxed);
     });
 }
@@ -213,7 +210,7 @@ fn one_client_commands_at_a_time() {
     ownership.admit(&ask(&here, Verb::Resume), true).unwrap();
 }
 
-/// `canter shutdown`: the engine answers and is gone before the client looks again.
+/// `canter shutdown`: the engine answers and has ended before the client polls again.
 #[test]
 fn the_last_answer_of_an_engine_that_leaves_is_read() {
     for _ in 0..10 {
@@ -284,7 +281,7 @@ fn a_request_that_was_taken_is_waited_for() {
     assert!(client.join().unwrap().unwrap().accepted);
 }
 
-/// The answer to a request that timed out reaches nobody, whoever asks next.
+/// The answer to a request that timed out reaches no other client.
 #[test]
 fn an_answer_reaches_only_who_asked() {
     let arm = arm("numbered");
@@ -318,7 +315,7 @@ fn every_client_has_its_turn() {
         let flood = || {
             let client = Client::open(&arm, "flood").unwrap();
             while !stop.load(Ordering::Relaxed) {
-                // Nobody waits for the answers.
+                // No client waits for the answers.
                 let _ = client.ask(Verb::Status, Duration::ZERO);
             }
         };

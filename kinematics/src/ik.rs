@@ -22,7 +22,7 @@ pub use report::{Branches, IkFailure, IkReport, MOST_BRANCHES, Solution};
 use simd::Frame;
 
 use crate::chain::Chain;
-use crate::measure;
+use crate::measure::{self, LENGTH};
 use closed::{Branching, Closed, Raw};
 use goal::Target;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector};

@@ -7,7 +7,7 @@ use trajectory::otg::{Audit, Otg, Problem};
 
 use crate::{Ends, Problems};
 
-/// One line of the benchmark: planning times of random problems, and whether the moves are sound.
+/// One line of the benchmark: planning times of random problems, and whether the moves are valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OtgRow {
     /// Number of joints.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use nalgebra::Isometry3;
 use trajectory::smooth::{RESOLUTION, SmoothOptions, Windows, plan};
 
-/// What planning one list of poses gave: a row of `canter bench motion`.
+/// The result of planning one list of poses: a row of `canter bench motion`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measure {
     /// Number of poses, the start included.
@@ -59,8 +59,8 @@ impl Measure {
     }
 }
 
-/// Plans one list of poses in pure tool space and measures the result. Poses
-/// in m; the first is the start.
+/// Plans one list of poses for a tool without an arm and measures the result. Poses in m; the first
+/// is the start.
 ///
 /// ```
 /// use nalgebra::Isometry3;

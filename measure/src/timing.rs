@@ -6,8 +6,8 @@ use trajectory::{TimingOptions, ToolLimits, time_path};
 
 use crate::RandomPaths;
 
-/// One line of the benchmark: random spline paths of so many joints and waypoints, each timed
-/// with pieces and certificate.
+/// One line of the benchmark: random spline paths with given numbers of joints and waypoints, each
+/// with time law, pieces and certificate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimingRow {
     /// Number of joints.
@@ -26,7 +26,7 @@ pub struct TimingRow {
     pub p99_ms: f64,
     /// Mean duration of the motions (s).
     pub motion_s: f64,
-    /// Mean of duration over its lower bound, which knows no jerk limit but on straight lines.
+    /// Mean of duration / lower bound; the bound uses jerk limits only on straight lines.
     pub optimality: f64,
     /// Largest distance of a joint from its path (rad).
     pub fit_error: f64,

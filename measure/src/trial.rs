@@ -1,9 +1,9 @@
-//! A list of poses tried on a robot: what a benchmark of smooth motions measures.
+//! Plans a list of poses for a robot and measures the motion: one case of a benchmark of smooth
+//! motions.
 //!
-//! The list has a frame of its own; it is laid before the robot so that its middle is where the
-//! flange is at home, its axes along those of the workstation, and the orientation it calls
-//! identity is that of the flange at home. The flange carries nothing: arms are compared, not
-//! their end effectors.
+//! The list has its own frame. It is placed so that its middle is at the flange's home position,
+//! its axes are parallel to those of the workstation, and its identity orientation is that of the
+//! flange at home. The flange has no end effector, so that arms are compared and not their tools.
 
 use std::time::Instant;
 
@@ -31,7 +31,7 @@ pub struct Trial {
 const STARTS: usize = 8;
 
 impl Trial {
-    /// The poses in the workstation, laid before a robot that has its flange at `home`.
+    /// The poses in the workstation, placed for a robot that has its flange at `home`.
     ///
     /// ```
     /// use nalgebra::{Isometry3, Vector3};

@@ -43,7 +43,7 @@ pub enum PlanError {
         /// Program, subcommand and process id of the holder.
         holder: String,
     },
-    /// A file of the database was taken away or changed while it was in use.
+    /// A file of the database was removed or changed while it was in use.
     #[error(
         "{path} {what} while this process used it; nothing more is written, and what the arm did \
          since the last commit is not recorded; restore the file or begin with a new database"

@@ -13,19 +13,18 @@ use crate::motion::{PlannedMove, Planner};
 use crate::robot::{Robot, RobotError, vector};
 use crate::task::Task;
 
-/// A command that has left the queue: what it means and, for a move, the
-/// trajectory that does it.
+/// A command that has left the queue: its task and, for a move, its trajectory.
 #[derive(Clone, Debug)]
 pub struct Step<const N: usize> {
     /// What the command means.
     pub task: Task,
     /// The trajectory, for a move.
     pub planned: Option<PlannedMove<N>>,
-    /// Nominal length in servo ticks; what a driver answers is waited for besides.
+    /// Nominal length in servo ticks, without the time until a driver's answer.
     pub ticks: u64,
 }
 
-/// A step that was planned before its turn came, with what it stands on and what it leaves behind.
+/// A step that was planned ahead, with the state it was planned for and the state after it.
 #[derive(Clone, Debug)]
 pub struct PlannedStep<const N: usize> {
     /// The step itself.
@@ -45,7 +44,7 @@ pub struct PlannedStep<const N: usize> {
 pub struct AnyStep(Box<dyn Any + Send>);
 
 impl AnyStep {
-    /// The step, for a robot of `N` joints; none for one of a robot with another number.
+    /// The step, for a robot of `N` joints; `None` for another number of joints.
     #[must_use]
     pub fn into_step<const N: usize>(self) -> Option<PlannedStep<N>> {
         self.0.downcast().ok().map(|step| *step)
@@ -66,8 +65,8 @@ impl<const N: usize> PlannedStep<N> {
     }
 }
 
-/// Resolves and plans commands one after the other, each from where the one
-/// before it ends. Nothing in here moves an arm.
+/// Resolves and plans commands one after the other, each from where the one before it ends. It does
+/// not move an arm.
 #[derive(Clone, Debug)]
 pub struct Controller<const N: usize> {
     workstation_from_flange: Chain<N>,
@@ -84,7 +83,7 @@ impl<const N: usize> Controller<N> {
     /// A controller for `robot`, unready, at its home position.
     ///
     /// # Errors
-    /// [`RobotError`] when the robot has not `N` joints or its description is at fault.
+    /// [`RobotError`] when the robot does not have `N` joints or its description is wrong.
     pub fn new(robot: &Robot, rate_hz: f64, length: LengthUnit) -> Result<Self, RobotError> {
         let workstation_from_flange = robot.chain::<N>()?;
         let limits = robot.joint_limits::<N>();
@@ -161,10 +160,10 @@ impl<const N: usize> Controller<N> {
         self.chain().forward(&self.joints)
     }
 
-    /// Resolves a command with the settings in force and plans it whole.
+    /// Resolves a command with the present settings and plans it as a whole.
     ///
     /// # Errors
-    /// A [`CommandError`]; the controller is then as before.
+    /// A [`CommandError`]; the controller is then unchanged.
     pub fn step(&mut self, command: &crcl::Command) -> Result<Step<N>, CommandError> {
         let flange = self.workstation_from_flange.forward(&self.joints);
         let task = self.modal.resolve(command, &flange)?;
@@ -205,7 +204,7 @@ impl<const N: usize> Controller<N> {
         Ok(step)
     }
 
-    /// What a command means here and now; nothing is planned and nothing changes.
+    /// The task of a command in the present modes; nothing is planned and nothing changes.
     ///
     /// # Errors
     /// A [`CommandError`] for a command that is out of order or out of range.
@@ -224,7 +223,7 @@ impl<const N: usize> Controller<N> {
     /// As [`Self::step`]; the step can be executed later, by [`Self::follow`].
     ///
     /// # Errors
-    /// A [`CommandError`]; the controller is then as before.
+    /// A [`CommandError`]; the controller is then unchanged.
     pub fn step_ahead(&mut self, command: &crcl::Command) -> Result<PlannedStep<N>, CommandError> {
         let (start, before) = (self.joints, self.modal.clone());
         let step = self.step(command)?;
@@ -238,9 +237,9 @@ impl<const N: usize> Controller<N> {
         })
     }
 
-    /// Takes a step that was planned before, without planning it again. Says whether that was
-    /// possible: only for a controller of the same robot whose joints, modes and servo rate are
-    /// exactly those that the step was planned for. Otherwise the controller is as before.
+    /// Executes a step that was planned before, without planning it again. Returns whether that was
+    /// possible: only if joints, modes and servo rate are exactly those that the step was planned
+    /// for, and the robot is the same. Otherwise the controller is unchanged.
     pub fn follow(&mut self, planned: &PlannedStep<N>) -> bool {
         let same = self.joints == planned.start && self.modal == planned.before;
         if !same || self.rate_hz.to_bits() != planned.rate_hz.to_bits() {
@@ -260,9 +259,9 @@ impl<const N: usize> Controller<N> {
         self.plans
     }
 
-    /// Whole servo periods that hold a time, rounded up.
+    /// A time in whole servo periods, rounded up.
     fn ticks(&self, seconds: f64) -> u64 {
-        // A duration that is whole but for rounding is not given another tick.
+        // A duration that is whole up to rounding gets no additional tick.
         (seconds * self.rate_hz - 1e-6).ceil().max(0.0) as u64
     }
 

@@ -18,12 +18,12 @@ pub struct PlanOptions {
     pub rate_hz: f64,
     /// Unit of length before SetLengthUnits and after InitCanon.
     pub default_length: LengthUnit,
-    /// Whether planning goes on after a command that is refused.
+    /// Whether planning continues after a command that is refused.
     pub on_refusal: FailurePolicy,
     /// Joint positions at the start (rad, m); the robot's home unless given.
     pub start: Option<Vec<f64>>,
-    /// A clock that only goes forward (s), for the planning times in the plan; this crate has
-    /// none. Without one they are 0.
+    /// A monotonic clock (s), for the planning times in the plan; this crate has none. Without it
+    /// they are 0.
     pub clock: fn() -> f64,
 }
 
@@ -45,9 +45,9 @@ pub enum FailurePolicy {
     /// Stop, drop what waits, accept only InitCanon.
     #[default]
     Abort,
-    /// The command has no effect; go on with the next.
+    /// The command has no effect; continue with the next.
     Skip,
-    /// Stop and keep what waits, until the operator decides.
+    /// Stop and keep the waiting commands until the operator decides.
     Hold,
 }
 
@@ -147,8 +147,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// States at `0, period, 2 period, ...` up to the end; an instant that
-    /// two commands share belongs to the one that ends there.
+    /// States at `0, period, 2 period, ...` up to the end; a time that two commands share belongs
+    /// to the one that ends there.
     pub fn samples(&self, period: f64) -> impl Iterator<Item = PlanSample> + '_ {
         let count = if self.commands.is_empty() || period.is_nan() || period <= 0.0 {
             0

@@ -27,7 +27,7 @@ pub struct EndEffector {
 /// The part of the flange that takes end effectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolChanger {
-    /// Time to let go, s.
+    /// Time to release, s.
     pub opening: f64,
     /// Time to take hold, s.
     pub closing: f64,

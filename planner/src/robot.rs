@@ -56,7 +56,7 @@ pub struct ToolLimits {
     pub source: String,
 }
 
-/// A robot as the planner needs it. All vectors have one entry a joint.
+/// A robot for the planner. All vectors have one entry per joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
     /// Short name: the shipped name, or that of the folder.
@@ -71,7 +71,7 @@ pub struct Robot {
     pub joints: JointLimits,
     /// Limits of the controlled point.
     pub tool: ToolLimits,
-    /// Where the robot's base stands in the workstation.
+    /// Pose of the robot's base in the workstation.
     pub workstation_from_base: Isometry3<f64>,
     /// A ready position: well inside the limits and away from singular poses.
     pub home: Vec<f64>,
@@ -90,7 +90,7 @@ pub struct Robot {
 /// taken for a folder; all else is a shipped name.
 ///
 /// # Errors
-/// [`RobotError`]; faults of files name file, line and column.
+/// [`RobotError`]; errors in files name file, line and column.
 ///
 /// ```
 /// let robot = planner::robot::load("ur5e")?;
@@ -124,7 +124,7 @@ pub fn load(name_or_folder: &str) -> Result<Robot, RobotError> {
 /// Reads a robot from the texts of its two files, without touching the disk.
 ///
 /// # Errors
-/// [`RobotError`]; faults name file, line and column.
+/// [`RobotError`]; errors name file, line and column.
 pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
     file::Files {
         name,
@@ -135,7 +135,7 @@ pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
     .read()
 }
 
-/// Largest file of a robot folder, bytes: a URDF of a factory has a hundredth of it.
+/// Largest file of a robot folder, bytes: the URDF of a whole factory has a hundredth of it.
 const LARGEST: u64 = 64 << 20;
 
 /// The text of a regular file: a pipe would wait for a writer, a device may never end.
@@ -185,7 +185,7 @@ impl Robot {
         self.model.dof()
     }
 
-    /// The arm with its base placed in the workstation; poses are those of the flange.
+    /// The arm with its base in the workstation; poses are those of the flange.
     ///
     /// # Errors
     /// [`RobotError::Urdf`] when the robot does not have `N` joints.
@@ -219,7 +219,7 @@ impl Robot {
     }
 }
 
-/// One value a joint as a vector; joints that are missing get zero.
+/// One value per joint as a vector; missing joints get zero.
 #[must_use]
 pub fn vector<const N: usize>(values: &[f64]) -> SVector<f64, N> {
     SVector::from_fn(|i, _| values.get(i).copied().unwrap_or(0.0))

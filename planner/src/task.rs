@@ -13,7 +13,7 @@ pub enum Task {
         /// Reason given by the program.
         reason: i64,
     },
-    /// A setting was taken over; nothing happens in the world.
+    /// A setting was applied; nothing moves.
     Setting,
     /// Show a text on the operator console.
     Message {
@@ -36,10 +36,10 @@ pub enum Task {
     },
 }
 
-/// Shape of the way to the last pose.
+/// Shape of the path to the last pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Any convenient way: joint space.
+    /// Any convenient path: joint space.
     Joint,
     /// Straight line of the controlled point.
     Straight,
@@ -50,7 +50,7 @@ pub enum Shape {
 /// One motion from the current pose, at rest, to the last of `poses`, at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {
-    /// Shape of the way.
+    /// Shape of the path.
     pub shape: Shape,
     /// Poses of the controlled point, `workstation_from_tool`, in order; never empty.
     pub poses: Vec<Isometry3<f64>>,
@@ -60,7 +60,7 @@ pub struct Move {
     pub limits: ToolLimits,
 }
 
-/// What a tool can be told to do.
+/// An action of a tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToolAction {
     /// Open the gripper of the mounted end effector.

@@ -11,7 +11,7 @@ use crate::task::ToolAction;
 pub struct Holder {
     /// Name, unique in a station.
     pub name: String,
-    /// Where the arm's end is while it leaves or takes an end effector here.
+    /// Pose of the arm's end while it leaves or takes an end effector here.
     pub workstation_from_flange: Isometry3<f64>,
     /// Index of the end effector that is in the holder.
     pub holds: Option<usize>,
@@ -30,7 +30,7 @@ pub struct Tooling {
     pub gripper_open: Option<bool>,
     /// Whether the tool changer is open.
     pub changer_open: bool,
-    /// Nominal times of the tool changer; none on an arm without.
+    /// Nominal times of the tool changer; `None` for an arm without one.
     pub changer: Option<ToolChanger>,
 }
 
@@ -64,7 +64,7 @@ impl Tooling {
         self.mounted.and_then(|index| self.end_effectors.get(index))
     }
 
-    /// Checks an action with the arm's end at `workstation_from_flange` and takes it over.
+    /// Checks an action with the arm's end at `workstation_from_flange` and applies it.
     ///
     /// # Errors
     /// A gripper-use or tool-change error; the state is then unchanged.

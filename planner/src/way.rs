@@ -7,14 +7,14 @@ use crate::command_error::CommandError;
 use crate::controller::{Controller, PlannedStep};
 use crate::task::Task;
 
-/// Time (s) from one look at a free way to the next.
+/// Time (s) between two checks of a free path.
 const LOOK: f64 = 0.01;
 
-/// How far (m) a free way may go below its lower end: half of the distance that is kept while
-/// travelling.
+/// How far (m) a free path may go below its lower end: half of the clearance that is kept during
+/// travel.
 const DIP: f64 = 0.02;
 
-/// Most parts that a straight way is made in.
+/// Largest number of parts of a straight path.
 const MOST_PARTS: usize = 8;
 
 /// A command as it is executed, and how.
@@ -26,14 +26,14 @@ pub struct Leg<const N: usize> {
     pub planned: PlannedStep<N>,
 }
 
-/// Plans a command of a plan; gives the commands that do it.
+/// Plans a command of a plan; returns the commands that do it.
 ///
 /// A `MoveTo` becomes a `MoveStraightTo` where it would go below its lower end by more than 20 mm.
-/// A `MoveStraightTo` that an arm with more than six joints cannot go at once is made in up to
-/// eight parts with a rest between them, in which the arm chooses its posture anew.
+/// A `MoveStraightTo` that an arm with more than six joints cannot do in one move is divided into
+/// up to eight parts with a rest between them; for each part the arm chooses its posture again.
 ///
 /// # Errors
-/// A [`CommandError`]; the controller is then as before.
+/// A [`CommandError`]; the controller is then unchanged.
 pub fn plan_way<const N: usize>(
     controller: &mut Controller<N>,
     command: &Command,
@@ -53,8 +53,8 @@ fn leg<const N: usize>(
     Ok(Leg { command, planned })
 }
 
-/// A free way between two places above the workstation, unless the arm would come down on it: then
-/// a straight one.
+/// A free path between two places above the workstation; a straight one if the free path would go
+/// too low.
 fn free<const N: usize>(
     controller: &mut Controller<N>,
     pose: &Pose,
@@ -76,7 +76,7 @@ fn free<const N: usize>(
     Ok(vec![leg])
 }
 
-/// A straight way, in parts where the arm cannot go it at once.
+/// A straight path, divided into parts if the arm cannot do it in one move.
 fn straight<const N: usize>(
     controller: &mut Controller<N>,
     pose: &Pose,

@@ -95,7 +95,7 @@ fn faults_of_robot_toml_name_the_place() {
         (
             "jerk_per_s3 = [100.0, ",
             "jerk_per_s3 = [",
-            "joints.jerk_per_s3: expected 6 numbers, one a joint",
+            "joints.jerk_per_s3: expected 6 numbers, one per joint",
         ),
         (
             "jerk_per_s3",

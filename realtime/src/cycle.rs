@@ -22,7 +22,7 @@ pub enum Demand {
 pub struct Step<const N: usize> {
     /// The setpoint.
     pub setpoint: Sample<N>,
-    /// The command under way, or the last one.
+    /// The current command, or the last one.
     pub command: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,
@@ -138,7 +138,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         &self.setpoint
     }
 
-    /// The command under way, or the last one.
+    /// The current command, or the last one.
     pub fn command(&self) -> u32 {
         self.command
     }

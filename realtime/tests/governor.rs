@@ -245,7 +245,7 @@ proptest! {
     #![proptest_config(config(200))]
 
     /// A stop from an unhurried motion takes no longer than the joints need; and after it the arm
-    /// rests where it is until it is told to go on.
+    /// rests where it is until a resume.
     #[test]
     fn a_stop_stops(pieces in motion(), at in 0.05..0.8_f64, fast in any::<bool>()) {
         let slow = stretch(&pieces, 2.0);

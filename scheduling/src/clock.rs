@@ -1,6 +1,6 @@
 //! The clock that times in messages use, and sleeping until a time of it.
 
-/// The time of `CLOCK_MONOTONIC` (ns): the clock of every time in a message. It never jumps.
+/// The time of `CLOCK_MONOTONIC` (ns). All times in messages use this clock. It never jumps.
 pub fn now_ns() -> u64 {
     let mut time = libc::timespec {
         tv_sec: 0,

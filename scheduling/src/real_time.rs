@@ -12,7 +12,7 @@ pub struct RealTimeRequest {
     pub processor: Option<usize>,
     /// Keep all memory of the process in RAM.
     pub lock_memory: bool,
-    /// Keep the processors awake while the guard lives.
+    /// Keep the processors out of sleep states while the guard exists.
     pub low_latency: bool,
 }
 
@@ -27,7 +27,7 @@ impl Default for RealTimeRequest {
     }
 }
 
-/// What was granted. The processors stay awake as long as this lives.
+/// What was granted. The processors stay out of sleep states as long as this exists.
 #[derive(Debug, Default)]
 pub struct Granted {
     /// What was refused, each with the remedy.
@@ -36,7 +36,7 @@ pub struct Granted {
 }
 
 impl Granted {
-    /// One warning for a person, or nothing if all was granted.
+    /// One warning for the user, or nothing if all was granted.
     pub fn warning(&self) -> Option<String> {
         (!self.refused.is_empty())
             .then(|| format!("deadlines are not guaranteed: {}", self.refused.join("; ")))
@@ -74,7 +74,7 @@ pub fn request_real_time(wish: RealTimeRequest) -> Granted {
     granted
 }
 
-/// Locks all memory, now and later; not where a limit would make later requests for memory fail.
+/// Locks all memory, now and later; not if a limit would make later allocations fail.
 #[expect(unsafe_code, reason = "no safe interface in the standard library")]
 fn lock_memory() -> bool {
     const ENOUGH: libc::rlim_t = 1 << 30;
@@ -112,7 +112,7 @@ fn set_processor(processor: usize) -> bool {
     }
 }
 
-/// A wish for no latency holds as long as the file is open.
+/// The request for low latency holds as long as the file is open.
 fn hold_latency() -> Option<File> {
     let mut file = OpenOptions::new()
         .write(true)

@@ -14,13 +14,13 @@ pub struct ExecutorConfig<const N: usize> {
     pub arm: Arm,
     /// Setpoints a second, 100 to 4000.
     pub rate_hz: f64,
-    /// By the clock, or in step with the driver.
+    /// By the wall clock, or in lock-step with the driver.
     pub clock: Clock,
-    /// What the joints may do: the last check before a setpoint leaves.
+    /// Limits of the joints, for the last check of each setpoint.
     pub limits: JointLimits<N>,
     /// How far the measured position may be from the setpoint.
     pub following: Following,
-    /// The driver stops by itself when it has had no setpoint for this long.
+    /// The driver stops by itself after this time without setpoints.
     pub watchdog: Duration,
     /// No state for this long means that the driver is lost.
     pub patience: Duration,
@@ -30,8 +30,9 @@ pub struct ExecutorConfig<const N: usize> {
     pub model: u64,
     /// What the thread asks of the operating system; nothing of it in lock-step.
     pub real_time: RealTimeRequest,
-    /// In lock-step: time stands while the planner thinks or there is nothing to do, so that the
-    /// same program gives the same periods. The planner must tell: [`super::SegmentSender::settle`].
+    /// In lock-step: simulated time is stopped while the planner works or there is nothing to do,
+    /// so that the same program gives the same periods. The planner must call
+    /// [`super::SegmentSender::settle`].
     pub wait_for_planner: bool,
     /// Whether each setpoint and measured position is recorded for [`super::Monitor::sample`].
     pub record: bool,

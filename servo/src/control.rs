@@ -5,16 +5,15 @@
 pub enum Control {
     /// Stop on the path and wait for [`Control::Resume`].
     Pause,
-    /// Go on along the path.
+    /// Continue along the path.
     Resume,
-    /// Share of the planned speed, 0..=1; what is outside is brought inside, what is not a number
-    /// is ignored.
+    /// Fraction of the planned speed, 0..=1; other values are clamped, NaN is ignored.
     Override(f64),
     /// Stop on the path and wait for [`Control::Resume`].
     Stop {
         /// As fast as the joints can.
         fast: bool,
     },
-    /// Stop on the path, then forget all that was pushed.
+    /// Stop on the path, then drop everything that was pushed.
     Abort,
 }

@@ -22,12 +22,12 @@ pub enum Fault {
     DriverFault {
         /// Why.
         code: FaultCode,
-        /// Which joint, from 0, where it is about one.
+        /// Which joint, from 0, if the fault is about one.
         joint: Option<u32>,
     },
-    /// A state that makes no sense.
+    /// An invalid state.
     BadState(MessageError),
-    /// The real-time thread was kept from running for longer than the watchdog.
+    /// The real-time thread did not run for longer than the watchdog.
     Stalled {
         /// How long (ms).
         late_ms: u64,
@@ -66,7 +66,7 @@ impl fmt::Display for Fault {
                 write!(f, "driver fault at joint {}: {}", joint + 1, code.reason())
             }
             Self::DriverFault { code, joint: None } => write!(f, "driver fault: {}", code.reason()),
-            Self::BadState(cause) => write!(f, "a state of the driver makes no sense: {cause}"),
+            Self::BadState(cause) => write!(f, "invalid state of the driver: {cause}"),
             Self::Stalled { late_ms } => write!(f, "the real-time thread was {late_ms} ms late"),
             Self::Tool { tool, timeout } => {
                 let name = if *tool == ipc::GRIPPER {
@@ -86,7 +86,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What happened, and in which period since the start.
+/// An event, and its period since the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A command starts to move, or a tool order goes out.
@@ -108,14 +108,14 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
-    /// What was queued is forgotten; the arm rests.
+    /// The queue was dropped; the arm rests.
     Aborted {
-        /// How many aborts were asked for by then: what was given after the last of them counts.
+        /// Number of aborts asked for until then: commands given after the last of them stay.
         aborts: u32,
         /// The period.
         tick: u64,
     },
-    /// Something went wrong; the arm is being stopped.
+    /// A fault; the arm is being stopped.
     Faulted {
         /// What.
         fault: Fault,
@@ -139,7 +139,7 @@ pub enum Event {
 pub struct Recorded<const N: usize> {
     /// The period since the start.
     pub tick: u64,
-    /// The command under way, or the last one.
+    /// The current command, or the last one.
     pub command: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,

@@ -61,7 +61,7 @@ impl<const N: usize> Executor<N> {
                 Ok((executor, sender, monitor))
             }
             Err(error) => {
-                // The thread has ended or is about to; what it would say has been said.
+                // The thread has ended or is about to; it has reported everything.
                 let _ = thread.join();
                 Err(error)
             }
@@ -88,7 +88,7 @@ impl<const N: usize> Executor<N> {
     fn end(&mut self) {
         self.remote.steering().shut_down();
         if let Some(thread) = self.thread.take() {
-            // A thread that panicked has already said so; there is nothing left to end.
+            // A thread that panicked has already printed it; there is nothing left to end.
             let _ = thread.join();
         }
     }

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-/// Buckets an octave: a bucket is at most a sixteenth of its value wide.
+/// Buckets per octave: the width of a bucket is at most a sixteenth of its value.
 const FINE: u64 = 16;
 
 /// Buckets in all: up to 2^40 ns, about 18 minutes.
@@ -23,7 +23,7 @@ impl Histogram {
         }
     }
 
-    /// The bucket of a value: linear below [`FINE`], then [`FINE`] an octave.
+    /// The bucket of a value: linear below [`FINE`], then [`FINE`] per octave.
     fn bucket(value: u64) -> usize {
         if value < FINE {
             return value as usize;
@@ -64,8 +64,8 @@ impl Histogram {
         self.largest.load(Ordering::Relaxed)
     }
 
-    /// The duration (ns) that `share` (0..=1) of those counted do not exceed, to a sixteenth;
-    /// 0 without any.
+    /// The quantile `share` (0..=1) of the counted durations (ns), to a sixteenth; 0 if none was
+    /// counted.
     pub fn quantile(&self, share: f64) -> u64 {
         let wanted = (share.clamp(0.0, 1.0) * self.total() as f64).ceil() as u64;
         let mut seen = 0;

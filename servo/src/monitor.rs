@@ -4,7 +4,7 @@ use rtrb::Consumer;
 
 use super::event::{Event, Recorded};
 
-/// The reader's end: what happened, and what was published and measured.
+/// The reader of events and of published and measured samples.
 #[derive(Debug)]
 pub struct Monitor<const N: usize> {
     pub(super) events: Consumer<Event>,
@@ -26,7 +26,8 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// The oldest sample that was not read yet; none without [`super::ExecutorConfig::record`]. In
-    /// lock-step the thread waits for the reader, by the clock it drops what has no room.
+    /// lock-step the thread waits for the reader; by the wall clock it drops samples that do not
+    /// fit.
     pub fn sample(&mut self) -> Option<Recorded<N>> {
         self.samples.pop().ok()
     }

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::control::Control;
 
-/// How the arm shall behave, as two bits of the word of orders.
+/// The demanded behaviour of the arm, as two bits of the word of orders.
 const RUN: u64 = 0;
 const GENTLE: u64 = 1;
 const FAST: u64 = 2;
@@ -26,8 +26,8 @@ const ABORT: u64 = 1 << 8;
 const ABORTS: u64 = 0x00ff_ff00;
 const ORDER: u64 = 1 << 32;
 
-/// What was asked for, as the real-time thread reads it once in a period: all of it at once, so
-/// that no order is lost between two others.
+/// The orders, as the real-time thread reads them once per period: all at once, so that no order is
+/// lost between two others.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Asked {
     word: u64,
@@ -105,11 +105,11 @@ pub struct NoFault;
 #[derive(Debug, Default)]
 pub(super) struct Orders {
     word: AtomicU64,
-    /// Share of the planned speed, as its distance from 1 in bits: 0 is full speed.
+    /// Fraction of the planned speed, as its distance from 1 in bits: 0 is full speed.
     share: AtomicU64,
-    /// Number of the last order that lets the arm go on.
+    /// Number of the last order that resumes the motion.
     resumed: AtomicU32,
-    /// Number of the latched fault, how many there were, and which one shall be cleared.
+    /// Number of the latched fault, the number of faults so far, and which one should be cleared.
     fault: AtomicU32,
     faults: AtomicU32,
     recover: AtomicU32,
@@ -128,7 +128,8 @@ const FULL: u64 = 1.0_f64.to_bits();
 impl Orders {
     /// What is asked for now.
     pub(super) fn asked(&self) -> Asked {
-        // The share is stored before the order's number: who sees the number sees the share.
+        // The share is stored before the order's number: a thread that sees the number also sees
+        // the share.
         let word = self.word.load(Ordering::Acquire);
         let share = f64::from_bits(self.share.load(Ordering::Acquire) ^ FULL);
         Asked { word, share }
@@ -150,7 +151,7 @@ impl Orders {
         self.fault.store(0, Ordering::Release);
     }
 
-    /// Whether the latched fault shall be cleared. An order about another fault says nothing.
+    /// Whether the latched fault should be cleared. An order about another fault has no effect.
     pub(super) fn wants_recovery(&self) -> bool {
         let fault = self.fault.load(Ordering::Acquire);
         fault != 0 && self.recover.load(Ordering::Acquire) == fault
@@ -165,7 +166,7 @@ impl Orders {
         self.ended.store(true, Ordering::Release);
     }
 
-    /// Tells where the motion is after a period; only the real-time thread does.
+    /// Publishes the progress of the motion after a period; only the real-time thread calls it.
     pub(super) fn tell(&self, now: &Progress) {
         let version = self.version.load(Ordering::Relaxed);
         self.version
@@ -239,27 +240,27 @@ impl Orders {
     }
 }
 
-/// Everybody's hand on the motion, for an arm of any number of joints. Cheap to clone, usable from
-/// any thread; what it does is a few atomic operations, whatever any other thread is doing.
+/// A handle to control the motion, for an arm with any number of joints. Cheap to clone, usable
+/// from any thread; each call is a few atomic operations, whatever other threads do.
 #[derive(Clone, Debug)]
 pub struct Steering {
     pub(super) orders: Arc<Orders>,
 }
 
 impl Steering {
-    /// Asks for something; it acts in the next period. Gives the number of the order, for
+    /// Gives an order, which acts in the next period. Returns the number of the order, for
     /// [`Progress::has`].
     pub fn control(&self, control: Control) -> u32 {
         self.orders.control(control)
     }
 
-    /// Asks for a new session with the driver, which clears the fault that is latched now and
-    /// forgets all that was pushed. The answer is an event: [`super::Event::Recovered`], or
-    /// [`super::Event::Faulted`] again. Gives the number of the fault, which
-    /// [`Progress::fault`] shows until it is cleared.
+    /// Asks for a new session with the driver, which clears the fault that is latched now and drops
+    /// everything that was pushed. The answer is an event: [`super::Event::Recovered`], or
+    /// [`super::Event::Faulted`] again. Returns the number of the fault, which [`Progress::fault`]
+    /// shows until it is cleared.
     ///
     /// # Errors
-    /// [`NoFault`], and nothing is left behind that could act later.
+    /// [`NoFault`]; the request then has no later effect.
     pub fn recover(&self) -> Result<u32, NoFault> {
         match self.orders.fault.load(Ordering::Acquire) {
             0 => Err(NoFault),
@@ -270,12 +271,12 @@ impl Steering {
         }
     }
 
-    /// Where the motion is, as of the last period.
+    /// The progress of the motion, as of the last period.
     pub fn progress(&self) -> Progress {
         self.orders.progress()
     }
 
-    /// How many aborts were asked for. What was given before an abort is dropped by it.
+    /// Number of aborts asked for. An abort drops the commands given before it.
     pub fn aborts(&self) -> u32 {
         self.orders.asked().aborts()
     }
@@ -322,13 +323,13 @@ mod tests {
             ..Progress::default()
         };
         assert!(progress.has(1) && progress.has(fast) && !progress.has(fast + 1));
-        // An abort lets go of the stop, keeps how hard the arm brakes, and is one order.
+        // An abort cancels the stop, keeps its stop category, and is one order.
         let abort = hand.control(Control::Abort);
         let asked = hand.orders.asked();
         assert_eq!((asked.order(), asked.aborts()), (abort, 1));
         assert_eq!(asked.abort_category(), StopCategory::Fast);
         assert!(!asked.holds());
-        // A stop after the abort holds, whatever the abort let go of.
+        // A stop after the abort holds, although the abort cancelled the one before.
         hand.control(Control::Pause);
         let asked = hand.orders.asked();
         assert_eq!((asked.aborts(), asked.holds()), (1, true));

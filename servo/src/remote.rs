@@ -43,7 +43,7 @@ pub struct Counters {
     pub ticks: u64,
     /// Setpoints that iceoryx2 did not take.
     pub unsent: u64,
-    /// Events and samples that nobody fetched in time.
+    /// Events and samples that were not read in time.
     pub lost_reports: u64,
     /// Setpoints that the driver missed, by its own count.
     pub driver_missed: u64,
@@ -55,7 +55,8 @@ pub(super) struct Shared<const N: usize> {
     /// What is asked for.
     pub(super) orders: Arc<Orders>,
     epoch: AtomicU32,
-    /// Events reported, and how many of them the planner had seen when it had no more to do.
+    /// Number of events reported, and how many of them the planner had seen when it had nothing
+    /// more to do.
     reported: AtomicU64,
     answered: AtomicU64,
     version: AtomicU32,
@@ -105,17 +106,18 @@ impl<const N: usize> Shared<N> {
         self.epoch.load(Ordering::Acquire)
     }
 
-    /// Begins a new epoch: what belongs to the old one is dropped.
+    /// Begins a new epoch: segments of the old one are dropped.
     pub(super) fn new_epoch(&self) -> u32 {
         self.epoch.fetch_add(1, Ordering::AcqRel).wrapping_add(1)
     }
 
-    /// Counts an event that the planner shall see.
+    /// Counts an event that the planner must see.
     pub(super) fn count_report(&self) {
         self.reported.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// The planner has nothing more to do, having seen `events`; `None` when it has.
+    /// Sets that the planner has seen `events` and has nothing more to do; `None`: it has something
+    /// to do.
     pub(super) fn answer(&self, events: Option<u64>) {
         self.answered
             .store(events.unwrap_or(u64::MAX), Ordering::Release);
@@ -126,7 +128,7 @@ impl<const N: usize> Shared<N> {
         self.answered.load(Ordering::Acquire) == self.reported.load(Ordering::Acquire)
     }
 
-    /// Writes where the arm is; only the real-time thread does.
+    /// Publishes the position of the arm; only the real-time thread calls it.
     pub(super) fn write(&self, now: &Measured<N>) {
         let version = self.version.load(Ordering::Relaxed);
         self.version
@@ -155,7 +157,7 @@ impl<const N: usize> Shared<N> {
             .store(version.wrapping_add(2), Ordering::Release);
     }
 
-    /// Reads where the arm is; a reader that collides with the writer tries again.
+    /// Reads the position of the arm; a reader that collides with the writer tries again.
     pub(super) fn read(&self) -> Measured<N> {
         let load = |from: &[AtomicU64; N]| {
             SVector::from_fn(|joint, _| {
@@ -191,25 +193,25 @@ impl<const N: usize> Shared<N> {
     }
 }
 
-/// Everybody's end: control, and where the arm is. Cheap to clone, usable from any thread.
+/// A handle for control and for the position of the arm. Cheap to clone, usable from any thread.
 #[derive(Clone, Debug)]
 pub struct Remote<const N: usize> {
     pub(super) shared: Arc<Shared<N>>,
 }
 
 impl<const N: usize> Remote<N> {
-    /// Asks for something; it acts in the next period. Gives the number of the order, for
+    /// Gives an order, which acts in the next period. Returns the number of the order, for
     /// [`super::Progress::has`].
     pub fn control(&self, control: Control) -> u32 {
         self.steering().control(control)
     }
 
-    /// Asks for a new session with the driver, which clears the fault that is latched now and
-    /// forgets all that was pushed. The answer is an event: [`super::Event::Recovered`], or
-    /// [`super::Event::Faulted`] again. Gives the number of the fault.
+    /// Asks for a new session with the driver, which clears the fault that is latched now and drops
+    /// everything that was pushed. The answer is an event: [`super::Event::Recovered`], or
+    /// [`super::Event::Faulted`] again. Returns the number of the fault.
     ///
     /// # Errors
-    /// [`NoFault`], and nothing is left behind that could act later.
+    /// [`NoFault`]; the request then has no later effect.
     pub fn recover(&self) -> Result<u32, NoFault> {
         self.steering().recover()
     }
@@ -251,7 +253,7 @@ impl<const N: usize> Remote<N> {
         &self.shared.work
     }
 
-    /// How old the newest state was when a setpoint was made (ns).
+    /// Age of the newest state when a setpoint was made (ns).
     pub fn state_age(&self) -> &Histogram {
         &self.shared.state_age
     }

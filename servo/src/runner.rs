@@ -20,19 +20,19 @@ use super::segment_sender::{Item, SegmentSender, ToolOrder, Work};
 
 use message::first;
 
-/// Planned segments that the cycle has at hand.
+/// Number of planned segments in the cycle's buffer.
 const AT_HAND: usize = 512;
 
-/// Items on their way from the planner.
+/// Items from the planner.
 const RING: usize = 4096;
 
 /// Events and samples that wait for their reader.
 const REPORTS: usize = 1 << 14;
 
-/// Items taken from the ring in a period at most.
+/// Largest number of items taken from the ring per period.
 const A_PERIOD: usize = 64;
 
-/// In about this time a driver is back where the setpoints are after a stall (s).
+/// Time in which a driver returns to the setpoints after a stall, about (s).
 const REJOIN: f64 = 0.25;
 
 /// When a period runs.
@@ -48,7 +48,7 @@ pub struct Tick {
     pub skipped: u64,
 }
 
-/// A tool order under way.
+/// The current tool order.
 #[derive(Clone, Copy, Debug)]
 struct Working {
     order: ToolOrder,
@@ -56,8 +56,8 @@ struct Working {
     left: u64,
 }
 
-/// What the real-time thread does in a period: states and planned work go in, setpoints and
-/// events come out. After [`Runner::open`] nothing allocates or waits.
+/// The work of the real-time thread in a period: it gets states and planned work, and returns
+/// setpoints and events. After [`Runner::open`] nothing allocates or waits.
 #[derive(Debug)]
 pub struct Runner<const N: usize> {
     config: ExecutorConfig<N>,
@@ -89,7 +89,7 @@ pub struct Runner<const N: usize> {
 }
 
 impl<const N: usize> Runner<N> {
-    /// A runner with its three ends. It needs a session before it moves: [`Runner::open`].
+    /// A runner with its three handles. It needs a session before it moves: [`Runner::open`].
     pub fn new(config: ExecutorConfig<N>) -> (Self, SegmentSender<N>, Remote<N>, Monitor<N>) {
         let shared = Arc::new(Shared::new());
         let (ring, items) = RingBuffer::new(RING);
@@ -136,8 +136,8 @@ impl<const N: usize> Runner<N> {
         (runner, sender, Remote { shared }, monitor)
     }
 
-    /// Begins a session at the position that the driver measured; what was planned is forgotten
-    /// and a fault is cleared.
+    /// Begins a session at the position that the driver measured; drops the plan and clears a
+    /// fault.
     pub fn open(&mut self, ack: &HelloAck) {
         let position = first(&ack.position);
         self.cycle.reset(position);
@@ -160,7 +160,7 @@ impl<const N: usize> Runner<N> {
         self.share_position();
     }
 
-    /// Drops the epoch, tells that the session is new.
+    /// Drops the epoch and reports the new session.
     pub(super) fn recovered(&mut self) {
         self.epoch = self.shared.new_epoch();
         self.report(Event::Recovered { tick: self.tick });
@@ -177,7 +177,7 @@ impl<const N: usize> Runner<N> {
         self.latch(fault);
     }
 
-    /// The session under way.
+    /// The current session.
     pub(super) fn session(&self) -> u64 {
         self.session
     }
@@ -187,12 +187,12 @@ impl<const N: usize> Runner<N> {
         self.shared.orders.wants_recovery() && self.cycle.is_resting()
     }
 
-    /// Comes to rest on the path, whatever is asked for: the thread shall end.
+    /// Comes to rest on the path, whatever is asked for, because the thread will end.
     pub(super) fn leave(&mut self) {
         self.leaving = true;
     }
 
-    /// Whether the driver follows and the arm rests: the time to leave.
+    /// Whether the driver follows and the arm rests, so that the thread may end.
     pub(super) fn may_leave(&self) -> bool {
         self.cycle.is_resting()
     }
@@ -204,7 +204,7 @@ impl<const N: usize> Runner<N> {
             .is_some_and(|samples| samples.slots() == 0 && !samples.is_abandoned())
     }
 
-    /// Whether virtual time may stand: the planner thinks, or there is nothing to do.
+    /// Whether virtual time may stop: the planner works, or there is nothing to do.
     pub(super) fn may_stand(&self) -> bool {
         if self.aborting.is_some() || self.shared.orders.is_newer(self.asked) {
             return false;
@@ -309,8 +309,8 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// How far the arm may be from the setpoint: further for a while after a stall, in which the
-    /// driver went on as it was going.
+    /// How far the arm may be from the setpoint: more for a while after a stall, during which the
+    /// driver continued the motion.
     fn following(&self) -> Following {
         let allowed = self.config.following;
         Following {
@@ -390,7 +390,7 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Latches a fault where the thread was kept from running for longer than the driver waits.
+    /// Latches a fault if the thread did not run for longer than the watchdog.
     fn watch_stall(&mut self, skipped: u64) {
         let late = skipped as f64 * self.period;
         if late > self.config.watchdog.as_secs_f64() {
@@ -403,9 +403,8 @@ impl<const N: usize> Runner<N> {
         self.ahead = ahead.max(if fading > 1e-6 { fading } else { 0.0 });
     }
 
-    /// Moves along the path by one step. Periods that were left out are not made up for: the
-    /// plan is late by them, and a setpoint is never further from the one before than the joints
-    /// can come in a period.
+    /// Moves along the path by one step. Periods that were left out delay the plan, so a setpoint
+    /// is never further from the one before than the joints can move in a period.
     fn move_on(&mut self) {
         let made = self.cycle.step(self.demand());
         self.tell(&made, self.tick);
@@ -443,7 +442,7 @@ impl<const N: usize> Runner<N> {
         self.stopped = held && resting;
     }
 
-    /// Hands the last period's sample to its reader.
+    /// Sends the last period's sample to its reader.
     fn record(&mut self) {
         let (Some(samples), Some(mut pending)) = (&mut self.samples, self.pending.take()) else {
             return;
@@ -464,7 +463,7 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Hands over the last sample and says goodbye.
+    /// Sends the last sample and the goodbye.
     pub(super) fn end(&mut self) {
         self.record();
         self.report(Event::Ended { tick: self.tick });

@@ -30,7 +30,7 @@ pub(super) enum Work<const N: usize> {
     Tool(ToolOrder),
 }
 
-/// Work and the age it belongs to: an abort begins a new epoch and drops what is older.
+/// Work and the epoch it belongs to: an abort begins a new epoch and drops older work.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item<const N: usize> {
     pub(super) epoch: u32,
@@ -42,7 +42,7 @@ pub(super) struct Item<const N: usize> {
 #[error("the ring to the real-time thread is full")]
 pub struct Full;
 
-/// The planner's end. What is pushed is executed in order.
+/// The planner's handle. What is pushed is executed in order.
 #[derive(Debug)]
 pub struct SegmentSender<const N: usize> {
     pub(super) ring: Producer<Item<N>>,
@@ -51,7 +51,7 @@ pub struct SegmentSender<const N: usize> {
 }
 
 impl<const N: usize> SegmentSender<N> {
-    /// Hands over a planned segment.
+    /// Sends a planned segment.
     ///
     /// # Errors
     /// [`Full`] when there is no room now.
@@ -59,7 +59,7 @@ impl<const N: usize> SegmentSender<N> {
         self.hand_over(Work::Motion(segment))
     }
 
-    /// Hands over a tool order.
+    /// Sends a tool order.
     ///
     /// # Errors
     /// [`Full`] when there is no room now.
@@ -67,15 +67,15 @@ impl<const N: usize> SegmentSender<N> {
         self.hand_over(Work::Tool(order))
     }
 
-    /// Begins a new program after an abort or a fault: what was pushed before this call is
-    /// dropped if it was not executed yet, what is pushed after it counts. Call it once the
-    /// [`super::Event::Aborted`] or [`super::Event::Recovered`] has come.
+    /// Begins a new program after an abort or a fault: work pushed before this call is dropped if
+    /// it was not executed yet. Call it once the [`super::Event::Aborted`] or
+    /// [`super::Event::Recovered`] has come.
     pub fn renew(&mut self) {
         self.epoch = self.shared.epoch();
     }
 
-    /// Tells that the planner has nothing more to hand over after `events` events, or, with
-    /// `None`, that it begins to think. Only [`super::ExecutorConfig::wait_for_planner`] looks.
+    /// Says that the planner has nothing more to send after `events` events, or, with `None`, that
+    /// it begins to plan. Only used with [`super::ExecutorConfig::wait_for_planner`].
     pub fn settle(&self, events: Option<u64>) {
         self.shared.answer(events);
     }

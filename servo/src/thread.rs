@@ -14,19 +14,19 @@ use super::event::Fault;
 use super::remote::Shared;
 use super::runner::{Runner, Tick};
 
-/// How long a driver of a lock-step session may think about a period.
+/// How long a driver of a lock-step session may take for a period.
 const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
 
-/// How many times lock-step looks for a state before it sleeps between looks.
+/// How many times lock-step polls for a state before it sleeps between polls.
 const SPINS: u32 = 4000;
 
-/// How often a driver gets a sign of life while virtual time stands.
+/// Time between two signs of life while virtual time is stopped.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 
 /// How long the thread tries to come to rest before it leaves anyway.
 const LEAVE: Duration = Duration::from_secs(5);
 
-/// What the thread tells when it has begun.
+/// What the thread sends when it has started.
 #[derive(Debug)]
 pub(super) struct Begun {
     pub(super) warning: Option<String>,
@@ -45,7 +45,7 @@ struct Loop<'a, const N: usize> {
     leaving: Option<Instant>,
 }
 
-/// The thread. Says first whether it begins.
+/// The thread. First reports whether it starts.
 pub(super) fn main<const N: usize>(
     config: &ExecutorConfig<N>,
     runner: Runner<N>,
@@ -69,18 +69,18 @@ pub(super) fn main<const N: usize>(
     let (mut all, driver) = match begun {
         Ok(begun) => begun,
         Err(error) => {
-            // Whoever asked has gone; the thread goes too.
+            // The caller has ended; the thread ends too.
             shared.orders.end();
             let _ = tell.send(Err(error));
             return;
         }
     };
-    // A thread that waits awake, as in lock-step, must not be a real-time thread.
+    // A thread that waits actively, as in lock-step, must not be a real-time thread.
     let granted = match config.clock {
         Clock::Wall => request_real_time(config.real_time),
         Clock::LockStep => Granted::default(),
     };
-    // Whoever asked may have gone; then the drop of its handle ends the thread.
+    // The caller may have ended; then the drop of its handle ends the thread.
     let _ = tell.send(Ok(Begun {
         warning: granted.warning(),
         driver,
@@ -120,11 +120,11 @@ impl<const N: usize> Loop<'_, N> {
         } else {
             self.runner.fail(Fault::NoSession);
         }
-        // The handshake took its time; the periods begin anew instead of being late.
+        // The handshake took time; the periods start again instead of being late.
         self.origin = now_ns().saturating_sub(self.tick * self.config.period_ns());
     }
 
-    /// Whether the thread shall end now: it was asked to before this period, and the arm rests.
+    /// Whether the thread should end now: it was asked to before this period, and the arm rests.
     fn leaves(&mut self) -> bool {
         if !self.shared.orders.is_shutting_down() {
             return false;
@@ -156,7 +156,7 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    /// Periods by the clock: absolute deadlines; late periods are left out, never made up for.
+    /// Periods by the wall clock: absolute deadlines; late periods are left out.
     fn by_the_clock(&mut self) {
         let period = self.config.period_ns();
         self.origin = now_ns() + period;
@@ -222,12 +222,12 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    /// Lets virtual time stand while the runner may; returns the newest state, or `None` when the
-    /// driver is gone.
+    /// Stops virtual time as long as the runner allows it; returns the newest state, or `None` when
+    /// the driver has ended.
     fn stand(&mut self, mut state: State, last: &mut Setpoint) -> Option<State> {
         let mut since = Instant::now();
         let mut turns = 0_u32;
-        // The first period of a session is what a sign of life repeats.
+        // A sign of life repeats a period, so the first period of a session comes before it.
         let mine = last.session == self.runner.session();
         while self.config.wait_for_planner && mine && self.runner.may_stand() {
             if self.shared.orders.is_shutting_down() {
@@ -256,7 +256,7 @@ impl<const N: usize> Loop<'_, N> {
         Some(state)
     }
 
-    /// The driver of a lock-step session is gone: the motion comes to rest in virtual time.
+    /// The driver of a lock-step session has ended: the motion comes to rest in virtual time.
     fn stop_alone(&mut self, period: u64) {
         for _ in 0..100_000 {
             if self.runner.may_leave() {
@@ -275,8 +275,8 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    /// The next state of the session, first awake, then asleep; `None` when none came for long,
-    /// when the thread shall end, or when a new session is wanted.
+    /// The next state of the session; waits actively at first, then sleeps. `None` when none came
+    /// for a long time, when the thread should end, or when a new session is wanted.
     fn wait_for_state(&self) -> Option<State> {
         let start = Instant::now();
         let mut turns = 0_u32;
@@ -303,20 +303,20 @@ impl<const N: usize> Loop<'_, N> {
     }
 }
 
-/// Wakes up at a time by going to bed for a little less: about as long as waking up usually takes,
-/// which is then waited awake.
+/// Waits until a time: sleeps until a little earlier, by the usual wake-up delay, and waits
+/// actively for the rest.
 struct PeriodicTimer {
-    /// How much less (ns): the middle of what waking up took.
+    /// How much earlier (ns): the median of the wake-up delay.
     early: u64,
     /// The most of it (ns).
     most: u64,
 }
 
 impl PeriodicTimer {
-    /// Part of a period that may be waited awake, at most.
+    /// Divisor of the period: the longest active wait is this part of it.
     const AWAKE: u64 = 50;
 
-    /// How fast the middle is followed (ns a period).
+    /// Change of the estimated median (ns per period).
     const STEP: u64 = 50;
 
     fn new(period: u64) -> Self {
@@ -326,12 +326,12 @@ impl PeriodicTimer {
         }
     }
 
-    /// Waits until `begin` (ns); says what time it is then.
+    /// Waits until `begin` (ns); returns the time then.
     fn wait(&mut self, begin: u64) -> u64 {
         let bed = begin.saturating_sub(self.early);
         sleep_until_ns(bed);
         let mut now = now_ns();
-        // Half of the times later, half earlier: the middle.
+        // Half of the delays are longer, half shorter: the median.
         self.early = if now.saturating_sub(bed) > self.early {
             (self.early + Self::STEP).min(self.most)
         } else {

@@ -325,7 +325,7 @@ mod tests {
     impl Op for All {
         type Output = (Vec<[f64; 4]>, [u8; 4]);
 
-        fn run<A: Arith>(self, a: S) -> Self::Output {
+        fn run<S: Four>(self, a: S) -> Self::Output {
             let (x, y) = (F4::new(a, self.0), F4::new(a, self.1));
             let (less, not) = (x.le(y), y.le(x));
             let numbers = [

@@ -21,7 +21,7 @@ const ARRIVED: f64 = 2e-6;
 /// Largest distance from a straight line, m.
 const STRAIGHT: f64 = 1e-5;
 
-/// Judges a plan; `meanings` has one entry per command of the program.
+/// Checks a plan; `meanings` has one entry per command of the program.
 pub(crate) fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
     let samples: Vec<PlanSample> = plan.samples(PERIOD).collect();
     joints(arm, &samples, tally);
@@ -249,7 +249,7 @@ impl Seen<'_> {
         let poses = &self.motion.poses;
         let legs = poses.len();
         if self.states.len() < 2 {
-            // No time passes: everything is where the arm stands.
+            // No time passes: everything is at the position of the arm.
             let here = self.states[0].pose.translation.vector;
             let off = poses
                 .iter()
@@ -282,7 +282,7 @@ impl Seen<'_> {
         );
     }
 
-    /// The passes that the certificate tells of are those of the samples.
+    /// Checks that the passes in the certificate are those of the samples.
     fn certified_passes(&self, between: &[Isometry3<f64>], tally: &mut Tally) {
         let Some(said) = &self.command.certificate else {
             return;
@@ -318,7 +318,7 @@ impl Seen<'_> {
         }
     }
 
-    /// What the certificate says is true of the samples.
+    /// Checks the claims of the certificate against the samples.
     fn certificate(&self, tally: &mut Tally) {
         let Some(said) = &self.command.certificate else {
             tally.must("a move has a certificate", false);

@@ -18,7 +18,7 @@ use planner::robot::{Robot, load};
 use system_tests::arm::Arm;
 use tally::Tally;
 
-/// Programs per robot unless the environment says otherwise.
+/// Number of programs per robot unless the environment sets another.
 const PROGRAMS: u64 = 20;
 
 fn number(variable: &str, otherwise: u64) -> u64 {

@@ -20,7 +20,7 @@ pub(crate) struct Move {
     pub(crate) shape: Shape,
     pub(crate) poses: Vec<Isometry3<f64>>,
     pub(crate) tolerance: f64,
-    /// Parts of the largest speed and acceleration that are in force.
+    /// Fractions of the largest speed and acceleration that apply.
     pub(crate) speed: f64,
     pub(crate) acceleration: f64,
 }
@@ -153,7 +153,7 @@ impl Writer<'_> {
         for _ in 0..count {
             let last = *poses.last().unwrap_or(&self.at);
             let pose = match self.random.below(8) {
-                // Back to where it came from, or the same pose again.
+                // Back to the pose before, or the same pose again.
                 0 => {
                     let back = poses.len().checked_sub(2).map(|index| poses[index]);
                     back.unwrap_or(last)

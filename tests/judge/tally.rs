@@ -1,4 +1,4 @@
-//! Which laws were judged how often, and where one was broken.
+//! Counts how often each rule was checked, and where one was broken.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ pub(crate) struct Tally {
     laws: BTreeMap<&'static str, Law>,
     /// The program that is judged, for the list of faults.
     pub(crate) program: String,
-    /// The first faults, in words.
+    /// The first errors, as text.
     pub(crate) faults: Vec<String>,
     pub(crate) programs: usize,
     pub(crate) moves: usize,
@@ -23,7 +23,7 @@ struct Law {
     worst: f64,
 }
 
-/// Faults that are kept in words.
+/// Number of errors that are kept as text.
 const KEPT: usize = 40;
 
 impl Tally {

@@ -15,7 +15,7 @@ fn the_simulated_driver_conforms() {
         let _stop = crate::StopOnDrop(&stop);
         let options = driver_options(arm.clone());
         let driver = scope.spawn(|| driver_sim::run(options, &stop).unwrap());
-        // A machine that stalls for longer than the watchdog fails a clause; not three times.
+        // A machine that stalls for longer than the watchdog fails a clause, but not three times.
         let passed = (0..3).any(|_| {
             let report = test_driver(&arm).unwrap();
             assert_eq!(report.joints, JOINTS);
@@ -32,7 +32,7 @@ fn the_simulated_driver_conforms() {
     });
 }
 
-/// A driver that is too slow to follow and has no gripper is seen.
+/// A driver that is too slow to follow and has no gripper is detected.
 #[test]
 fn a_lazy_driver_is_seen() {
     let arm = system_tests::domain::arm("conform/lazy");

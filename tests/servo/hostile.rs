@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::scene::{Scene, assert_within_limits, read};
 
-/// A driver that goes wrong in the middle of a move; how the engine calls it.
+/// A driver that fails in the middle of a move; returns the engine's fault.
 fn goes_wrong(kind: &str, wanted: &[&str]) {
     let scene = Scene::new(kind);
     let _driver = scene.hostile(kind);
@@ -21,7 +21,7 @@ fn goes_wrong(kind: &str, wanted: &[&str]) {
         velocity.iter().all(|speed| speed.abs() < 1e-9),
         "{velocity:?}"
     );
-    // It latches: nothing moves any more.
+    // It latches: nothing moves afterwards.
     thread::sleep(Duration::from_millis(500));
     let later = read(&scene.log(0));
     assert!(later.len() > lines.len());
@@ -51,7 +51,8 @@ fn a_measured_position_that_jumps() {
     goes_wrong("jump", &["Following"]);
 }
 
-/// A driver that reads one setpoint in twenty: the oldest are overwritten, nobody waits for it.
+/// A driver that reads one setpoint in twenty: the oldest are overwritten, the engine does not
+/// wait.
 #[test]
 fn a_slow_reader_holds_nobody_up() {
     let scene = Scene::new("slow");
@@ -68,8 +69,8 @@ fn a_slow_reader_holds_nobody_up() {
 #[test]
 fn another_protocol_is_refused() {
     for (kind, words) in [
-        ("old-answer", "protocol 7 where 1 is spoken"),
-        ("old-refusal", "protocol 1 where 7 is spoken"),
+        ("old-answer", "protocol 7, expected 1"),
+        ("old-refusal", "protocol 1, expected 7"),
     ] {
         let scene = Scene::new(kind);
         let _driver = scene.hostile(kind);

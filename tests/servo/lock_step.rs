@@ -64,7 +64,7 @@ fn run(name: &str, commands: u32) -> Run {
         }
         let seconds = start.elapsed().as_secs_f64();
         drop(executor);
-        // What was under way when the last event came.
+        // The periods in work when the last event came.
         while let Some(sample) = monitor.sample() {
             samples.push(sample);
         }

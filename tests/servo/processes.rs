@@ -16,7 +16,8 @@ fn kill_the_engine() {
     let (mut engine, _driver) = scene.moving();
     engine.child.kill().unwrap();
     engine.child.wait().unwrap();
-    // The driver stops within watchdog and brake, and latches; a new engine syncs to where it is.
+    // The driver stops within watchdog and braking time, and latches; a new engine starts from its
+    // position.
     thread::sleep(Duration::from_millis(600));
     let again = scene.engine();
     again.wait_for("ready");
@@ -60,7 +61,7 @@ fn stop_the_engine_process_for_300_ms() {
         fault.contains("Stalled") || fault.contains("DriverFault"),
         "{fault}"
     );
-    // It does not go on by itself.
+    // It does not continue by itself.
     thread::sleep(Duration::from_millis(500));
     let stopped = read(&scene.log(0)).len();
     engine.say("recover");
@@ -68,12 +69,12 @@ fn stop_the_engine_process_for_300_ms() {
     engine.wait_for("Finished");
     let lines = read(&scene.log(0));
     assert!(lines.len() > stopped);
-    // What a latched driver received is what it did not follow; the sessions are what counts.
+    // A latched driver does not follow what it receives; only sessions count.
     assert_within_limits(&lines);
 }
 
-/// Stalls that are shorter than the watchdog: no setpoint is further from the one before than the
-/// joints can come in a period, however long that one is ago.
+/// Stalls shorter than the watchdog: no setpoint is further from the one before than the joints can
+/// move in one period, however long ago that one was.
 #[test]
 fn a_short_stall_of_the_engine_makes_no_jump() {
     let scene = Scene::new("short-stalls");
@@ -89,7 +90,7 @@ fn a_short_stall_of_the_engine_makes_no_jump() {
     let velocity = system_tests::servo_arm::limits().velocity;
     let mut late = 0;
     for pair in lines.windows(2) {
-        // What the driver was too late to read is not in its log.
+        // Setpoints that the driver read too late are not in its log.
         let follows =
             pair[1].session == pair[0].session && pair[1].sequence == pair[0].sequence + 1;
         if !follows {
@@ -144,8 +145,8 @@ fn dead_nodes() -> usize {
     ipc::count_nodes(&domain()).unwrap().dead
 }
 
-/// A hundred kills leave nothing behind but what the next start cleans up: each start cleans up
-/// after the one before, and the last is cleaned up here.
+/// After a hundred kills, each start cleans up after the one before; the last one is cleaned up
+/// here.
 #[test]
 fn a_hundred_kills_leak_nothing() {
     let scene = Scene::new("leak");
@@ -170,8 +171,8 @@ fn a_hundred_kills_leak_nothing() {
     assert_eq!(dead_nodes(), 0);
 }
 
-/// A hog of the processors at a higher priority: either every period is made in time to go on, or
-/// the fault latches; no setpoint breaks a limit either way.
+/// A process of higher priority uses all processors: either every period is made in time, or the
+/// fault latches; in both cases no setpoint breaks a limit.
 #[test]
 fn a_hog_of_the_processors() {
     let scene = Scene::new("hog");
@@ -180,7 +181,7 @@ fn a_hog_of_the_processors() {
     thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
-                // Where the user may not, the hog has an ordinary priority.
+                // Without the right to do so, the process has ordinary priority.
                 scheduling::request_real_time(scheduling::RealTimeRequest {
                     priority: 90,
                     processor: None,
@@ -201,7 +202,7 @@ fn a_hog_of_the_processors() {
     assert!(lines.last().unwrap().received_ns > 0);
 }
 
-/// An engine that leaves says goodbye: the driver rests where the last setpoint is.
+/// An engine that ends sends a goodbye: the driver rests at the last setpoint.
 #[test]
 fn at_rest_the_joints_are_at_the_setpoint() {
     let scene = Scene::new("rest");
@@ -218,7 +219,7 @@ fn at_rest_the_joints_are_at_the_setpoint() {
     assert!(rest_error(&resting[..1]) < 1e-6);
 }
 
-/// A planner that dies in the middle of a command: the arm stops on the path, without a fault.
+/// A planner that stops in the middle of a command: the arm stops on the path, without a fault.
 #[test]
 fn a_starved_planner_stops_the_arm() {
     let scene = Scene::new("starved");
@@ -226,7 +227,7 @@ fn a_starved_planner_stops_the_arm() {
     engine.say("starve");
     let started = engine.wait_for("Started { command: 4000000000");
     assert!(!started.is_empty());
-    // What is at hand lasts 3 s; the nearer its end, the slower the arm.
+    // The planned part lasts 3 s; the arm slows down towards its end.
     let start = Instant::now();
     let lines = loop {
         thread::sleep(Duration::from_millis(500));
@@ -241,7 +242,7 @@ fn a_starved_planner_stops_the_arm() {
     assert!(rest_error(&lines) < 1e-3);
 }
 
-/// Both are killed while the arm moves: what they left is no obstacle to the next two.
+/// Both are killed while the arm moves; what they leave behind does not hinder the next two.
 #[test]
 fn left_over_segments_are_cleaned_up() {
     let scene = Scene::new("left-over");

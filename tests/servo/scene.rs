@@ -87,7 +87,7 @@ impl Peer {
     }
 }
 
-/// An arm of its own for a test, with a driver that writes a log.
+/// A separate arm for a test, with a driver that writes a log.
 pub(crate) struct Scene {
     arm: String,
     folder: tempfile::TempDir,
@@ -119,7 +119,7 @@ impl Scene {
         Peer::start(&["hostile", &self.arm, self.log(0).to_str().unwrap(), kind])
     }
 
-    /// Both, with the arm on its way.
+    /// Both, with the arm moving.
     pub(crate) fn moving(&self) -> (Peer, Peer) {
         let driver = self.driver(0);
         let engine = self.engine();

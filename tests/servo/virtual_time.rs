@@ -7,7 +7,7 @@ use realtime::{Piece, Sample, Segment};
 use servo::{Control, Event, Fault, Monitor, Remote, Runner, SegmentSender, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
 
-/// A runner, its ends, and a driver that is always exactly at the last setpoint.
+/// A runner, its handles, and a driver that is always exactly at the last setpoint.
 struct Bench {
     runner: Runner<JOINTS>,
     sender: SegmentSender<JOINTS>,
@@ -44,7 +44,8 @@ impl Bench {
         }
     }
 
-    /// A period, after `skipped` that were left out; `change` spoils the state on its way.
+    /// A period, after `skipped` that were left out; `change` modifies the state before it is
+    /// received.
     fn period(&mut self, skipped: u64, change: impl Fn(State) -> Option<State>) -> Setpoint {
         self.state.sequence += 1;
         self.state.driver_state = DriverState::Active as u32;
@@ -92,7 +93,7 @@ impl Bench {
     }
 }
 
-/// A pause, an override and a fast stop on the way change the time, never the way.
+/// A pause, an override and a fast stop during a move change the time, never the path.
 #[test]
 fn the_operator_changes_time_only() {
     let mut bench = Bench::new();
@@ -130,7 +131,7 @@ fn the_operator_changes_time_only() {
     );
 }
 
-/// How a fault in the middle of a move ends: latched, at rest, on the path, deaf to `Resume`.
+/// How a fault in the middle of a move ends: latched, at rest, on the path; `Resume` has no effect.
 fn faulted(change: impl Fn(State) -> Option<State> + Copy, periods: u64) -> Fault {
     let mut bench = Bench::new();
     assert!(feed(&mut bench.sender, 0));
@@ -236,9 +237,8 @@ fn what_a_driver_may_do_wrong() {
     );
 }
 
-/// Periods that come late are left out and not made up for: the plan is late by them, and each
-/// setpoint is one period of the plan after the last one that was published, however long that is
-/// ago.
+/// Late periods are left out and delay the plan: each setpoint is one period of the plan after the
+/// last one that was published, however long ago that was.
 #[test]
 fn late_periods_are_left_out() {
     let mut bench = Bench::new();
@@ -280,7 +280,7 @@ fn late_periods_are_left_out() {
     assert!(bench.events().iter().any(stalled));
 }
 
-/// A planner that hands over half a command and dies: the arm stops on the path.
+/// A planner that sends half a command and stops: the arm stops on the path.
 #[test]
 fn a_starved_planner() {
     let mut bench = Bench::new();
@@ -307,8 +307,8 @@ fn a_starved_planner() {
     assert!((last.position[0] - whole.sample(last.path_time).position[0]).abs() < 1e-9);
 }
 
-/// An abort on the way comes to rest on the path and forgets the rest; what is pushed after it
-/// counts.
+/// An abort during a move comes to rest on the path and drops the rest; what is pushed after it is
+/// executed.
 #[test]
 fn abort_and_begin_anew() {
     let mut bench = Bench::new();
@@ -342,14 +342,14 @@ fn abort_and_begin_anew() {
 }
 
 /// The clock jumps: an hour forward, then back to where it was. The engine latches instead of
-/// catching up, and neither side moves faster than it may; jumps back are no time at all.
+/// catching up, and neither side moves faster than its limits; a jump back counts as no time.
 #[test]
 fn a_clock_that_jumps() {
     const HOUR: u64 = 3_600_000_000_000;
     let mut bench = Bench::new();
     assert!(feed(&mut bench.sender, 0));
     bench.run(400);
-    // Time stamps of the driver from the future and from the past are no time to rely on.
+    // Time stamps of the driver from the future and from the past are ignored.
     for published_ns in [u64::MAX, 0, HOUR] {
         let setpoint = bench.period(0, |state| {
             Some(State {

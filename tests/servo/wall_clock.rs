@@ -58,7 +58,7 @@ fn the_periods_add_up() {
             }
         }
         for sample in samples.iter().filter(|sample| sample.tick >= started[0]) {
-            // Late periods are left out and not made up for: the plan is late by them.
+            // Late periods are left out and delay the plan.
             let passed = (sample.tick - started[sample.command as usize]) as f64 * 0.001;
             assert!(sample.path_time <= passed + 1e-9);
             let plan = planned(sample.command, sample.path_time);
@@ -92,8 +92,8 @@ fn no_driver() {
     );
 }
 
-/// A driver that does not follow trips the following error, which latches and is cleared only by
-/// a new session; an abort flushes.
+/// A driver that does not follow causes a following error, which latches and is cleared only by a
+/// new session; an abort empties the queue.
 #[test]
 fn a_following_error_latches_until_recovery() {
     let arm = arm("following");

@@ -41,7 +41,7 @@ pub(crate) fn good_plans_reach_their_goal() {
     assert_eq!(result, Ok(21));
 }
 
-/// Plans that do not fit their domain or problem fail at the step they should.
+/// Plans that do not fit their domain or problem fail at the right step.
 pub(crate) fn bad_plans_fail_where_they_should() {
     let g1 = |domain: &str| {
         (

@@ -10,8 +10,8 @@ use ipc::{Arm, DOMAIN_VARIABLE, Domain};
 
 /// The domain of this test process; processes that it starts join it with [`join`].
 ///
-/// Its directory is named after the process. Whoever comes first in a process removes what test
-/// processes that are gone have left: directories, and segments of those that were killed.
+/// Its directory is named after the process. The first call in a process removes what earlier test
+/// processes have left: directories, and segments of those that were killed.
 ///
 /// # Panics
 /// The directory cannot be made; a test stops there.
@@ -23,7 +23,7 @@ pub fn domain() -> Domain {
             Domain::open(&above).expect("a directory for the tests");
             remove_of_the_dead(&above);
             let own = above.join(std::process::id().to_string());
-            // One that had our number before us.
+            // A directory of an earlier process with the same number.
             let _ = fs::remove_dir_all(&own);
             Domain::open(&own).expect("a directory for this test")
         })

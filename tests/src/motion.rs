@@ -84,7 +84,7 @@ fn row(line: &str, joints: usize, index: usize) -> Result<Row, String> {
     })
 }
 
-/// Everything that is wrong with a recorded motion of a program; empty when it is as it must be.
+/// All errors of a recorded motion of a program; empty if it is correct.
 pub fn faults(arm: &Arm, program: &[Command], rows: &[Row]) -> Vec<String> {
     let mut faults = Vec::new();
     let Some(first) = rows.first() else {
@@ -203,7 +203,7 @@ fn poses_agree(arm: &Arm, modes: &Modes, rows: &[Row], say: &mut impl FnMut(Stri
     }
 }
 
-/// The modes of the language, read anew from its description.
+/// The modes of the language, implemented independently from its description.
 struct Modes {
     metre: f64,
     radian: f64,
@@ -230,7 +230,7 @@ impl Modes {
         }
     }
 
-    /// Takes a command over and checks the motion made for it; says whether the tool changed.
+    /// Applies a command and checks its motion; returns whether the tool changed.
     fn run(
         &mut self,
         arm: &Arm,
@@ -277,7 +277,7 @@ impl Modes {
         false
     }
 
-    /// The tool in the holder where the flange is now comes or goes.
+    /// Takes or leaves the tool in the holder at the flange.
     fn change_tool(&mut self, arm: &Arm, open: bool, rows: &[Row], say: &mut impl FnMut(String)) {
         let Some(last) = rows.last() else { return };
         let flange = arm.flange(&last.q);

@@ -48,7 +48,7 @@ pub fn executor_config(arm: ipc::Arm, clock: ipc::Clock) -> ExecutorConfig<JOINT
     }
 }
 
-/// The command `index` of a to and fro between home and a place that is 0.5 rad or less away in
+/// Command `index` of a motion back and forth between home and a position at most 0.5 rad away in
 /// each joint: two pieces, a little under a second.
 pub fn command(index: u32) -> [Segment<JOINTS>; 2] {
     let away = home() + Joints::from_column_slice(&[0.5, -0.3, 0.4, 0.2, -0.5, 0.1]);
@@ -88,7 +88,7 @@ pub fn planned(index: u32, time: f64) -> Joints {
     }
 }
 
-/// Hands a whole command to the executor; `false` when there was no room for it.
+/// Sends a whole command to the executor; `false` if there was no room for it.
 pub fn feed(sender: &mut SegmentSender<JOINTS>, index: u32) -> bool {
     sender.room() >= 2
         && command(index)

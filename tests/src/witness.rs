@@ -12,7 +12,7 @@ use ipc::{ToolAction, ToolFeedback};
 /// How many numbers a witness writes.
 const WORDS: usize = 6;
 
-/// The worst of what a robot was told, over all joints and periods.
+/// The worst references that a robot got, over all joints and periods.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Worst {
     /// How far beyond its range a joint was sent (rad).
@@ -23,8 +23,9 @@ pub struct Worst {
     pub acceleration: f64,
     /// Change of the acceleration in a period as a share of what the jerk limit allows.
     pub jerk: f64,
-    /// How far a position is from what the speeds before and after say, as a share of what the jerk
-    /// limit allows (a twelfth of jerk times period cubed, and 1e-8 rad of rounding).
+    /// Distance of a position from the value that the speeds before and after give, as a fraction
+    /// of what the jerk limit allows (a twelfth of jerk times period cubed, and 1e-8 rad of
+    /// rounding).
     pub step: f64,
     /// How far from its last reference at rest a session began (rad).
     pub begin: f64,
@@ -70,7 +71,7 @@ impl Worst {
         }
     }
 
-    /// What a witness wrote, also one that was killed.
+    /// Reads what a witness wrote, also one that was killed.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -84,8 +85,8 @@ impl Worst {
     }
 }
 
-/// A robot whose references are judged before they are passed on. What is worse than before is
-/// written at once, so that a kill hides nothing.
+/// A robot whose references are checked before they are passed on. A new worst value is written at
+/// once, so that a kill loses nothing.
 #[derive(Debug)]
 pub struct Witness<R> {
     robot: R,

@@ -18,15 +18,16 @@ use watch::Watch;
 /// What one stop took.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
-    /// From the call to the first setpoint that the order has reached (ms).
+    /// From the call to the first setpoint on which the order acts (ms).
     acts_ms: f64,
-    /// From the call to the first slower setpoint (ms): later where the plan leaves no room to brake.
+    /// From the call to the first slower setpoint (ms): later if the plan leaves no margin to
+    /// brake.
     effect_ms: f64,
-    /// The way of the controlled point in that time (mm).
+    /// The distance of the controlled point in that time (mm).
     effect_mm: f64,
     /// From the call to rest (ms).
     rest_ms: f64,
-    /// The way of the controlled point in that time (mm).
+    /// The distance of the controlled point in that time (mm).
     rest_mm: f64,
 }
 

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use ipc::{Arm, Client, Verb};
 use system_tests::signal;
 
-/// What goes on beside the motion.
+/// The load during the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Burden {
     /// Nothing.
@@ -39,7 +39,7 @@ impl Burden {
 /// How long an engine may take to be there.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// An engine, its program and its burden; all of it ends with this.
+/// An engine, its program and its load; all end when this is dropped.
 pub(crate) struct Scene {
     pub(crate) arm: Arm,
     burden: Burden,
@@ -72,7 +72,7 @@ fn canter() -> Command {
 }
 
 impl Scene {
-    /// An engine with a long motion under way.
+    /// An engine with a long motion.
     pub(crate) fn engine(burden: Burden) -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -157,7 +157,7 @@ impl Scene {
         }
     }
 
-    /// Until when the burden is known to be there and the motion to last.
+    /// Until when the load is certain to act and the motion to last.
     pub(crate) fn episode(&self) -> Instant {
         let seconds = match self.burden {
             // The planner begins with the list when the slow move has begun.
@@ -180,7 +180,7 @@ impl Scene {
     }
 }
 
-/// A straight move of more than two minutes, to and fro, and behind it a list of poses.
+/// A straight move of more than two minutes, back and forth, and after it a list of poses.
 fn program(poses: usize) -> String {
     let mut text = "InitCanon()\nSetRelativeSpeed(100)\n\
         MoveTo({{400, -200, 400}, {0,0,-1}, {1,1,0}})\nSetAbsoluteSpeed(40)\n"

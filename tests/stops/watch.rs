@@ -70,8 +70,8 @@ impl Watch {
         false
     }
 
-    /// What a stop took that was called at `called` (ns); forgets what was seen. None where the
-    /// arm was at rest between two commands just then, or where setpoints were not seen.
+    /// Times of a stop that was called at `called` (ns); clears the record. `None` if the arm was
+    /// at rest between two commands then, or if setpoints were missed.
     pub(crate) fn taken(&self, called: u64) -> Option<Taken> {
         let end = Instant::now() + PATIENCE;
         loop {
@@ -111,7 +111,7 @@ impl Watch {
         })
     }
 
-    /// The way of the controlled point (mm).
+    /// The distance of the controlled point (mm).
     fn way(&self, seen: &[Seen]) -> f64 {
         let places = seen.iter().map(|seen| {
             let joints = nalgebra::SVector::<f64, 6>::from(seen.joints);

@@ -11,7 +11,7 @@ use std::thread;
 use scene::{Arm, Tally};
 use system_tests::witness::Worst;
 
-/// Runs `stalls` and `kills`, shared by `arms` that storm at the same time; prints what came out.
+/// Runs `stalls` and `kills`, distributed over `arms` at the same time; prints the result.
 fn storm(stalls: usize, kills: usize, arms: usize, seed: u64) -> Tally {
     let share = |all: usize, arm: usize| all / arms + usize::from(arm < all % arms);
     let tallies: Vec<Tally> = thread::scope(|scope| {
@@ -42,7 +42,7 @@ fn a_few_stalls_and_kills() {
     check(&storm(12, 12, 2, 1), 12, 12);
 }
 
-/// Takes long: a stall or kill takes about three seconds, several arms go side by side.
+/// Takes long: a stall or kill takes about three seconds; several arms run at the same time.
 #[test]
 #[ignore = "the long storm, an hour and a half by one arm; set STORM to the number of each"]
 fn a_storm_of_stalls_and_kills() {

@@ -27,7 +27,7 @@ pub(crate) struct Tally {
     pub(crate) driver: BTreeMap<String, usize>,
     /// How the engine named its fault, and how often.
     pub(crate) engine: BTreeMap<String, usize>,
-    /// Faults that nobody caused: a busy machine stalls by itself.
+    /// Faults that the test did not cause: a busy machine stalls by itself.
     pub(crate) by_themselves: usize,
     /// The driver's output, over all joints and periods.
     pub(crate) worst: Worst,
@@ -140,7 +140,7 @@ impl Arm {
         speeds.fold(0.0, |most, speed| most.max(speed.abs()))
     }
 
-    /// Waits for the arm to move, at a random moment of its way.
+    /// Waits until the arm moves, at a random time of its motion.
     fn wait_for_motion(&mut self) {
         let moment = Duration::from_millis(self.below(1300));
         let end = Instant::now() + PATIENCE;
@@ -150,7 +150,7 @@ impl Arm {
             // The engine may have one of its own while the driver follows it to rest.
             let engine = self.fault(Duration::ZERO);
             if engine || self.state.driver() == DriverState::Fault {
-                // Nobody did it.
+                // The test did not cause it.
                 self.tally.by_themselves += 1;
                 self.recover();
                 since = None;

@@ -6,7 +6,8 @@ use std::fs;
 use system_tests::repository::root;
 use toml::{Table, Value};
 
-/// Who may depend on whom among our own crates. `system-tests` and `benches` may on everything.
+/// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
+/// depend on everything.
 const ARROWS: [(&str, &[&str]); 16] = [
     (
         "cli",
@@ -55,8 +56,8 @@ const ARROWS: [(&str, &[&str]); 16] = [
     ("scheduling", &[]),
 ];
 
-/// Crates of others that may be named by these crates of ours only. That the planner starts no
-/// thread and reads no clock is more than a manifest shows: see [`the_planner_is_pure`].
+/// External crates that only these crates of Canter may name. That the planner starts no thread and
+/// reads no clock is not in a manifest: see [`the_planner_is_pure`].
 const FENCES: [(&str, &[&str]); 9] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
@@ -71,8 +72,7 @@ const FENCES: [(&str, &[&str]); 9] = [
 
 const OUTERMOST: [&str; 2] = ["system-tests", "benches"];
 
-/// What the manifest of a crate has that it must not have; development dependencies are free,
-/// for oracles.
+/// Forbidden dependencies in the manifest of a crate; development dependencies are not checked.
 fn violations(manifest: &Table) -> Vec<String> {
     let name = manifest["package"]["name"].as_str().unwrap();
     if OUTERMOST.contains(&name) {
@@ -183,7 +183,7 @@ const IMPURE: [&str; 8] = [
     "unsafe ",
 ];
 
-/// What makes this source impure, the first of it.
+/// The first forbidden name in this source.
 fn impurity(text: &str) -> Option<&'static str> {
     let code = text
         .lines()
@@ -214,7 +214,7 @@ fn the_planner_is_pure() {
     assert_eq!(impurity("// std::thread"), None);
 }
 
-/// Inside a crate: `k` is one file's secret, the real-time crate has no heap.
+/// Inside crates: only one file uses `k`, and the real-time crate has no heap.
 #[test]
 fn fences_inside_crates_hold() {
     let urdf = root().join("kinematics/src/urdf.rs");

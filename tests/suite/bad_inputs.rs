@@ -20,7 +20,7 @@ fn said(ran: &Ran) -> String {
     )
 }
 
-/// The joint that would jump at a singular pose, and how singular it is, hang on the last digits.
+/// The joint that would jump at a singular pose, and how singular the pose is, depend on rounding.
 fn without_rounding(text: &str) -> String {
     let (start, end) = ("a singular pose, where ", ')');
     let Some((before, after)) = text.split_once(start) else {
@@ -134,7 +134,7 @@ fn missing_things_are_named() {
     }
 }
 
-/// Bytes that are no program: refused in one screen of text.
+/// A file that is not a program: refused with at most one screen of text.
 #[test]
 fn bytes_that_are_no_program() {
     let line = [b"InitCanon() Message(\"".to_vec(), vec![b'x'; 10_000_000]].concat();
@@ -220,7 +220,7 @@ fn a_refused_robot_leaves_nothing_behind() {
     assert!(!folder.path().join("nine").exists());
 }
 
-/// Poses at kilometres are refused as soon as those out of reach: no curve is laid to them.
+/// Poses kilometres away are refused as fast as others out of reach: no curve is planned to them.
 #[test]
 fn far_poses_are_refused_at_once() {
     let pose = |x: f64, y: f64| format!("{{{{{x}, {y}, 250}}, {{0,0,-1}}, {{1,0,0}}}}");
@@ -249,7 +249,8 @@ fn far_poses_are_refused_at_once() {
     }
 }
 
-/// A line that ends next to a singular pose can be followed, but not timed: the refusal says so.
+/// A line that ends next to a singular pose can be followed, but has no time law: the error says
+/// so.
 #[test]
 fn a_line_next_to_a_singular_pose_is_explained() {
     let program = "tests/data/next_to_singular.canon";

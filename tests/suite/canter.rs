@@ -40,7 +40,7 @@ pub(crate) fn canter_reading<S: AsRef<OsStr>>(
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // A command that refuses early closes its input; that is not this function's business.
+    // A command that refuses early closes its input; this is not an error here.
     let _ = child.stdin.take().unwrap().write_all(input);
     ran(child.wait_with_output().unwrap())
 }

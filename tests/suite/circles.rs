@@ -13,8 +13,8 @@ type Name = Vec<String>;
 /// Which modules of a crate a module names.
 type Arrows = BTreeMap<Name, BTreeSet<Name>>;
 
-/// Circles that are still there, by crate and modules; decision 0006 explains each. None may be
-/// added; who breaks one takes it out of this list.
+/// Remaining circles, by crate and modules; decision 0006 explains each. None may be added; remove
+/// an entry when its circle is resolved.
 const KNOWN: [(&str, &str); 4] = [
     ("crcl", "command, finding, pose, program, value"),
     ("plan", "kitting, run"),

@@ -191,7 +191,7 @@ fn a_program_is_converted_there_and_back() {
     assert_eq!(schema["title"], "Canonical robot program");
 }
 
-/// Log lines have no colours where nobody sees them.
+/// Log lines have no colours in a pipe.
 #[test]
 fn piped_logs_have_no_colours() {
     let ran = crate::canter::command(["robots", "list"])

@@ -156,7 +156,7 @@ fn a_stop_does_not_wait_for_the_planner() {
             (&now["time_scaling"], &now["held"]),
             (&0.0.into(), &true.into())
         );
-        // Far less than the planner needs, and than the move would take.
+        // Far less than the planner or the move would take.
         assert!(took < Duration::from_secs(5), "{word} took {took:?}");
         assert_eq!(canter([again, "--arm", &arm]).code, 0);
         if again == "resume" {
@@ -172,7 +172,7 @@ fn a_stop_does_not_wait_for_the_planner() {
     assert!(sent.stdout.contains("after"), "{}", sent.stdout);
 }
 
-/// Ctrl-C ends a run while the planner thinks.
+/// Ctrl-C ends a run while the planner works.
 #[test]
 fn ctrl_c_does_not_wait_for_the_planner() {
     let arm = arm("planning-run");
@@ -235,8 +235,8 @@ fn output_that_nobody_reads_disables_no_stop() {
     }
 }
 
-/// A run whose output nobody reads goes on to its end, says how much was dropped, and is no
-/// success; Ctrl-C stops it.
+/// A run whose output nobody reads runs to its end, prints how much was dropped, and does not exit
+/// with 0; Ctrl-C stops it.
 #[test]
 fn a_run_that_nobody_reads_is_no_success() {
     let arm_name = arm("unread-run");
@@ -271,7 +271,7 @@ fn a_run_that_nobody_reads_is_no_success() {
     assert_eq!(run.code(Duration::from_secs(15)), Some(5));
 }
 
-/// `canter run P | head -1`: the program goes on to its end, and the exit code is no success.
+/// `canter run P | head -1`: the program runs to its end, and the exit code is not 0.
 #[test]
 fn a_closed_output_is_no_success() {
     let arm = arm("closed");

@@ -13,7 +13,7 @@ use crate::canter::{canter, command};
 /// A user that owns nothing here.
 const STRANGER: u32 = 12_345;
 
-/// A driver that is ready; ended with the value.
+/// A driver that is ready; ended when dropped.
 struct Driver(Child);
 
 impl Driver {
@@ -51,7 +51,8 @@ fn driver() -> Command {
     ])
 }
 
-/// The same arm in another domain is another arm: nobody is in the way, nobody is counted.
+/// The same arm in another domain is another arm: the processes do not affect each other and are
+/// not counted.
 #[test]
 fn two_domains_do_not_see_each_other() {
     let folder = tempfile::tempdir().unwrap();
@@ -65,8 +66,8 @@ fn two_domains_do_not_see_each_other() {
     assert_eq!((own.alive, other.alive), (1, 1));
 }
 
-/// Two users have the same arm at the same time; the second can neither look into the first one's
-/// directory nor join it, and his own is closed to others.
+/// Two users have the same arm at the same time; the second can neither open the first one's
+/// directory nor join it, and their own is closed to others.
 #[test]
 fn two_users_do_not_meet() {
     let ours = system_tests::domain::domain();
@@ -110,6 +111,6 @@ fn two_users_do_not_meet() {
         "{said}"
     );
     drop(_their_driver);
-    // The test's stranger leaves nothing.
+    // The second user leaves nothing behind.
     let _ = std::fs::remove_dir_all(place);
 }

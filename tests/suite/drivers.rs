@@ -12,7 +12,7 @@ fn arm(name: &str) -> String {
     format!("drivers{}/{name}", std::process::id())
 }
 
-/// A driver in a process of its own, ended with the value.
+/// A driver in a separate process, ended when dropped.
 struct Driver(Child);
 
 impl Driver {
@@ -55,7 +55,7 @@ fn the_simulated_driver_passes_its_test() {
         clauses.iter().all(|clause| clause["verdict"] == "pass"),
         "{report:#}"
     );
-    // The doctor greets it too, and it allows all that the robot may.
+    // The doctor opens a session with it too, and its limits allow those of the robot.
     let words = [
         "doctor",
         "--arm",
@@ -148,7 +148,7 @@ fn a_python_driver_that_ends_brakes_first() {
     }
 }
 
-/// The Python kit keeps the laws of the Rust kit, in virtual time.
+/// The Python kit has the same properties as the Rust kit, in virtual time.
 #[test]
 fn the_python_kit_keeps_the_limits() {
     let laws = system_tests::repository::root().join("drivers/python/tests/laws.py");
@@ -199,7 +199,7 @@ fn mujoco_without_its_python_says_so() {
     assert!(start.elapsed() < Duration::from_secs(60));
 }
 
-/// The README's promise: a physics simulation drives the same program, twice the same.
+/// As the README says: a physics simulation executes the same program, twice with the same result.
 #[test]
 fn mujoco_in_step_is_the_same_every_time() {
     if !python_has("mujoco, iceoryx2") {

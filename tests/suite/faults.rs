@@ -12,7 +12,7 @@ fn rows(text: &str) -> Vec<Vec<&str>> {
         .collect()
 }
 
-/// Why a row is not one of our table; none when it is.
+/// Why a row of the table is wrong; `None` if it is right.
 fn fault(cells: &[&str]) -> Option<String> {
     let [.., named] = cells else {
         return Some("an empty row".into());

@@ -23,7 +23,7 @@ fn start(database: &Path, kits: usize, more: &[&str]) -> Child {
         .unwrap()
 }
 
-/// Goes on with a run that was killed; the report.
+/// Resumes a run that was killed; returns the report.
 fn resume(database: &Path, more: &[&str]) -> Value {
     let database = database.to_str().unwrap();
     let start = ["plan-run", "--resume", "-r", "ur5e", "--json", "--world"];
@@ -33,8 +33,8 @@ fn resume(database: &Path, more: &[&str]) -> Value {
     report(&ran)
 }
 
-/// Name, class, reference and pose of each object, without those of the arm, which is where its
-/// last way led it.
+/// Name, class, reference and pose of each object except the arm, whose position depends on its
+/// last motion.
 fn state(world: &Value) -> Vec<String> {
     let line = |object: &Value| {
         let numbers = |part: &str| -> Vec<i64> {
@@ -56,8 +56,8 @@ fn state(world: &Value) -> Vec<String> {
     objects(world).iter().map(line).collect()
 }
 
-/// Kills runs for some kits, as many as asked for, and has each go on; all come to the same end.
-/// How often that was.
+/// Kills as many runs as asked for and resumes each; all must have the same result. Returns how
+/// many runs were killed.
 fn kill_runs(kits: usize, kills: usize, mode: &dyn Fn(&str) -> Vec<String>) -> String {
     let folder = tempfile::tempdir().unwrap();
     let begin = |database: &Path, name: &str| {
@@ -101,8 +101,8 @@ fn kill_runs(kits: usize, kills: usize, mode: &dyn Fn(&str) -> Vec<String>) -> S
     format!("{kills} kills, {cut} of them in the middle of the run, which takes {length:?}")
 }
 
-/// Killed at random moments of a dry run: the database opens, is consistent, and the run goes on to
-/// the same end.
+/// Killed at random times of a dry run: the database opens, is consistent, and the resumed run has
+/// the same result.
 #[test]
 fn a_killed_run_goes_on_to_the_same_end() {
     let dry = |_: &str| vec!["--dry-run".into()];
@@ -121,7 +121,7 @@ fn a_killed_arm_goes_on_to_the_same_end() {
     println!("{said}");
 }
 
-/// A PDDL plan that the arm cannot go on with is tried again where it was.
+/// A PDDL plan whose motion failed is resumed at the same step.
 #[test]
 fn a_pddl_run_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
@@ -149,7 +149,7 @@ fn a_pddl_run_goes_on_where_it_was() {
     assert!(shown.contains("6 statements, 0 kits; failed"), "{shown}");
 }
 
-/// Waits until a run has done some statements and another is under way.
+/// Waits until a run has executed some statements and another is being executed.
 pub(crate) fn moving(database: &str, statements: usize) {
     let deadline = Instant::now() + Duration::from_secs(300);
     while Instant::now() < deadline {
@@ -167,7 +167,8 @@ pub(crate) fn moving(database: &str, statements: usize) {
     panic!("the run does not get as far as {statements} statements");
 }
 
-/// A driver that dies is a fault of the arm: the run ends, at once and with its exit code.
+/// A driver that dies is a fault of the arm: the run ends at once with the exit code of such a
+/// fault.
 #[test]
 fn a_plan_whose_driver_dies_ends() {
     let folder = tempfile::tempdir().unwrap();

@@ -12,8 +12,8 @@ use system_tests::arm::Arm;
 use crate::canter::canter;
 use crate::plans::{Work, objects, own, report, run, world};
 
-/// Where the controlled point may be when it is to be at a pose: the planned end is exact to less
-/// than a micrometre, the rest is how the driver follows (m, rad).
+/// Largest distance of the controlled point from a pose: the planned end is exact to less than a
+/// micrometre, the rest is the following error of the driver (m, rad).
 const END_TOLERANCE: (f64, f64) = (1e-4, 1e-3);
 
 /// Standstill (servo ticks) in which the gripper acts: it takes 0.2 s, and a part of that later the
@@ -98,8 +98,8 @@ fn rests(samples: &Path, robot: &str) -> Vec<Isometry3<f64>> {
     rests
 }
 
-/// The measured arm stood still once a kit at the grasp of each part in its pose of the design, and
-/// once at the grasp of each finished kit in the box. How far (m) it was off at most.
+/// The measured arm rested once per kit at the grasp of each part in its pose of the design, and
+/// once at the grasp of each finished kit in the box. Returns the largest distance (m).
 fn assert_measured(world: &Value, rests: &[Isometry3<f64>]) -> f64 {
     let named = |name: &Value| {
         let is = |object: &&Value| object["name"] == *name;
@@ -161,7 +161,7 @@ fn three_kits_are_made() {
     make_three_kits(&own());
 }
 
-/// Has three kits made by the simulated driver in lock-step, and looks at what it measured.
+/// Makes three kits with the simulated driver in lock-step, and checks what it measured.
 pub(crate) fn make_three_kits(work: &Work) {
     let folder = tempfile::tempdir().unwrap();
     let robots = std::env::var("CANTER_PLAN_ROBOTS").unwrap_or_else(|_| "ur5e".into());

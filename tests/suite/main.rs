@@ -26,7 +26,7 @@ mod shared_memory;
 mod soak;
 mod world_in_use;
 
-/// Every file of this folder is a module above: a forgotten one would never run.
+/// Every file of this folder is a module above: otherwise it would never run.
 #[test]
 fn no_test_file_was_forgotten() {
     let runner = include_str!("main.rs");

@@ -97,7 +97,10 @@ impl Watch {
     fn start(arm: &str) -> Self {
         let robot = planner::robot::load("ur5e").unwrap();
         let limits = robot.joint_limits::<6>();
-        let (ends, worst) = (Arc::<AtomicBool>::default(), Arc::new(Mutex::new([0.0; 3])));
+        let (ends, worst) = (
+            Arc::<AtomicBool>::default(),
+            Arc::new(Mutex::new([0.0_f64; 3])),
+        );
         let (stop, seen, arm) = (ends.clone(), worst.clone(), system_tests::domain::arm(arm));
         let thread = std::thread::spawn(move || {
             let observer = ipc::Observer::open(&arm).unwrap();
@@ -317,7 +320,7 @@ impl Cell {
         self.broken.push("a new engine does not answer".to_owned());
     }
 
-    /// Looks whether both live and at the faults that the engine told of.
+    /// Checks that both run, and the faults that the engine reported.
     fn explain(&mut self) {
         for (name, process) in [("engine", &mut self.engine), ("driver", &mut self.driver)] {
             if process
@@ -363,7 +366,7 @@ impl Cell {
         }
     }
 
-    /// Recovers, forgets what is left, and runs a program to its end.
+    /// Recovers, drops what is left, and runs a program to its end.
     fn finish(&mut self) {
         for _ in 0..20 {
             self.client(&["recover"]);

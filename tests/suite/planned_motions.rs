@@ -78,8 +78,9 @@ macro_rules! robots {
 
 robots! { ur5e ur10e panda fr3 iiwa7 iiwa14 }
 
-/// Arms that are smaller or stand elsewhere do what they reach, and that correctly. The number of
-/// examples is part of the test: an arm that refuses everything has kept no limit.
+/// Arms that are smaller or placed differently execute the examples that they reach, and these
+/// correctly. The number of examples is part of the test: an arm that refuses everything must not
+/// pass.
 #[test]
 fn every_other_robot() {
     let named = ["ur5e", "ur10e", "panda", "fr3", "iiwa7", "iiwa14"];
@@ -93,7 +94,7 @@ fn every_other_robot() {
     }
 }
 
-/// The checker fires: a good motion with one thing changed is not good.
+/// The checker can fail: a good motion with one change is refused.
 #[test]
 fn a_wrong_motion_is_seen() {
     let arm = Arm::read("ur5e");

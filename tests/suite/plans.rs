@@ -306,7 +306,8 @@ fn a_pddl_plan_runs() {
     assert_eq!(parts.count(), 4);
 }
 
-/// A simulated PDDL plan reaches its goal, or the first step whose precondition is false is told.
+/// A simulated PDDL plan reaches its goal, or the first step whose precondition is false is
+/// reported.
 #[test]
 fn a_pddl_plan_is_checked_against_its_domain() {
     let folder = tempfile::tempdir().unwrap();

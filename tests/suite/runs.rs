@@ -31,8 +31,8 @@ fn columns(path: &std::path::Path, names: &[String]) -> Vec<(usize, Vec<f64>)> {
     lines.map(row).collect()
 }
 
-/// Holds the published setpoints of a run (CSV) against those of the dry run, of so many commands;
-/// tells how many were compared.
+/// Compares the published setpoints of a run (CSV) with those of the dry run, for this many
+/// commands; returns how many were compared.
 pub(crate) fn same_setpoints(
     planned: &std::path::Path,
     published: &std::path::Path,
@@ -130,7 +130,7 @@ fn a_run_publishes_what_was_planned() {
     measured_way(&folder.path().join("run.csv"), program, off_path);
 }
 
-/// The measured way keeps the tolerances of the program: 10 mm at the intermediate poses, in their
+/// The measured path keeps the tolerances of the program: 10 mm at the intermediate poses, in their
 /// order, and 0.5 mm at the end of each move. The plan uses a tolerance whole: `off_path` (m), the
 /// arm's greatest distance from its setpoint, comes on top while it moves.
 fn measured_way(samples: &std::path::Path, program: &str, off_path: f64) {
@@ -246,7 +246,7 @@ fn ctrl_c_stops_on_the_path_and_cleans_up() {
     }
 }
 
-/// A driver of its own for an arm; killed when the test fails before its end.
+/// A separate driver for an arm; killed when the test fails before its end.
 fn driver(arm: &str, options: &[&str]) -> Engine {
     let arguments = ["driver", "sim", "-r", "ur5e", "--arm", arm];
     let child = command(arguments.iter().chain(options))
@@ -289,7 +289,7 @@ fn a_driver_that_dies_is_told() {
     );
 }
 
-/// A program that cannot be done from where an external arm stands moves nothing.
+/// A program that cannot be executed from the position of an external arm moves nothing.
 #[test]
 fn an_external_arm_is_asked_where_it_stands() {
     let arm = arm("elsewhere");

@@ -110,7 +110,7 @@ fn an_answer_is_for_who_asked() {
     assert_eq!(canter(["shutdown", "--arm", "memory/answers"]).code, 0);
 }
 
-/// Two clients that ask without a pause keep the engine neither from others nor from a signal.
+/// Two clients that ask without a pause do not delay other clients or a signal.
 #[test]
 fn a_flood_does_not_hold_the_engine() {
     let mut engine = Engine::start("memory/flood", &[]);
@@ -199,8 +199,8 @@ fn kill_all(mut engine: Engine, domain: &Domain) {
     }
 }
 
-/// However segments are damaged, under a living engine or after its death: no client dies of a
-/// signal or hangs, each says what repairs it, and after the repair all works.
+/// However segments are damaged, while an engine runs or after it was killed: no client dies of a
+/// signal or hangs, each says what repairs the damage, and after the repair everything works.
 #[test]
 fn damaged_segments_are_named_and_repaired() {
     let folder = tempfile::tempdir().unwrap();
@@ -268,8 +268,8 @@ fn damaged_segments_are_named_and_repaired() {
     assert!(told * 2 > looked, "{told} of {looked}");
 }
 
-/// In a `/dev/shm` of its own of 48 MiB: a moving engine outlives a memory that is full to the
-/// last page, clients say what is missing, and SIGINT stops the arm.
+/// In a separate `/dev/shm` of 48 MiB: a moving engine continues when the memory is full, clients
+/// report what is missing, and SIGINT stops the arm.
 #[test]
 fn a_full_shared_memory_is_named() {
     const SCRIPT: &str = r#"

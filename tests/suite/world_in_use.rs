@@ -63,8 +63,8 @@ impl Drop for Run {
     }
 }
 
-/// While a plan runs in a database nothing else writes it, and who is refused is told by whom. When
-/// the holder is killed the database is free, consistent, and the run goes on.
+/// While a plan runs in a database, no other process writes it, and the error names the holder.
+/// When the holder is killed, the database is free and consistent, and the run can be resumed.
 #[test]
 fn a_second_writer_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();

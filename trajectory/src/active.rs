@@ -2,19 +2,19 @@
 
 use crate::limit::{ActiveSpan, Limit};
 
-/// Collects the stretches over which limits are used to a share or more.
+/// Collects the intervals of time in which limits are used to a given fraction or more.
 #[derive(Clone, Debug)]
 pub(crate) struct Active {
     limits: Vec<Limit>,
     /// From which ratio on each limit is active.
     shares: Vec<f64>,
     spans: Vec<ActiveSpan>,
-    /// Start of the stretch in which each limit has been active up to now.
+    /// Start of the interval in which each limit has been active until now.
     since: Vec<Option<f64>>,
 }
 
 impl Active {
-    /// Nothing yet, of `limits`, each active from the ratio `share` on.
+    /// No intervals yet; each of `limits` is active from the ratio `share` on.
     pub(crate) fn new(limits: Vec<Limit>, share: f64) -> Self {
         let shares = vec![share; limits.len()];
         Self::with(limits, shares)
@@ -30,7 +30,7 @@ impl Active {
         }
     }
 
-    /// Adds a stretch that starts at `start` (s), with the ratio of each limit.
+    /// Adds an interval that starts at `start` (s), with the ratio of each limit.
     pub(crate) fn add(&mut self, start: f64, ratios: &[f64]) {
         for (k, ratio) in ratios.iter().enumerate() {
             match (self.since[k], *ratio >= self.shares[k]) {
@@ -47,7 +47,7 @@ impl Active {
         self.since[k] = None;
     }
 
-    /// All stretches in the order of time; the motion ends at `end` (s).
+    /// All intervals in the order of time; the motion ends at `end` (s).
     pub(crate) fn finish(mut self, end: f64) -> Vec<ActiveSpan> {
         for k in 0..self.limits.len() {
             if let Some(since) = self.since[k] {

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Why a path could not be given a time law. Nothing here is raised inside the control cycle.
+/// Why a path has no time law. These errors do not occur in the control cycle.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum TimingError {

@@ -5,7 +5,7 @@ use realtime::Piece;
 
 use crate::Trajectory;
 
-/// Largest magnitude of each derivative, one a joint, over a whole motion.
+/// Largest magnitude of each derivative, one per joint, over a whole motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointPeaks<const N: usize> {
     /// Largest |velocity|, rad/s or m/s.
@@ -56,8 +56,8 @@ impl<const N: usize> Trajectory<N> {
         peaks
     }
 
-    /// Lowest and highest position of each joint for all t, rad or m; both
-    /// infinite the wrong way round when there is no piece.
+    /// Lowest and highest position of each joint for all t, rad or m; plus and minus infinity if
+    /// there is no piece.
     #[must_use]
     pub fn position_range(&self) -> (SVector<f64, N>, SVector<f64, N>) {
         let mut lowest = SVector::repeat(f64::INFINITY);

@@ -4,9 +4,9 @@ use nalgebra::SVector;
 
 use crate::{JointPoint, Path, PathPoint, ToolCurve, ToolPoint};
 
-/// A joint path through given points with their three derivatives, for example those that inverse
-/// kinematics found along a [`ToolCurve`]: between two points the polynomial of degree seven that
-/// meets value and three derivatives at both, so the path is C3. The tool follows its own curve.
+/// A joint path through given points with three derivatives, for example from inverse kinematics
+/// along a [`ToolCurve`]. Between two points it is the polynomial of degree seven with the value
+/// and three derivatives of both, so the path is C3. The tool values come from the curve.
 #[derive(Clone, Debug)]
 pub struct HermitePath<const N: usize, C> {
     at: Vec<f64>,

@@ -4,8 +4,8 @@ use nalgebra::SVector;
 
 use crate::{JointPoint, Path, PathPoint, ToolPoint};
 
-/// The straight line in joint space from a start to an end, parameter 0 to 1. What the tool does
-/// along it comes from a closure, so that this crate needs no kinematics.
+/// The straight line in joint space from a start to an end, parameter 0 to 1. The motion of the
+/// tool along it comes from a closure, so that this crate needs no kinematics.
 ///
 /// ```
 /// use nalgebra::{Isometry3, vector};

@@ -45,7 +45,7 @@ impl fmt::Display for Limit {
     }
 }
 
-/// How a ratio shrinks when time is stretched: as the first, second or third power.
+/// The power of the stretching factor by which a ratio falls: first, second or third.
 pub(crate) fn order(limit: Limit) -> i32 {
     match limit {
         Limit::JointVelocity(_) | Limit::ToolSpeed | Limit::AngularSpeed | Limit::Rate => 1,
@@ -74,7 +74,7 @@ pub struct LimitPeak {
     pub time: f64,
 }
 
-/// A part of the motion over which one limit decides the speed.
+/// A part of the motion in which one limit is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActiveSpan {
     /// Which limit.

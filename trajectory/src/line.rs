@@ -4,16 +4,15 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::{ToolCurve, ToolPoint};
 
-/// Below this length (m) and angle (rad) a move is no move at all.
+/// A move below this length (m) and angle (rad) counts as no move.
 const STILL: f64 = 1e-12;
 
 /// Straight line between two poses, parameter 0 to 1.
 ///
-/// The controlled point moves along the line at a constant rate of the
-/// parameter; the orientation turns in step about one fixed axis (slerp, the
-/// shorter way round). Either part may be empty: a pure rotation and a pure
-/// translation are lines too. Both poses are in the same frame, and so is the
-/// result; lengths in m, angles in rad.
+/// The controlled point moves along the line in proportion to the parameter; the orientation turns
+/// in the same proportion about one fixed axis (slerp, the shorter way). Either part may be empty:
+/// a pure rotation and a pure translation are lines too. Both poses are in the same frame, and so
+/// is the result; lengths in m, angles in rad.
 ///
 /// # Source
 /// K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985.
@@ -52,7 +51,7 @@ impl Line {
         }
     }
 
-    /// Length of the way of the controlled point, m.
+    /// Length of the path of the controlled point, m.
     #[must_use]
     pub fn length(&self) -> f64 {
         self.direction.norm()

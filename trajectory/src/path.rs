@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, SVector, Vector3};
 
-/// Pose of the controlled point at a path parameter `u`, with three derivatives to `u`.
+/// Pose of the controlled point at a path parameter `u`, with three derivatives with respect to
+/// `u`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolPoint {
     /// Where the controlled point is.
@@ -24,8 +25,8 @@ impl ToolPoint {
     }
 }
 
-/// Positions of `N` joints at a path parameter `u` (rad) and their three derivatives to `u`
-/// (rad/u, rad/u², rad/u³).
+/// Positions of `N` joints at a path parameter `u` (rad) and their three derivatives with respect
+/// to `u` (rad/u, rad/u², rad/u³).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointPoint<const N: usize> {
     /// `q[k]` is derivative `k` of the positions to `u`.
@@ -74,12 +75,12 @@ pub trait Path<const N: usize> {
     /// The path at `u`; outside of its range as at the nearer end.
     fn at(&self, u: f64) -> PathPoint<N>;
 
-    /// The joints of [`Path::at`]; for paths that have them without the tool.
+    /// The joints of [`Path::at`]; override it if they can be computed without the tool.
     fn joint_at(&self, u: f64) -> JointPoint<N> {
         self.at(u).joint
     }
 
-    /// The tool of [`Path::at`]; for paths that have it without the joints.
+    /// The tool of [`Path::at`]; override it if it can be computed without the joints.
     fn tool_at(&self, u: f64) -> ToolPoint {
         self.at(u).tool
     }

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, SVector};
 
 use crate::{JointPoint, Path, PathPoint, ToolPoint};
 
-/// The natural cubic spline of `N` joints through waypoints, one unit of the parameter from each
-/// to the next; twice continuously differentiable. It knows no tool: for joint moves and benches.
+/// The natural cubic spline of `N` joints through waypoints, one unit of the parameter from each to
+/// the next; twice continuously differentiable. It has no tool: for joint moves and benchmarks.
 ///
 /// ```
 /// use nalgebra::vector;

@@ -48,9 +48,9 @@ impl<const N: usize> Trajectory<N> {
         &self.times
     }
 
-    /// Position, velocity, acceleration and jerk at `t` (s). Before the start the motion is where
-    /// it starts, after the end where it ends, with the derivatives it has there. A motion without
-    /// pieces is at the origin.
+    /// Position, velocity, acceleration and jerk at `t` (s). Times before the start give the start,
+    /// times after the end give the end, with the derivatives there. A motion without pieces is at
+    /// the origin.
     pub fn sample(&self, t: f64) -> Sample<N> {
         let after = self.times.partition_point(|start| *start <= t);
         let index = after
@@ -62,8 +62,8 @@ impl<const N: usize> Trajectory<N> {
         }
     }
 
-    /// The same motion, `factor` times as long: velocities shrink by `factor`, accelerations by
-    /// its square, jerks by its cube. The geometry stays.
+    /// The same motion, `factor` times as long: velocities shrink by `factor`, accelerations by its
+    /// square, jerks by its cube. The geometry does not change.
     pub fn stretched(&self, factor: f64) -> Self {
         self.clone().into_stretched(factor)
     }

@@ -208,7 +208,7 @@ fn slower_is_within_limits() {
     assert!((scaled.duration() - 0.4 * slower).abs() < 1e-12);
 }
 
-/// A way round a corner: no sample is farther from its leg than the bound, which is near.
+/// A path round a corner: no sample is farther from its leg than the bound, which is tight.
 #[test]
 fn legs_and_lines_bound_the_way() {
     let zero = SVector::zeros();

@@ -99,8 +99,8 @@ fn limits(random: &mut Random) -> ToolLimits {
 /// Checks the times of the passes on samples: each is the first local closest
 /// approach after the pass before, and within tolerance.
 ///
-/// Rises by less than `slack` cannot be seen in samples: of two approaches that
-/// are told apart only by such a rise, the plan may name either.
+/// Rises by less than `slack` cannot be seen in samples: of two approaches that differ only by such
+/// a rise, the plan may name either.
 fn passes_in_order(
     plan: &SmoothPlan,
     times: &[f64],

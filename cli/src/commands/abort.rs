@@ -5,7 +5,7 @@ use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// Come to rest on the path and forget the rest of the program
+/// Come to rest on the path and drop the rest of the program
 #[derive(Args, Debug)]
 pub(crate) struct Abort {
     #[command(flatten)]

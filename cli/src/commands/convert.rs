@@ -13,7 +13,7 @@ use crate::program::ProgramArgument;
 pub(crate) struct Convert {
     #[command(flatten)]
     program: ProgramArgument,
-    /// Form to print; the other one unless told
+    /// Form to print; by default the other one
     #[arg(long, value_enum)]
     to: Option<Form>,
 }

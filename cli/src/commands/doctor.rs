@@ -15,23 +15,23 @@ use crate::failure::Failure;
 use crate::host_options::rate;
 use crate::output;
 
-/// How long a look at the segments may take.
+/// How long reading the segments may take.
 const PROBE: Duration = Duration::from_secs(10);
 
-/// Look at what the servo loop needs of this machine, and say what would repair it
+/// Check what the servo loop needs of this machine, and say how to correct problems
 ///
-/// Looks at the kernel, the rights, shared memory and what dead processes left there (which it
-/// removes), measures wake-ups at the servo period and a round trip through shared memory; with
-/// --arm it greets the driver, with --robot it compares limits. The exit code is 1 when something
-/// does not work, 0 with warnings.
+/// Checks the kernel, the rights, shared memory and what dead processes left there (which it
+/// removes); measures wake-up delays at the servo period and a round trip through shared memory.
+/// With --arm it opens a session with the driver, with --robot it compares limits. The exit code is
+/// 1 when something does not work, 0 with warnings.
 #[derive(Args, Debug)]
 pub(crate) struct Doctor {
-    /// Greet the driver of this arm, which must have no engine
+    /// Open a session with the driver of this arm, which must have no engine
     #[arg(long, value_name = "CELL/ARM")]
     arm: Option<String>,
     #[command(flatten)]
     domain: DomainOption,
-    /// Look at the limits of this robot: shipped name or folder
+    /// Check the limits of this robot: shipped name or folder
     #[arg(short, long, value_name = "R")]
     robot: Option<String>,
     /// Servo rate to measure at
@@ -40,11 +40,11 @@ pub(crate) struct Doctor {
     /// How long to measure wake-ups, s
     #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
     seconds: f64,
-    /// Remove all segments and lists of the domain: for when they are damaged. Refused while a
-    /// process uses them
+    /// Remove all segments and lists of the domain, if they are damaged. Refused while a process
+    /// uses them
     #[arg(long)]
     repair: bool,
-    /// Look at the segments, which may end this process
+    /// Read the segments, which may crash this process
     #[arg(long, hide = true)]
     probe: bool,
     /// Print JSON
@@ -97,7 +97,7 @@ fn repair(domain: &Domain) -> Result<Exit, Failure> {
     }
 }
 
-/// Reads all that is kept of processes and services.
+/// Reads all data of processes and services.
 fn probe(domain: &Domain) -> Result<Exit, Failure> {
     ipc::look_at_services(domain)?;
     ipc::count_nodes(domain)?;
@@ -105,7 +105,7 @@ fn probe(domain: &Domain) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The same in a process of its own, which may crash or hang; gives what it came to, if not well.
+/// The same in a separate process, which may crash or hang; returns the problem, if any.
 fn probe_apart(domain: &Domain) -> Result<Option<String>, Failure> {
     let program = std::env::current_exe().context("cannot find the program's own file");
     let mut child = Command::new(program.map_err(|cause| Failure::new(Exit::Internal, cause))?)
@@ -135,7 +135,7 @@ fn probe_apart(domain: &Domain) -> Result<Option<String>, Failure> {
     Ok((!status.success()).then(|| format!("{status}: {last}")))
 }
 
-/// One line a check, and under it what repairs it.
+/// One line per check, and under it how to correct it.
 fn print(checks: &[Check]) -> io::Result<()> {
     let mut out = io::stdout().lock();
     for check in checks {

@@ -10,8 +10,8 @@ use crate::signals::SignalThread;
 
 /// Run the engine of an arm until Ctrl-C; programs come from `canter send`
 ///
-/// Prints a line for everything that happens; the arm waits for no reader. Ctrl-C stops on the path
-/// and ends; a second Ctrl-C brakes as fast as the joints can.
+/// Prints a line for each event; the arm does not wait for a reader. Ctrl-C stops on the path and
+/// ends; a second Ctrl-C brakes as fast as the joints can.
 #[derive(Args, Debug)]
 pub(crate) struct Engine {
     #[command(flatten)]
@@ -20,7 +20,7 @@ pub(crate) struct Engine {
     host: HostOptions,
     #[command(flatten)]
     refusal: RefusalOption,
-    /// Print one JSON object for everything that happens, one per line
+    /// Print one JSON object per event, one per line
     #[arg(long)]
     json: bool,
 }
@@ -54,7 +54,7 @@ impl Engine {
                 break Exit::Done;
             }
             let note = host.turn()?;
-            // Nobody reads the recording here; it must not grow.
+            // The recording is not used here; it must not grow.
             drop(host.session.samples());
             let Some(note) = note else { continue };
             self.tell(printer, &note);
@@ -71,7 +71,7 @@ impl Engine {
         if !self.json {
             return printer.line(&line(note));
         }
-        // A note has no key that is not a text: it can be written.
+        // All keys of a note are texts, so it can be written.
         if let Ok(text) = serde_json::to_string(note) {
             printer.line(&text);
         }

@@ -47,7 +47,8 @@ impl Ik {
     }
 }
 
-/// A row as a pose; the quaternion may be a little off unit length, as printed numbers are.
+/// A row as a pose; the length of the quaternion may differ from one by rounding of printed
+/// numbers.
 fn pose(row: &CsvRow) -> anyhow::Result<Isometry3<f64>> {
     let line = row.line;
     let [x, y, z, w, i, j, k] = row.numbers.as_slice() else {
@@ -123,7 +124,7 @@ fn errors<const N: usize>(
     [apart.norm(), reached.rotation.angle_to(&pose.rotation)]
 }
 
-/// The answer on its way to standard output.
+/// Writes the results to standard output.
 struct Sheet {
     out: BufWriter<io::StdoutLock<'static>>,
     statuses: BTreeMap<&'static str, usize>,

@@ -11,7 +11,7 @@ use crate::client::{self, ArmOption};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// How often the engine is told to go on.
+/// Time between two requests to the engine.
 const AGAIN: Duration = Duration::from_millis(50);
 
 /// How long the engine may take to answer.
@@ -20,20 +20,20 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// The axes of the tool, in the order of the request.
 const TOOL: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// Move an arm by hand: joints, or the tool along and about its own axes
+/// Jog an arm: joints, or the tool along and about its own axes
 ///
-/// Goes on until Ctrl-C or --seconds, within the limits of any other motion; the arm stops by
-/// itself when this process is gone. No program may be under way.
+/// Moves until Ctrl-C or --seconds, within the same limits as any other motion; the arm stops by
+/// itself when this process ends. No program may be running.
 #[derive(Args, Debug)]
 pub(crate) struct Jog {
-    /// Which way: j2=-0.1 turns joint 2 back at a tenth of its speed; x, y, z and rx, ry, rz are
-    /// the tool's own axes; several of one kind go together
+    /// Direction: j2=-0.1 turns joint 2 back at a tenth of its speed; x, y, z and rx, ry, rz are
+    /// the axes of the tool; several of one kind can be combined
     #[arg(value_name = "AXIS=SHARE", required = true, value_parser = axis)]
     axes: Vec<(Axis, f64)>,
     /// How long; without it until Ctrl-C
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
-    /// The arm stops when the engine hears nothing for this long, 50 to 2000
+    /// The arm stops when the engine gets no request for this long, 50 to 2000
     #[arg(long, value_name = "MS", default_value_t = 300)]
     timeout: u64,
     #[command(flatten)]
@@ -45,7 +45,7 @@ pub(crate) struct Jog {
 enum Axis {
     /// A joint, from 0.
     Joint(usize),
-    /// An axis of the tool, by its place in [`TOOL`].
+    /// An axis of the tool, by its index in [`TOOL`].
     Tool(usize),
 }
 

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 /// To read it at once: `canter man | man -l -`.
 #[derive(Args, Debug)]
 pub(crate) struct Man {
-    /// Folder for one page a command (canter.1, canter-run.1, ...), made if it is not there
+    /// Folder for one page per command (canter.1, canter-run.1, ...), made if it is missing
     #[arg(long, value_name = "FOLDER")]
     folder: Option<PathBuf>,
 }

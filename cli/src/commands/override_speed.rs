@@ -7,7 +7,7 @@ use crate::failure::Failure;
 
 /// Move at a share of the planned speed
 ///
-/// Changes time, never geometry: tolerances hold at every share.
+/// Changes time, never geometry: tolerances hold at every override.
 #[derive(Args, Debug)]
 pub(crate) struct Override {
     /// Share of the planned speed, 0 to 100

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 
 /// Come to rest on the path and wait there
 ///
-/// The program stays where it is; `canter resume` goes on from exactly there.
+/// The program is kept; `canter resume` continues from exactly there.
 #[derive(Args, Debug)]
 pub(crate) struct Pause {
     #[command(flatten)]

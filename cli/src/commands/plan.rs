@@ -19,8 +19,8 @@ use crate::samples::{SampleRow, SampleWriter};
 
 /// Plan a program without moving anything: the dry run
 ///
-/// Goes through the same planner as `canter run`, from the robot's home position, and prints when
-/// each command starts, how long it takes and what was proved of each move.
+/// Uses the same planner as `canter run`, from the robot's home position, and prints when each
+/// command starts, how long it takes and what was proved of each move.
 #[derive(Args, Debug)]
 pub(crate) struct Plan {
     #[command(flatten)]

@@ -104,7 +104,7 @@ impl PlanCheck {
         })
     }
 
-    /// Steps of a PDDL plan that is as it should be, or the number of those and what is wrong.
+    /// Number of steps of a PDDL plan without errors, or the number of good steps and the error.
     fn judge(&self, source: &str) -> Result<Result<usize, (usize, String)>, Failure> {
         let steps = match read_plan(source) {
             Ok(steps) => steps,
@@ -173,7 +173,7 @@ impl PlanCheck {
     }
 }
 
-/// Prints the plan in a form that is read as the same plan.
+/// Prints the plan in another form, which reads as the same plan.
 fn convert(plan: &Plan, form: Form) -> io::Result<()> {
     match form {
         Form::Block => io::stdout().lock().write_all(write(plan).as_bytes()),

@@ -29,7 +29,7 @@ use crate::world_file::{Database, refused};
 /// Execute a kitting process plan or a PDDL plan in a world
 ///
 /// Starts the engine and, unless told otherwise, the simulated driver. With --dry-run the motion is
-/// planned exactly as in a real run but nothing moves, and the world is left as it is. The factotum
+/// planned exactly as in a real run, but nothing moves, and the world does not change. The factotum
 /// is simulated: it brings supplies like those at the start. Ctrl-C stops on the path and ends; the
 /// run can then be resumed. A second Ctrl-C aborts.
 #[derive(Args, Debug)]
@@ -53,13 +53,13 @@ pub(crate) struct PlanRun {
     /// How often the factotum brings what meets a requirement; without this, always
     #[arg(long, value_name = "REQUIREMENT=TIMES")]
     stock: Vec<String>,
-    /// Plan all motion, move nothing, leave the world as it is
+    /// Plan all motion, move nothing, do not change the world
     #[arg(long)]
     dry_run: bool,
     /// Run in a copy of the world, which is kept in this new database
     #[arg(long, value_name = "FILE.db")]
     keep: Option<PathBuf>,
-    /// Go on with the last run of the database, which was killed or stopped
+    /// Continue the last run of the database, which was killed or stopped
     #[arg(long)]
     resume: bool,
     /// Percentage of the arm's speed and acceleration
@@ -118,7 +118,7 @@ impl PlanRun {
         with_joints!(robot.dof(), execute(task, &robot, arm))
     }
 
-    /// What can be known before an engine is started.
+    /// Checks what is possible before an engine is started.
     fn check(
         &self,
         source: Option<&str>,
@@ -185,8 +185,8 @@ impl PlanRun {
     fn robot_options(&self, robot: &Robot) -> RobotOptions {
         RobotOptions {
             percent: Some(self.speed),
-            // Straight ways in a row leave a seven-joint arm in whatever posture they end in;
-            // between free ones it can take a good posture again.
+            // After several straight paths in a row a seven-joint arm may be in a bad posture; free
+            // paths between them let it choose a good one.
             straight: robot.dof() <= 6,
             ..RobotOptions::default()
         }
@@ -231,7 +231,7 @@ struct Task<'a> {
     printer: &'a Printer,
     /// Text of the plan; none when a run is resumed.
     source: Option<String>,
-    /// The run that goes on; none when a plan is started.
+    /// The run that is resumed; `None` when a plan is started.
     stored: Option<StoredRun>,
     parameters: BTreeMap<String, String>,
     limits: BTreeMap<String, usize>,
@@ -240,7 +240,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Whether the plan, or the one whose run goes on, is PDDL.
+    /// Whether the plan, or that of the resumed run, is PDDL.
     fn is_pddl(&self) -> bool {
         let stored = self.stored.as_ref().map(|run| run.source.as_str());
         self.source.as_deref().or(stored).is_some_and(is_pddl)

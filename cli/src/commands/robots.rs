@@ -12,7 +12,7 @@ use crate::mobility::{Mobility, mobility};
 use crate::output;
 use crate::robot::{load, with_joints};
 
-/// Robots: those that are shipped, one in detail, a new one from its URDF
+/// Robots: list the shipped ones, show one, make a new one from its URDF
 #[derive(Args, Debug)]
 pub(crate) struct Robots {
     #[command(subcommand)]
@@ -37,8 +37,8 @@ enum What {
     },
     /// Make a robot folder from a URDF
     ///
-    /// Writes robot.urdf and robot.toml; what the URDF does not say is filled with cautious values
-    /// that are marked as such. Look through robot.toml before the robot moves.
+    /// Writes robot.urdf and robot.toml; what the URDF does not have is filled with cautious values
+    /// that are marked as such. Check robot.toml before the robot moves.
     Import {
         /// The URDF file
         #[arg(value_name = "FILE.urdf")]
@@ -201,7 +201,7 @@ fn table(robot: &Robot, mobility: &Mobility) -> io::Result<()> {
     end_effectors(&mut out, robot)
 }
 
-/// One line a joint.
+/// One line per joint.
 fn joint_table(out: &mut impl Write, robot: &Robot) -> io::Result<()> {
     let joints = &robot.joints;
     writeln!(
@@ -252,7 +252,7 @@ fn end_effectors(out: &mut impl Write, robot: &Robot) -> io::Result<()> {
     Ok(())
 }
 
-/// A pose for people: millimetres, and degrees of roll, pitch and yaw where it is turned.
+/// A pose for display: millimetres, and degrees of roll, pitch and yaw if it is turned.
 fn millimetres(pose: &Isometry3<f64>) -> String {
     let place = pose.translation.vector * 1e3;
     let (roll, pitch, yaw) = pose.rotation.euler_angles();

@@ -23,8 +23,8 @@ use crate::signals::SignalThread;
 /// Starts the engine and, unless told otherwise, the simulated driver, runs the program, prints a
 /// line for each command that is done, and ends both. The whole program is planned first: one that
 /// cannot be executed moves nothing. Ctrl-C stops on the path and ends; a second Ctrl-C brakes as
-/// fast as the joints can. The arm waits for nobody who reads: where standard output is closed or
-/// not read, the program goes on to its end, lines are dropped and counted, and the exit code is 8.
+/// fast as the joints can. The arm does not wait for a reader: if standard output is closed or not
+/// read, the program runs to its end, lines are dropped and counted, and the exit code is 8.
 #[derive(Args, Debug)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -38,7 +38,7 @@ pub(crate) struct Run {
     /// Write what was published and measured as CSV
     #[arg(long, value_name = "FILE.csv")]
     samples: Option<PathBuf>,
-    /// Print one JSON object for everything that happens, one per line
+    /// Print one JSON object per event, one per line
     #[arg(long)]
     json: bool,
 }
@@ -53,7 +53,7 @@ impl Run {
             return Ok(program.exit());
         }
         // The simulated arm starts where the dry run does, so that a program that cannot be
-        // executed starts nothing. Where another arm stands is known to its driver only.
+        // executed starts nothing. The position of another arm is known to its driver only.
         let mut plans = 0;
         let mut plan = None;
         if self.host.driver != DriverChoice::External {
@@ -107,8 +107,8 @@ impl Run {
 }
 
 impl Run {
-    /// Plans the whole program from `start`, or from home, and reports what is refused; no plan if
-    /// it may not be run. With a policy that lives with refusals it always may.
+    /// Plans the whole program from `start`, or from home, and reports refused commands; no plan if
+    /// it may not be run. With a policy that allows refusals it always may.
     fn plan(
         &self,
         program: &ProgramFile,
@@ -125,7 +125,7 @@ impl Run {
     }
 }
 
-/// A program on its way.
+/// A program that is running.
 struct Running {
     json: bool,
     host: Host,
@@ -167,7 +167,7 @@ impl Running {
         self.finish(exit, done, count)
     }
 
-    /// What a note means for the process, if it is the last one.
+    /// The exit code for a note, if it is the last one.
     fn over(&self, note: &Note, last: u32) -> Option<Exit> {
         match note {
             Note::Done { id, .. } if *id == last => Some(Exit::Done),
@@ -187,7 +187,7 @@ impl Running {
     fn tell(&mut self, note: &Note) {
         let printer = &self.printer;
         if self.json {
-            // A note has no key that is not a text: it can be written.
+            // All keys of a note are texts, so it can be written.
             if let Ok(text) = serde_json::to_string(note) {
                 printer.line(&text);
             }
@@ -221,13 +221,14 @@ impl Running {
     fn finish(mut self, exit: Exit, done: usize, count: usize) -> Result<Exit, Failure> {
         let duration = self.recording.duration();
         let status = self.host.session.status();
-        // The sample of a period is complete when the next state came: the last ones are still out.
+        // The sample of a period is complete when the next state arrives: the last ones are still
+        // missing.
         self.host.session.close();
         self.recording.take(&self.host.session.samples())?;
         let driver = self.host.session.driver.clone();
         let tracking = self.recording.worst();
         let exit = match exit {
-            // The end was reached, but not everything on the way was done.
+            // The end was reached, but not every command was executed.
             Exit::Done if done < count => Exit::Refused,
             exit => exit,
         };

@@ -17,7 +17,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Send a program to a running engine and wait for its end
 ///
-/// Prints one JSON object for everything that happens to it, one per line.
+/// Prints one JSON object per event of the program, one per line.
 #[derive(Args, Debug)]
 pub(crate) struct Send {
     #[command(flatten)]
@@ -70,7 +70,7 @@ impl Send {
     }
 }
 
-/// What a note means for the process, if nothing of the program can follow.
+/// The exit code for a note, if nothing of the program can follow.
 fn over(note: &Value, last: u64) -> Option<Exit> {
     let is_last = note["id"].as_u64() == Some(last);
     match note["event"].as_str()? {

@@ -19,10 +19,10 @@ const WATCH: Duration = Duration::from_millis(250);
 pub(crate) struct Status {
     #[command(flatten)]
     arm: ArmOption,
-    /// Go on showing it until Ctrl-C or the end of the engine
+    /// Show it continuously until Ctrl-C or the end of the engine
     #[arg(long)]
     watch: bool,
-    /// Print JSON; with --watch one object a line
+    /// Print JSON; with --watch one object per line
     #[arg(long)]
     json: bool,
 }

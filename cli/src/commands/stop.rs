@@ -7,12 +7,11 @@ use crate::failure::Failure;
 
 /// Come to rest on the path, now
 ///
-/// Waits until the arm rests and says where the motion is. `canter resume` goes on from there,
-/// `canter abort` forgets the rest. This is not an emergency
-/// stop: that is the robot's own.
+/// Waits until the arm rests and prints the state of the motion. `canter resume` continues from
+/// there, `canter abort` drops the rest. This is not an emergency stop: use that of the robot.
 #[derive(Args, Debug)]
 pub(crate) struct Stop {
-    /// Use all that the joints can do, not only what is gentle
+    /// Brake as fast as the joints can, instead of gently
     #[arg(long)]
     fast: bool,
     #[command(flatten)]

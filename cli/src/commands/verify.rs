@@ -15,10 +15,10 @@ use crate::{input, output};
 
 /// Check a recorded motion against its program, from the samples alone
 ///
-/// Takes what `canter plan --samples` or `canter run --samples` wrote and holds every column against
-/// the program, the robot and the other columns: limits of joints and tool, tolerances and their
-/// order, straight lines and legs, orientation, rest, times. A finding names the rule, the time, the
-/// value and the limit. It shares no code with the planner.
+/// Reads what `canter plan --samples` or `canter run --samples` wrote and checks every column
+/// against the program, the robot and the other columns: limits of joints and tool, tolerances and
+/// their order, straight lines and legs, orientation, rest, times. A finding names the rule, the
+/// time, the value and the limit. It has its own kinematics and plans nothing.
 #[derive(Args, Debug)]
 pub(crate) struct Verify {
     /// CSV file of samples; `-` is standard input

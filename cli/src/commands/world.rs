@@ -32,7 +32,7 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// Make a database from a workstation file, or replace the world in it; its runs are forgotten
+    /// Make a database from a workstation file, or replace the world in it; its runs are deleted
     Import {
         /// Workstation file: .toml, .json, or NIST's .xml
         file: PathBuf,
@@ -120,7 +120,7 @@ fn show(model: &Model) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The last run of a plan in a database: where it is, or how it ended.
+/// Prints the last run of a plan in a database: how far it came, or how it ended.
 fn tell_run(world: &Path) -> Result<Exit, Failure> {
     let unreadable = |error| Failure::new(Exit::Unreadable, error);
     if world_file::is_workstation_file(world) {
@@ -146,7 +146,7 @@ fn tell_run(world: &Path) -> Result<Exit, Failure> {
             writeln!(out, "; failed: {reason} (EndCanon({code}))")?;
         }
         (Some(_), _) => writeln!(out, "; ended")?,
-        (None, Some(step)) => writeln!(out, "; not ended, {step} was under way")?,
+        (None, Some(step)) => writeln!(out, "; not ended, {step} was not finished")?,
         (None, None) => writeln!(out, "; not ended")?,
     }
     Ok(Exit::Done)

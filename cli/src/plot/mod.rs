@@ -41,8 +41,8 @@ pub(crate) struct Span {
     pub(crate) moving: bool,
 }
 
-/// State at one time. The four lists have one entry a joint and are parts of the limits: the
-/// position runs from -1 at the lower to 1 at the upper limit, the others are divided by theirs.
+/// State at one time. The four lists have one entry per joint, relative to the limits: the position
+/// runs from -1 at the lower to 1 at the upper limit, the others are divided by theirs.
 pub(crate) struct PlotRow {
     /// Time, s.
     pub(crate) time: f64,
@@ -63,7 +63,7 @@ pub(crate) struct Target {
 /// Size of the picture, pixels.
 const SIZE: [f64; 2] = [1280.0, 900.0];
 
-/// One colour a joint, told apart by readers with a colour weakness too.
+/// One colour per joint; readers with a colour vision deficiency can distinguish them too.
 const COLOURS: [&str; 8] = [
     "#0969da", "#d1600a", "#1a9850", "#c2255c", "#7048e8", "#b08800", "#0b9bb0", "#6e7781",
 ];

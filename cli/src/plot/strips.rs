@@ -7,10 +7,10 @@ use super::{Drawing, colour};
 const NAMES: [&str; 4] = ["position", "velocity", "acceleration", "jerk"];
 const RIBBON: f64 = 24.0;
 const GAP: f64 = 30.0;
-/// Room left of the strips for the marks of their axes, and below them for the time axis.
+/// Space left of the plots for the marks of their axes, and below them for the time axis.
 const LEFT: f64 = 44.0;
 const BELOW: f64 = 40.0;
-/// What the strips show: the limits and a little beyond.
+/// The range of the plots: the limits and a little beyond.
 const RANGE: [f64; 2] = [-1.12, 1.12];
 
 pub(super) fn draw(svg: &mut Svg, drawing: &Drawing, [x, y]: [f64; 2], [width, height]: [f64; 2]) {

@@ -7,7 +7,7 @@ pub(super) struct Svg {
     text: String,
 }
 
-/// How the picture looks; follows the reader's light or dark setting where the viewer knows it.
+/// Style of the picture; follows the reader's light or dark setting if the viewer supports it.
 const STYLE: &str = "\
 text{font-family:Inter,'Segoe UI','Helvetica Neue',Arial,'DejaVu Sans',sans-serif;font-size:12px;fill:#57606a}\
 .title{font-size:21px;font-weight:600;fill:#1f2328}\
@@ -63,7 +63,7 @@ impl Svg {
         ));
     }
 
-    /// A line through points, in a colour; points that nobody could see the lack of are left out.
+    /// A line through points, in a colour; points that make no visible difference are left out.
     pub(super) fn curve(&mut self, class: &str, colour: &str, points: &[[f64; 2]]) {
         if points.len() < 2 {
             return;
@@ -169,7 +169,7 @@ fn off_line([x, y]: [f64; 2], [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> f64 {
     (x - x1 - part * dx).hypot(y - y1 - part * dy)
 }
 
-/// Text with the characters that mean something in XML replaced, control characters dropped.
+/// Text with XML's special characters replaced and control characters dropped.
 fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for character in text.chars() {

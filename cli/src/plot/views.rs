@@ -5,11 +5,11 @@ use super::svg::{Anchor, Svg};
 use super::{Drawing, PlotRow};
 
 const GAP: f64 = 30.0;
-/// Room for the marks of the axes, left of and below each view.
+/// Space for the marks of the axes, left of and below each view.
 const LEFT: f64 = 48.0;
 const BELOW: f64 = 40.0;
 const LEGEND: f64 = 24.0;
-/// Colours of the way from rest to full speed.
+/// Colours of the path from rest to full speed.
 const SPEEDS: [&str; 8] = [
     "#3b4cc0", "#4a6fdc", "#2c93d1", "#14a89b", "#4fb05a", "#b3a82a", "#e58a1f", "#d7301f",
 ];
@@ -151,7 +151,7 @@ fn millimetres(meters: f64) -> String {
     }
 }
 
-/// The way in pieces of one colour each, by speed.
+/// The path in pieces of one colour each, by speed.
 fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
     let peak = peak_speed(&drawing.rows);
     let at = |row: &PlotRow| {
@@ -170,7 +170,7 @@ fn way(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
             piece.push(at(&pair[0]));
             piece_shade = shade;
         }
-        // Points nearer than a fifth of a pixel (the arm waits) add nothing to see.
+        // Points nearer than a fifth of a pixel (the arm waits) make no visible difference.
         let next = at(&pair[1]);
         let apart = piece
             .last()
@@ -226,7 +226,7 @@ fn targets(svg: &mut Svg, drawing: &Drawing, view: &View, layout: &Layout) {
     }
 }
 
-/// What the colours of the way mean.
+/// The legend of the colours.
 fn speed_legend(svg: &mut Svg, drawing: &Drawing, [x, y]: [f64; 2], width: f64) {
     let peak = peak_speed(&drawing.rows);
     let label = format!("{:.0} mm/s", peak * 1e3);

@@ -4,13 +4,13 @@
 use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, asked_to_end, run};
 use ipc::{GRIPPER, ToolAction, ToolStatus};
 
-/// Six joints that are at once where they shall be.
+/// Six ideal joints that reach each setpoint at once.
 struct MyRobot([Measured; 6], ToolStatus);
 
 impl Robot for MyRobot {
     fn about(&self) -> About {
-        // HERE: ranges (rad), and the most of speed (rad/s), acceleration (rad/s2), jerk (rad/s3):
-        // at least what the robot's folder has.
+        // HERE: ranges (rad), and limits of speed (rad/s), acceleration (rad/s2), jerk (rad/s3): at
+        // least those of the robot's folder.
         About {
             name: "my robot".to_owned(),
             lower: vec![-6.3; 6],
@@ -23,17 +23,17 @@ impl Robot for MyRobot {
     }
 
     fn measure(&mut self, joints: &mut [Measured]) {
-        // HERE: ask the hardware where the joints are.
+        // HERE: read the joint positions and velocities from the hardware.
         joints.copy_from_slice(&self.0);
     }
 
     fn follow(&mut self, joints: &[Reference], _period: f64) {
-        // HERE: tell the hardware; use velocity and acceleration as feed-forward.
+        // HERE: send the reference to the hardware; use velocity and acceleration as feed-forward.
         self.0 = core::array::from_fn(|joint| joints[joint].into());
     }
 
     fn act(&mut self, _tool: usize, action: ToolAction) {
-        // HERE: begin to open or close; `tool_status` tells when it is done.
+        // HERE: begin to open or close; `tool_status` reports when it is done.
         let open = action == ToolAction::Open;
         self.1 = [ToolStatus::Closed, ToolStatus::Open][usize::from(open)];
     }
@@ -48,7 +48,7 @@ fn main() -> Result<(), DriverError> {
     let domain = ipc::Domain::choose(None, |name| std::env::var_os(name))?;
     let home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0].map(|at| Reference::rest(at).into());
     let robot = MyRobot(home, ToolStatus::Open);
-    // Ctrl-C and SIGTERM: the kit brakes the arm first.
+    // After Ctrl-C or SIGTERM the kit brakes the arm first.
     let stop = asked_to_end()?;
     let report = run(&domain.arm(&arm)?, robot, &RunOptions::default(), &stop)?;
     report.braked.iter().for_each(|text| eprintln!("{text}"));

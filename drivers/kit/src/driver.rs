@@ -7,11 +7,11 @@ use crate::{About, DriverError, Limiter, Measured, Reference, Robot};
 /// How far the first setpoint of a session may be from the measured position (rad).
 const FIRST: f64 = 1e-3;
 
-/// Room for a setpoint beside what speed and time allow (rad).
+/// Tolerance of a setpoint's position beyond what speed and time allow (rad).
 const ROOM: f64 = 2e-3;
 
-/// How far velocity and acceleration of a setpoint may be from zero, as a multiple of the joint's
-/// limit: room for rounding.
+/// Largest velocity and acceleration of a setpoint, as a multiple of the joint's limit: tolerance
+/// for rounding.
 const MARGIN: f64 = 1.001;
 
 /// What an engine and the driver agreed on.
@@ -25,8 +25,8 @@ pub(crate) struct Session {
     pub(crate) clock: Clock,
 }
 
-/// A robot with the driver's side of the protocol. Times go in as numbers, so that the same
-/// setpoints at the same times give the same states.
+/// A robot with the driver's side of the protocol. Times are arguments, so the same setpoints at
+/// the same times give the same states.
 #[derive(Clone, Debug)]
 pub struct Driver<R> {
     pub(crate) robot: R,
@@ -41,13 +41,13 @@ pub struct Driver<R> {
     pub(crate) measured: Vec<Measured>,
     /// What the robot follows.
     pub(crate) references: Vec<Reference>,
-    /// What the setpoints say, or would say by now.
+    /// The newest setpoint, extrapolated to the present time.
     pub(crate) targets: Vec<Reference>,
     pub(crate) orders: [u32; MAX_TOOLS],
     pub(crate) last: Setpoint,
     pub(crate) fresh: bool,
     pub(crate) received_ns: u64,
-    /// When the newest setpoint was sent, by its own word.
+    /// When the newest setpoint was sent, by its own time stamp.
     pub(crate) newest_ns: u64,
     /// When the last period was; 0 before the first of a session.
     pub(crate) stepped_ns: u64,
@@ -61,7 +61,7 @@ impl<R: Robot> Driver<R> {
     /// A robot at rest.
     ///
     /// # Errors
-    /// When what it says of itself does not fit together.
+    /// When the robot's description is not consistent.
     pub fn new(mut robot: R) -> Result<Self, DriverError> {
         let about = robot.about();
         about.check()?;
@@ -122,22 +122,22 @@ impl<R: Robot> Driver<R> {
         self.missed_ever
     }
 
-    /// The clock of the session under way.
+    /// The clock of the current session.
     pub fn clock(&self) -> Option<Clock> {
         self.session.as_ref().map(|session| session.clock)
     }
 
-    /// The period of the session under way (ns).
+    /// The period of the current session (ns).
     pub fn period_ns(&self) -> Option<u64> {
         self.session.as_ref().map(|session| session.period_ns)
     }
 
-    /// The watchdog of the session under way (ns).
+    /// The watchdog of the current session (ns).
     pub fn watchdog_ns(&self) -> Option<u64> {
         self.session.as_ref().map(|session| session.watchdog_ns)
     }
 
-    /// Whether a setpoint belongs to the session under way.
+    /// Whether a setpoint belongs to the current session.
     pub fn is_of_session(&self, setpoint: &Setpoint) -> bool {
         let session = self.session.as_ref();
         session.is_some_and(|session| session.number == setpoint.session)
@@ -148,7 +148,7 @@ impl<R: Robot> Driver<R> {
         self.about.joints()
     }
 
-    /// Where a joint was measured (rad); not a number where there is no such joint.
+    /// The measured position of a joint (rad); NaN if there is no such joint.
     pub fn position(&self, joint: usize) -> f64 {
         self.measured
             .get(joint)
@@ -160,8 +160,8 @@ impl<R: Robot> Driver<R> {
         &self.last
     }
 
-    /// Takes a setpoint at `now_ns`. What does not belong to the session is ignored; what makes
-    /// no sense stops the arm.
+    /// Receives a setpoint at `now_ns`. A setpoint of another session is ignored; an invalid one
+    /// stops the arm.
     pub fn receive(&mut self, setpoint: &Setpoint, now_ns: u64) {
         let Some(session) = &self.session else { return };
         let following = matches!(
@@ -179,13 +179,14 @@ impl<R: Robot> Driver<R> {
             return;
         }
         let wall = session.clock == Clock::Wall;
-        // Both sides read the same clock: what comes from long after now makes no sense.
+        // Both sides read the same clock: a time far in the future is invalid.
         let future = wall && setpoint.published_ns > now_ns.saturating_add(session.watchdog_ns);
         if future || setpoint.check(self.joints()).is_err() {
             self.stop(FaultCode::BadSetpoint, u32::MAX);
             return;
         }
-        // After a stall setpoints come together: then the time between them is that of their ticks.
+        // After a stall, setpoints arrive together: then the time between them is that of their
+        // ticks.
         let ticks = setpoint.tick.saturating_sub(self.last.tick);
         let planned = ticks.saturating_mul(session.period_ns);
         let elapsed = now_ns
@@ -220,8 +221,8 @@ impl<R: Robot> Driver<R> {
         self.fresh = true;
     }
 
-    /// Answers a sign of life: in lock-step a setpoint of the period that was before. Nothing
-    /// moves; the answer is the last state with a number of its own.
+    /// Answers a sign of life: in lock-step, a setpoint that repeats the last period. Nothing
+    /// moves; the answer is the last state with a new sequence number.
     pub fn sign_of_life(&mut self, setpoint: &Setpoint) -> Option<State> {
         let repeats = self.is_of_session(setpoint)
             && setpoint.tick == self.last.tick
@@ -246,7 +247,7 @@ impl<R: Robot> Driver<R> {
             let (at, speed) = (setpoint.position[joint], setpoint.velocity[joint]);
             let most = self.about.velocity[joint] * MARGIN;
             let force = self.about.acceleration[joint] * MARGIN;
-            // A late setpoint follows on the last one, not on what was made up meanwhile.
+            // A late setpoint continues the last one, not the extrapolation meanwhile.
             let before = if first {
                 self.measured[joint].position
             } else {
@@ -267,8 +268,8 @@ impl<R: Robot> Driver<R> {
         self.state = DriverState::Stopping;
     }
 
-    /// Begins to leave: an open session ends with [`FaultCode::Ended`], the arm stops within its
-    /// limits, and no session is opened any more. Says whether the arm moves.
+    /// Begins to end the driver: an open session ends with [`FaultCode::Ended`], the arm stops
+    /// within its limits, and no new session is opened. Returns whether the arm moves.
     pub fn leave(&mut self) -> bool {
         self.leaving = true;
         if self.is_following() || self.state == DriverState::Synced {
@@ -286,7 +287,7 @@ impl<R: Robot> Driver<R> {
         matches!(self.state, DriverState::Armed | DriverState::Active)
     }
 
-    /// Whether the driver itself was stopped for longer than the watchdog, at `now_ns`.
+    /// Whether, at `now_ns`, the driver itself did not run for longer than the watchdog.
     fn has_stalled(&self, now_ns: u64) -> bool {
         let Some(session) = &self.session else {
             return false;
@@ -297,8 +298,8 @@ impl<R: Robot> Driver<R> {
             && now_ns.saturating_sub(self.stepped_ns) > session.watchdog_ns
     }
 
-    /// One period of `period_ns` that ends at `now_ns`: measures, chooses what to follow, has the
-    /// robot follow it, returns the state to send.
+    /// One period of `period_ns` that ends at `now_ns`: measures, chooses the reference, has the
+    /// robot follow it, and returns the state to send.
     pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
         let period = period_ns as f64 * 1e-9;
         self.robot.measure(&mut self.measured);
@@ -334,7 +335,7 @@ impl<R: Robot> Driver<R> {
             self.stop(FaultCode::Stalled, u32::MAX);
         }
         let Some(session) = &self.session else { return };
-        // By its own time: a setpoint that waited while the driver did not run is not new.
+        // By its own time stamp: a setpoint that waited while the driver did not run is not new.
         let silence = now_ns.saturating_sub(self.newest_ns);
         match self.state {
             DriverState::Armed | DriverState::Active => {
@@ -356,8 +357,8 @@ impl<R: Robot> Driver<R> {
         }
     }
 
-    /// What the joints follow in this period: the setpoint, what it would be by now, or a stop;
-    /// never more than a joint can.
+    /// The reference of the joints in this period: the setpoint, its extrapolation, or a stop;
+    /// always within the limits of the joints.
     fn refer(&mut self, period: f64) {
         let fresh = std::mem::take(&mut self.fresh);
         let setpoint = &self.last;

@@ -14,7 +14,7 @@ pub enum DriverError {
         /// The most that fit.
         most: usize,
     },
-    /// An option for the joints has another length than there are joints.
+    /// The length of a list is not the number of joints.
     #[error("{option} has {found} values for {joints} joints")]
     Count {
         /// The option.
@@ -24,7 +24,7 @@ pub enum DriverError {
         /// Number of joints.
         joints: usize,
     },
-    /// An option is not a number that makes sense.
+    /// An option has an invalid value.
     #[error("{option} must be {wanted}, got {value}")]
     Value {
         /// The option.

@@ -17,7 +17,7 @@ impl<R: Robot> Driver<R> {
             return ack;
         }
         self.sessions += 1;
-        // Unlike any session of a driver process before, so that old setpoints do not fit.
+        // Different from any earlier session, so that old setpoints are not accepted.
         let number = (now_ns | 1).wrapping_add(self.sessions << 1).max(1);
         self.session = Some(Session {
             number,

@@ -8,25 +8,26 @@
 //! A setpoint that continues the last reference within the limits is used as it is, bit for bit.
 //!
 //! # Source
-//! Own derivation. The share is chosen so that the joint, braked as fast as allowed, would stop at
-//! the target: the switching surface of a third-order time-optimal law, as in R. Zanasi, C. Guarino
-//! Lo Bianco, A. Tonielli, "Nonlinear filters for the generation of smooth trajectories",
-//! Automatica 36(3), 2000.
+//! Own derivation. The share is chosen so that the distance to the target, with its rate of change
+//! braked as fast as allowed, ends at zero: the switching surface of a third-order time-optimal
+//! law, as in R. Zanasi, C. Guarino Lo Bianco, A. Tonielli, "Nonlinear filters for the generation
+//! of smooth trajectories", Automatica 36(3), 2000.
 
 use crate::{Ramp, Reference};
 
 /// Room for rounding, as a share of a limit.
 const ROUNDING: f64 = 1e-3;
 
-/// Room for rounding (rad, rad/s), and at an end of the range (rad).
+/// Tolerance for rounding (rad, rad/s), and at an end of the range (rad).
 const SMALL: f64 = 1e-9;
 const AT_END: f64 = 1e-6;
 
-/// Share of the jerk limit, and least share of the acceleration limit, with which the distance to
-/// the target is closed: the rest is for the motion of the target itself.
+/// Fraction of the jerk limit, and least fraction of the acceleration limit, used to approach the
+/// target; the rest is for the motion of the target itself.
 const CLOSING: [f64; 2] = [0.3, 0.2];
 
-/// Halvings of a share: to a 64 000th for an end of the range, as far as numbers go for a target.
+/// Bisection steps of a share: to a 64 000th for an end of the range, to floating-point precision
+/// for a target.
 const COARSE: u32 = 16;
 const FINE: u32 = 44;
 
@@ -44,7 +45,7 @@ pub(crate) struct Limiter {
 }
 
 impl Limiter {
-    /// One period (s) from `from` towards `target`, which is where the joint shall be at its end.
+    /// One period (s) from `from` towards `target`, the wanted state at its end.
     pub(crate) fn approach(&self, from: &Reference, target: &Reference, period: f64) -> Reference {
         if self.follows(from, target, period) {
             return *target;
@@ -53,7 +54,8 @@ impl Limiter {
         let acceleration =
             (self.acceleration - target.acceleration.abs()).max(CLOSING[1] * self.acceleration);
         let closing = [acceleration, CLOSING[0] * self.jerk];
-        // Beyond the target when the distance to it were stopped now.
+        // The distance beyond the target at which its rate of change, braked from now on, reaches
+        // zero.
         let beyond = |share: f64| {
             let distance = low.mixed(&high, share).beyond(target);
             Ramp::new(&distance, 0.0, closing).end(&distance)
@@ -68,8 +70,8 @@ impl Limiter {
         self.within_range(&low, &high, share)
     }
 
-    /// One period (s) without anything new: braking goes on, a speed is kept, and it is braked
-    /// early enough to rest within the range.
+    /// One period (s) without a new setpoint: braking continues, a constant speed is kept, and the
+    /// joint brakes early enough to rest within the range.
     pub(crate) fn go_on(&self, from: &Reference, period: f64) -> Reference {
         let (acceleration, velocity) = (from.acceleration, from.velocity);
         let next = if acceleration * velocity < 0.0 {
@@ -88,13 +90,13 @@ impl Limiter {
         self.or_brake(from, next, period)
     }
 
-    /// One period (s) of the quickest stop within the range.
+    /// One period (s) of the fastest stop within the range.
     pub(crate) fn stop(&self, from: &Reference, period: f64) -> Reference {
         let next = Ramp::new(from, 0.0, self.bounds()).sample(from, period);
         self.or_brake(from, next, period)
     }
 
-    /// `next`, or the hardest braking where only that stays within the range.
+    /// `next`, or the hardest braking if only that stays within the range.
     fn or_brake(&self, from: &Reference, next: Reference, period: f64) -> Reference {
         let [low, high] = self.extremes(from, period);
         if !self.stays_below(&next, AT_END) {
@@ -116,8 +118,8 @@ impl Limiter {
             .map(|speed| Ramp::new(from, speed, self.bounds()).sample(from, period))
     }
 
-    /// Whether `next` is a motion of a period (s) from `from` within all limits, and leaves a way
-    /// to stay within them.
+    /// Whether `next` is a motion of one period (s) from `from` within all limits, after which the
+    /// limits can still be kept.
     fn follows(&self, from: &Reference, next: &Reference, period: f64) -> bool {
         let room = 1.0 + ROUNDING;
         let jerk = self.jerk * room;
@@ -131,7 +133,7 @@ impl Limiter {
         next.velocity.abs() <= self.velocity * room
             && next.acceleration.abs() <= self.acceleration * room
             && change <= jerk * period + SMALL
-            // What a trapezium is off by at most when the jerk keeps its limit.
+            // Largest error of the trapezoidal rule when the jerk keeps its limit.
             && gained.abs() <= jerk * period * period / 4.0 + SMALL
             && moved.abs() <= jerk * period * period * period / 12.0 + SMALL
             && self.stays_below(next, AT_END)
@@ -153,10 +155,10 @@ impl Limiter {
         wanted
     }
 
-    /// Whether the hardest braking from `from` keeps below the upper end and `room` (rad).
+    /// Whether the hardest braking from `from` stays below the upper end plus `room` (rad).
     fn stays_below(&self, from: &Reference, room: f64) -> bool {
         let bounds @ [acceleration, jerk] = self.bounds();
-        // Seen from afar: the way that fading and braking together take at most.
+        // A quick bound: the largest distance that fading and braking together take.
         let speed = from.velocity.abs() + from.acceleration * from.acceleration / (2.0 * jerk);
         let most = speed * (speed / (2.0 * acceleration) + 2.0 * acceleration / jerk);
         let end = self.range[1];
@@ -164,7 +166,7 @@ impl Limiter {
             || Ramp::new(from, -self.velocity, bounds).top(from) <= end + room
     }
 
-    /// Whether the hardest braking from `from` keeps above the lower end less `room` (rad).
+    /// Whether the hardest braking from `from` stays above the lower end minus `room` (rad).
     fn stays_above(&self, from: &Reference, room: f64) -> bool {
         let [lower, upper] = self.range;
         let range = [-upper, -lower];
@@ -172,8 +174,8 @@ impl Limiter {
     }
 }
 
-/// The largest share in 0..1 for which `is_beyond` is not true; from there on it stays true. 0 where
-/// there is none.
+/// The largest share in 0..1 for which `is_beyond` is false; above it, it is true. 0 if there is
+/// none.
 fn before_share(is_beyond: impl Fn(f64) -> bool, halvings: u32) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..halvings {

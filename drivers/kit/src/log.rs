@@ -8,9 +8,9 @@ use ipc::Setpoint;
 
 use crate::{Driver, DriverError, Robot};
 
-/// A CSV file with a line for each setpoint received: when (ns), its session, sequence, tick and
-/// flags, then position, velocity and acceleration of each joint, then where the joints were.
-/// Nothing is held back: after a kill the file has all that was received.
+/// A CSV file with a line for each setpoint received: time (ns), session, sequence, tick and flags,
+/// then position, velocity and acceleration of each joint, then the measured positions. Lines are
+/// not buffered: after a kill the file contains everything that was received.
 #[derive(Debug)]
 pub(crate) struct Log(Option<File>);
 

@@ -17,13 +17,13 @@ use crate::{Driver, DriverError, Robot};
 /// The period without a session (ns).
 const IDLE_NS: u64 = 2_000_000;
 
-/// How many times lock-step looks for a setpoint before it sleeps between looks.
+/// How many times lock-step polls for a setpoint before it sleeps between polls.
 const SPINS: u32 = 4000;
 
-/// How many periods a driver that ends goes on saying so.
+/// For how many periods a driver that ends reports it.
 const FAREWELL: u32 = 20;
 
-/// How long lock-step waits for the engine before the arm counts as left alone (ns).
+/// How long lock-step waits for the engine before it counts as gone (ns).
 const LOCK_STEP_PATIENCE_NS: u64 = 1_000_000_000;
 
 /// What a run of the driver came to.
@@ -37,14 +37,14 @@ pub struct DriverReport {
     pub sessions: u64,
     /// What the operating system refused, in one sentence.
     pub warning: Option<String>,
-    /// When the driver was told to end while the arm moved: what it did then, in one sentence.
+    /// If the driver was told to end while the arm moved: what it did, in one sentence.
     pub braked: Option<String>,
 }
 
 /// How a driver runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunOptions {
-    /// Where to write each setpoint received, as CSV.
+    /// File for the received setpoints, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
     pub real_time: RealTimeRequest,
@@ -62,8 +62,8 @@ impl Default for RunOptions {
     }
 }
 
-/// A flag that SIGINT, SIGTERM and SIGHUP set, for [`run`]: how an operator ends a driver. A second
-/// signal changes nothing, so that it does not cut the braking short.
+/// A flag for [`run`] that SIGINT, SIGTERM and SIGHUP set: with these an operator ends a driver. A
+/// second signal has no effect, so that it does not interrupt the braking.
 ///
 /// # Errors
 /// [`DriverError::Signals`] when signals cannot be received.
@@ -79,12 +79,12 @@ pub fn asked_to_end() -> Result<Arc<AtomicBool>, DriverError> {
     Ok(stop)
 }
 
-/// Drives `robot` as `arm` until `stop` becomes true. An arm that moves then is braked within its
-/// limits first, and an engine that drives it is told: [`ipc::FaultCode::Ended`].
+/// Drives `robot` as `arm` until `stop` becomes true. If the arm moves then, it is first braked
+/// within its limits, and the engine gets [`ipc::FaultCode::Ended`].
 ///
 /// # Errors
-/// When what the robot says of itself does not fit together, or the arm already has a driver, or
-/// shared memory cannot be used.
+/// When the robot's description is not consistent, the arm already has a driver, or shared memory
+/// cannot be used.
 pub fn run<R: Robot>(
     arm: &Arm,
     robot: R,
@@ -96,7 +96,7 @@ pub fn run<R: Robot>(
     let mut log = Log::open(options.log.as_deref())?;
     let mut driver = Driver::new(robot)?;
     let mut report = DriverReport::default();
-    // While an engine paces the driver it may spin, which a real-time thread must not.
+    // In lock-step the driver may spin, which a real-time thread must not do.
     let mut granted = None;
     while !stop.load(Ordering::Relaxed) {
         match driver.clock() {
@@ -120,14 +120,14 @@ pub fn run<R: Robot>(
     Ok(report)
 }
 
-/// Brings the arm to rest and tells the engine; says what was done where the arm moved.
+/// Brings the arm to rest and informs the engine; returns what was done if the arm moved.
 fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Option<String> {
     let period = driver.period_ns().unwrap_or(IDLE_NS);
     let paced = driver.clock() == Some(Clock::LockStep);
     let told = driver.clock().is_some();
     let moves = driver.leave();
     let (mut periods, mut more) = (0_u64, if told { FAREWELL } else { 0 });
-    // Braking has an end; a limit that is next to nothing may make it a far one.
+    // Braking ends, but with a very small limit it may take long.
     while periods < 1_000_000 && (!driver.is_resting() || more > 0) {
         if driver.is_resting() {
             more -= 1;
@@ -135,7 +135,7 @@ fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Op
             periods += 1;
         }
         if paced {
-            // Nobody paces it any more; the last states are given time to be read.
+            // Nothing sets the pace any more; the last states get time to be read.
             answer_greeting(link, driver);
             link.send(driver.step(0, period));
             if driver.is_resting() {
@@ -176,7 +176,8 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
         return;
     }
     while let Some(setpoint) = link.next_setpoint() {
-        // Anew each time: a process may be stopped at any place, and a setpoint's age counts.
+        // Read again each time: a process may be stopped anywhere, and the age of a setpoint
+        // counts.
         let now = now_ns();
         driver.receive(&setpoint, now);
         log.write(&setpoint, driver, now);
@@ -184,8 +185,8 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
     link.send(driver.step(now_ns(), period));
 }
 
-/// Periods as fast as the engine asks for them; time is what the setpoints say. Returns after a
-/// few thousand, or when the engine is silent.
+/// Periods as fast as the engine asks for them; time is that of the setpoints. Returns after a few
+/// thousand periods, or when the engine sends nothing.
 fn lock_step<R: Robot>(
     link: &DriverLink,
     driver: &mut Driver<R>,
@@ -194,7 +195,7 @@ fn lock_step<R: Robot>(
     let Some(period) = driver.period_ns() else {
         return 0;
     };
-    // A time of its own that is the same in every run.
+    // A separate time that is the same in every run.
     let mut virtual_ns = driver
         .last_setpoint()
         .tick
@@ -222,8 +223,8 @@ fn lock_step<R: Robot>(
     4096
 }
 
-/// Waits for the next setpoint, first awake, then asleep. Without one the driver stops the arm in
-/// virtual time and latches.
+/// Waits for the next setpoint, actively at first, then sleeping. If none comes, the driver stops
+/// the arm in virtual time and latches.
 fn wait_for_setpoint<R: Robot>(
     link: &DriverLink,
     driver: &mut Driver<R>,
@@ -233,7 +234,7 @@ fn wait_for_setpoint<R: Robot>(
     let mut turns = 0_u32;
     loop {
         if let Some(setpoint) = link.next_setpoint() {
-            // One that was under way when the session began releases no state.
+            // A setpoint that was sent before the session began releases no state.
             if driver.is_of_session(&setpoint) {
                 return Some(setpoint);
             }
@@ -258,7 +259,7 @@ fn wait_for_setpoint<R: Robot>(
     }
 }
 
-/// The engine of a lock-step session is gone: the arm stops in virtual time.
+/// The engine of a lock-step session has ended: the arm stops in virtual time.
 fn give_up<R: Robot>(link: &DriverLink, driver: &mut Driver<R>) {
     let (Some(period), Some(watchdog)) = (driver.period_ns(), driver.watchdog_ns()) else {
         return;

@@ -2,11 +2,11 @@
 
 use crate::Reference;
 
-/// The way of one joint to a constant speed: three phases of constant jerk.
+/// The motion of one joint to a constant speed: three phases of constant jerk.
 ///
 /// # Source
-/// The double-integrator law of a bounded acceleration for the speed: A. Bryson, Y. Ho, "Applied
-/// Optimal Control", 1975, section 3.9; with a hold where the acceleration limit is reached.
+/// The time-optimal law of a double integrator, applied to the speed: A. Bryson, Y. Ho, "Applied
+/// Optimal Control", 1975, section 3.9; with a hold if the acceleration limit is reached.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ramp {
     /// How long (s), and with which jerk (rad/s³).
@@ -44,7 +44,7 @@ impl Ramp {
         }
     }
 
-    /// Where the joint is `time` (s) after it began in `from`.
+    /// State of the joint `time` (s) after it began in `from`.
     pub(crate) fn sample(&self, from: &Reference, time: f64) -> Reference {
         let (mut at, mut left) = (*from, time);
         for (duration, jerk) in self.phases {
@@ -61,14 +61,14 @@ impl Ramp {
         }
     }
 
-    /// Where the joint is when it has the speed (rad).
+    /// Position of the joint when it reaches the speed (rad).
     pub(crate) fn end(&self, from: &Reference) -> f64 {
         let at = self.phases.iter();
         at.fold(*from, |at, (duration, jerk)| at.after(*duration, *jerk))
             .position
     }
 
-    /// The highest position on the way (rad).
+    /// The highest position of the motion (rad).
     pub(crate) fn top(&self, from: &Reference) -> f64 {
         let (mut at, mut top) = (*from, from.position);
         for (duration, jerk) in self.phases {

@@ -32,13 +32,13 @@ impl Reference {
         }
     }
 
-    /// The speed that is left when the acceleration has faded with `jerk` (rad/s).
+    /// The remaining speed when the acceleration has faded to zero with `jerk` (rad/s).
     pub(crate) fn coasting_speed(&self, jerk: f64) -> f64 {
         self.velocity + self.acceleration * self.acceleration.abs() / (2.0 * jerk)
     }
 
     /// The times (s) at which the speed is zero under a constant `jerk` (rad/s³), before or after
-    /// now; not a number where there is none.
+    /// now; NaN if there is none.
     pub(crate) fn turns(&self, jerk: f64) -> [f64; 2] {
         if jerk == 0.0 {
             return [-self.velocity / self.acceleration, f64::NAN];

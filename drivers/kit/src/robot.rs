@@ -4,7 +4,7 @@ use ipc::{MAX_JOINTS, ToolAction, ToolFeedback, ToolStatus};
 
 use crate::{DriverError, Limiter, Reference};
 
-/// What a robot is like. Lists have one value a joint, root first.
+/// Description of a robot. Lists have one value per joint, root first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
     /// The driver's name.
@@ -17,9 +17,11 @@ pub struct About {
     pub upper: Vec<f64>,
     /// Largest speeds (rad/s).
     pub velocity: Vec<f64>,
-    /// Largest accelerations (rad/s²): those of the driver's own stop; setpoints beyond are refused.
+    /// Largest accelerations (rad/s²), also of the driver's own stop; setpoints beyond them are
+    /// refused.
     pub acceleration: Vec<f64>,
-    /// Largest jerks (rad/s³): those of the driver's own stop; what follows setpoints keeps them.
+    /// Largest jerks (rad/s³), also of the driver's own stop; the reference that follows setpoints
+    /// keeps them.
     pub jerk: Vec<f64>,
 }
 
@@ -98,26 +100,27 @@ impl From<Reference> for Measured {
     }
 }
 
-/// A robot that can be driven. In every period it is measured once, then told what to follow.
+/// A robot that can be driven. In every period it is measured once, and then gets a reference to
+/// follow.
 pub trait Robot {
     /// What the robot is like; asked once.
     fn about(&self) -> About;
 
-    /// How the joints are now, one entry a joint.
+    /// The present state of the joints, one entry per joint.
     fn measure(&mut self, joints: &mut [Measured]);
 
-    /// Follow this for `period` (s), one entry a joint.
+    /// Follow this for `period` (s), one entry per joint.
     fn follow(&mut self, joints: &[Reference], period: f64);
 
     /// Begin an action of a tool: [`ipc::GRIPPER`] or [`ipc::TOOL_CHANGER`].
     fn act(&mut self, _tool: usize, _action: ToolAction) {}
 
-    /// How a tool is; as it is given, there is none.
+    /// Status of a tool; by default there is none.
     fn tool_status(&self, _tool: usize) -> ToolStatus {
         ToolStatus::Unknown
     }
 
-    /// More about a tool; the `order` is filled in by the kit.
+    /// Further data of a tool; the kit fills in `order`.
     fn tool(&self, tool: usize) -> ToolFeedback {
         ToolFeedback {
             status: self.tool_status(tool) as u32,

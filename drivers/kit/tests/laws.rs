@@ -14,7 +14,7 @@ const SPEED: f64 = 3.0;
 const ACCELERATION: f64 = 15.0;
 const JERK: f64 = 300.0;
 
-/// A joint that is at once where it shall be, and checks what it is told.
+/// A joint that reaches each reference at once, and checks it.
 #[derive(Clone, Debug)]
 struct Strict(Reference);
 
@@ -135,7 +135,7 @@ impl Pair {
         setpoint
     }
 
-    /// A period of the engine: its plan goes on.
+    /// A period of the engine: its plan continues.
     fn engine(&mut self) {
         self.now += PERIOD;
         self.planned += PERIOD;
@@ -163,7 +163,8 @@ impl Pair {
         })
     }
 
-    /// The engine stands for some periods; its plan goes on after it, or leaps to where it would be.
+    /// The engine stalls for some periods; afterwards its plan continues, or jumps to where it
+    /// would be.
     fn engine_stands(&mut self, periods: u64, leaps: bool) {
         for _ in 0..periods {
             self.now += PERIOD;
@@ -172,7 +173,7 @@ impl Pair {
         }
     }
 
-    /// The driver stands for some periods, while the engine goes on.
+    /// The driver stalls for some periods, while the engine continues.
     fn driver_stands(&mut self, periods: u64) {
         (0..periods).for_each(|_| self.engine());
     }
@@ -181,7 +182,7 @@ impl Pair {
         self.driver.robot().0
     }
 
-    /// After a fault: nothing of it is forgotten, the arm comes to rest and stays there.
+    /// After a fault: it stays latched, and the arm comes to rest and stays there.
     fn assert_latched(&mut self, faults: &[FaultCode]) {
         let state = self.both(2000);
         assert_eq!(state.driver(), DriverState::Fault);
@@ -210,7 +211,7 @@ fn undisturbed_setpoints_are_followed_bit_for_bit() {
     }
 }
 
-/// A setpoint that comes a period late is made up for within a few periods.
+/// After a setpoint that comes one period late, the joint is back on the plan within a few periods.
 #[test]
 fn a_late_setpoint_is_caught_up() {
     let mut pair = Pair::new(&[0.9, -0.9]);
@@ -223,7 +224,7 @@ fn a_late_setpoint_is_caught_up() {
     assert_eq!(pair.reference(), Reference::rest(-0.9));
 }
 
-/// The driver stands for a second in motion: it stops and latches, though new setpoints wait.
+/// The driver stalls for a second in motion: it stops and latches, although new setpoints wait.
 #[test]
 fn a_stall_of_the_driver_latches() {
     let mut pair = Pair::new(&[1.0, -1.0, 1.0]);
@@ -272,7 +273,7 @@ fn an_acceleration_beyond_the_limit_is_refused() {
     }
 }
 
-/// Setpoints that claim to be old are silence, those from the future make no sense.
+/// Setpoints with an old time stamp count as silence; those from the future are invalid.
 #[test]
 fn the_age_of_a_setpoint_is_its_own() {
     let mut pair = Pair::new(&[0.8]);
@@ -291,7 +292,7 @@ fn the_age_of_a_setpoint_is_its_own() {
     pair.assert_latched(&[FaultCode::BadSetpoint]);
 }
 
-/// A driver that is told to end brakes, says why, and opens no session any more.
+/// A driver that is told to end brakes, reports why, and opens no new session.
 #[test]
 fn a_driver_that_leaves_brakes_first() {
     let mut pair = Pair::new(&[1.0, -1.0]);
@@ -329,8 +330,9 @@ proptest! {
         rng_seed: RngSeed::Fixed(11), cases: 1500, failure_persistence: None, ..ProptestConfig::default()
     })]
 
-    /// Random moves, to the ends of the range too, with random stalls and nonsense: [`Strict`]
-    /// looks at each period, and a silence beyond the watchdog always latches, by name.
+    /// Random moves, also to the ends of the range, with random stalls and invalid setpoints:
+    /// [`Strict`] checks each period, and a silence beyond the watchdog always latches the right
+    /// fault.
     #[test]
     fn limits_hold_whatever_comes(
         goals in prop::collection::vec(prop_oneof![Just(1.0), Just(-1.0), -1.0..1.0_f64], 1..8),
@@ -373,7 +375,7 @@ proptest! {
     }
 }
 
-/// A stop of the engine without a leap or with one: the joint is on its plan again afterwards.
+/// A stall of the engine, without a jump or with one: the joint is on its plan again afterwards.
 #[test]
 fn the_plan_is_joined_again() {
     for (stall, leaps) in [(5, true), (5, false), (40, true), (40, false)] {

@@ -1,7 +1,7 @@
 """Attach a robot to Canter from Python: implement `Robot`, call `run`.
 
-The kit does the protocol: handshake, sessions, watchdog, going on and stopping by itself, the
-latch. What the robot is told to follow never leaves range, speed, acceleration and jerk limits of a
+The kit implements the protocol: handshake, sessions, watchdog, continuing and stopping without
+setpoints, latched faults. The reference keeps range, speed, acceleration and jerk limits of each
 joint. The robot only measures and moves. `run` needs the `iceoryx2` wheel of version 0.9.3.
 """
 
@@ -15,20 +15,20 @@ from .driver import Driver
 
 __all__ = ["Robot", "run"]
 
-# How many times lock-step looks for a setpoint before it sleeps between looks, and how long it
-# waits until the arm counts as left alone.
+# How many times lock-step polls for a setpoint before it sleeps between polls, and how long it
+# waits until the engine counts as gone.
 SPINS = 200
 LOCK_STEP_PATIENCE_NS = 2_000_000_000
 
-# How many periods a driver that ends goes on saying so.
+# For how many periods a driver that ends reports it.
 FAREWELL = 20
 
 
 class Robot:
-    """What a robot must be able to do. Lists have one number a joint, in rad and seconds."""
+    """The interface of a robot. Lists have one number per joint, in rad and seconds."""
 
     name = "python"
-    # Range, and the most of speed, acceleration and jerk: setpoints beyond are refused, and the
+    # Range, and limits of speed, acceleration and jerk: setpoints beyond them are refused, and the
     # kit's own stop uses them.
     lower = []
     upper = []
@@ -37,7 +37,7 @@ class Robot:
     jerk = []
 
     def measure(self):
-        """The positions and the velocities now."""
+        """Returns the present positions and velocities."""
         raise NotImplementedError
 
     def move(self, position, velocity, acceleration, period):
@@ -48,18 +48,18 @@ class Robot:
         """Begin an action (messages.OPEN or CLOSE) of tool 0 (gripper) or 1 (tool changer)."""
 
     def tool_status(self, tool):
-        """How a tool is: one of the messages.TOOL_ numbers."""
+        """Status of a tool: one of the messages.TOOL_ numbers."""
         return m.TOOL_UNKNOWN
 
 
 def run(arm, robot, stop=lambda: False, ready=lambda: None):
     """Drives `robot` as the arm `cell/arm` until `stop()` is true or SIGINT, SIGTERM or SIGHUP comes;
-    `ready()` when it is there. An arm that moves then is braked within its limits first."""
+    calls `ready()` when the driver runs. If the arm moves at the end, it is first braked."""
     from .link import Link
 
     asked = threading.Event()
     if threading.current_thread() is threading.main_thread():
-        # A second signal changes nothing, so that it does not cut the braking short.
+        # A second signal has no effect, so that it does not interrupt the braking.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, lambda *_: asked.set())
     link, driver = Link(arm), Driver(robot)
@@ -76,7 +76,7 @@ def run(arm, robot, stop=lambda: False, ready=lambda: None):
 
 
 def leave(link, driver):
-    """Brings the arm to rest, tells the engine, and says so where the arm moved."""
+    """Brings the arm to rest, informs the engine, and prints a message if the arm moved."""
     more = FAREWELL if driver.hello else 0
     period = driver.hello.period_ns * 1e-9 if driver.hello else 2e-3
     periods, moves = 0, driver.leave()
@@ -87,7 +87,7 @@ def leave(link, driver):
             periods += 1
         answer_greeting(link, driver)
         if driver.lock_step:
-            # Nobody paces it any more; the last states are given time to be read.
+            # Nothing sets the pace any more; the last states get time to be read.
             link.send(driver.step(0, period))
             time.sleep(1e-3 if driver.resting else 0)
         else:
@@ -123,7 +123,7 @@ def wall_period(link, driver):
 
 
 def lock_step(link, driver, turns):
-    """A period if the engine asks for one; returns for how many turns it has not."""
+    """A period if the engine asks for one; returns the number of turns without a request."""
     setpoint = link.next_setpoint()
     if setpoint is None:
         if turns > SPINS:
@@ -136,7 +136,7 @@ def lock_step(link, driver, turns):
         return turns
     driver.heard_ns = time.monotonic_ns()
     if setpoint.session != driver.session:
-        # One that was under way when the session began releases no state.
+        # A setpoint that was sent before the session began releases no state.
         return turns
     answer = driver.sign_of_life(setpoint)
     if answer is not None:

@@ -7,7 +7,7 @@ __all__ = ["directory", "prefix"]
 
 
 def _private(path):
-    """Why a directory is not this user's alone, or None."""
+    """Why a directory does not belong to this user alone, or None."""
     found = os.lstat(path)
     if not stat.S_ISDIR(found.st_mode):
         return "it is not a directory (a link to one does not count)"
@@ -30,7 +30,7 @@ def _choice():
 
 
 def directory():
-    """The directory of this process's domain, made (mode 0700) where it is missing."""
+    """The directory of this process's domain, made (mode 0700) if it is missing."""
     path = _choice()
     try:
         os.mkdir(path, 0o700)
@@ -48,6 +48,6 @@ def directory():
 
 
 def prefix(path):
-    """What the names of a domain's segments in /dev/shm begin with."""
+    """The prefix of the names of a domain's segments in /dev/shm."""
     found = os.stat(path)
     return f"canter_{found.st_uid}_{found.st_dev:x}_{found.st_ino:x}_"

@@ -1,4 +1,4 @@
-"""The driver's side of the protocol, without a channel: times go in, states come out."""
+"""The driver's side of the protocol, without a channel: it gets times and returns states."""
 
 import math
 import time
@@ -6,11 +6,11 @@ import time
 from . import messages as m
 from .limiter import Limiter
 
-# How far the first setpoint of a session may be from the measured position, and the room for one
-# beside what speed and time allow (rad).
+# How far the first setpoint of a session may be from the measured position, and the tolerance of
+# a setpoint beyond what speed and time allow (rad).
 FIRST, ROOM = 1e-3, 2e-3
 
-# How far velocity and acceleration of a setpoint may be from zero, as a multiple of the limit.
+# Largest velocity and acceleration of a setpoint, as a multiple of the limit.
 MARGIN = 1.001
 
 
@@ -25,25 +25,25 @@ class Driver:
         self.sequence = self.missed = 0
         self.last = m.Setpoint()
         self.fresh = False
-        # When a setpoint came, the newest was sent by its own word, and the last period was.
+        # Times: a setpoint arrived, the newest was sent (its time stamp), the last period.
         self.received_ns = self.heard_ns = self.newest_ns = self.stepped_ns = 0
         self.leaving = False
         limits = robot.lower, robot.upper, robot.velocity, robot.acceleration, robot.jerk
         self.limiters = [Limiter(*values) for values in zip(*limits)]
         self.rest()
         self.orders = [0] * m.MAX_TOOLS
-        # The state to send, written anew in every period.
+        # The state to send, written in every period.
         self.out = m.State(protocol=m.PROTOCOL, joints=self.joints)
         self.feedback = [self.out.tools[tool] for tool in range(m.MAX_TOOLS)]
 
     def rest(self):
-        """What the robot follows, and what the setpoints say: at rest where it is measured."""
+        """Sets reference and setpoints to rest at the measured position."""
         position, _ = self.robot.measure()
         self.reference = self.target = [(at, 0.0, 0.0) for at in position]
 
     @property
     def resting(self):
-        """Whether what the robot follows rests."""
+        """Whether the reference is at rest."""
         return all(abs(v) < 1e-9 and abs(a) < 1e-6 for _, v, a in self.reference)
 
     @property
@@ -57,11 +57,11 @@ class Driver:
     def objection(self, hello):
         """Why there can be no session, as verdict and reason."""
         if hello.protocol != m.PROTOCOL:
-            return m.WRONG_PROTOCOL, f"protocol {hello.protocol} where {m.PROTOCOL} is spoken"
+            return m.WRONG_PROTOCOL, f"protocol {hello.protocol}, expected {m.PROTOCOL}"
         if hello.schema != m.schema_checksum():
             return m.WRONG_SCHEMA, "another message layout"
         if hello.joints != self.joints:
-            return m.WRONG_JOINTS, f"{hello.joints} joints where the arm has {self.joints}"
+            return m.WRONG_JOINTS, f"{hello.joints} joints, expected {self.joints}"
         if not 100_000 <= hello.period_ns <= hello.watchdog_ns <= 10_000_000_000:
             return m.WRONG_PERIOD, f"period {hello.period_ns} ns, watchdog {hello.watchdog_ns} ns"
         if hello.clock not in (m.WALL, m.LOCK_STEP):
@@ -101,7 +101,7 @@ class Driver:
         return ack
 
     def receive(self, setpoint, now_ns):
-        """Takes a setpoint; what makes no sense stops the arm."""
+        """Receives a setpoint; an invalid one stops the arm."""
         following = self.state in (m.SYNCED, m.ARMED, m.ACTIVE)
         if setpoint.session != self.session or not following:
             return
@@ -113,7 +113,7 @@ class Driver:
         lists = setpoint.position[:n], setpoint.velocity[:n], setpoint.acceleration[:n]
         sane = setpoint.protocol == m.PROTOCOL and setpoint.joints == n
         wall = not self.lock_step
-        # Both sides read the same clock: what comes from long after now makes no sense.
+        # Both sides read the same clock: a time far in the future is invalid.
         future = wall and setpoint.published_ns > now_ns + self.hello.watchdog_ns
         # A sum is finite only if all its parts are.
         if future or not (sane and math.isfinite(sum(map(sum, lists)))):
@@ -137,7 +137,7 @@ class Driver:
         far from the last."""
         first = self.state == m.SYNCED
         last = self.last.position
-        # After a stall setpoints come together: then the time between them is that of their ticks.
+        # After a stall setpoints arrive together: then the time between them is that of their ticks.
         hello = self.hello
         planned = (tick - self.last.tick) * hello.period_ns
         elapsed = max(now_ns - self.received_ns, planned, hello.period_ns)
@@ -157,7 +157,7 @@ class Driver:
         self.state, self.fault, self.fault_joint = m.STOPPING, fault, joint
 
     def leave(self):
-        """Begins to leave: the arm stops within its limits, and no session is opened any more. Says
+        """Begins to end: the arm stops within its limits, and no new session is opened. Returns
         whether the arm moves."""
         self.leaving = True
         if self.following or self.state == m.SYNCED:
@@ -165,7 +165,7 @@ class Driver:
         return not self.resting
 
     def stalled(self, now_ns):
-        """Whether the driver itself was stopped for longer than the watchdog."""
+        """Whether the driver itself did not run for longer than the watchdog."""
         if not self.following or self.lock_step or self.stepped_ns == 0:
             return False
         return now_ns - self.stepped_ns > self.hello.watchdog_ns
@@ -174,7 +174,7 @@ class Driver:
         """One period: returns the state to send, then moves the robot."""
         if self.stalled(now_ns):
             self.stop(m.STALLED)
-        # By its own time: a setpoint that waited while the driver did not run is not new.
+        # By its time stamp: a setpoint that waited while the driver did not run is not new.
         silence = now_ns - self.newest_ns
         if self.following:
             self.missed += 0 if self.fresh else 1
@@ -194,7 +194,7 @@ class Driver:
         return state
 
     def sign_of_life(self, setpoint):
-        """In lock-step, the answer to a setpoint of the period that was before; or None."""
+        """In lock-step, the answer to a setpoint that repeats the last period; or None."""
         last = self.last
         repeats = setpoint.tick == last.tick and 0 < last.sequence < setpoint.sequence
         if not repeats or setpoint.flags & (m.FLAG_GOODBYE | m.FLAG_STOP_REQUEST):
@@ -212,8 +212,8 @@ class Driver:
                     self.robot.tool(tool, order.action)
 
     def refer(self, period):
-        """What the robot follows: the setpoint, what it would be by now, or a stop; never more than
-        a joint can."""
+        """The reference: the setpoint, its extrapolation, or a stop; always within the limits of the
+        joints."""
         limiters = self.limiters
         if self.following:
             if not self.fresh:

@@ -1,4 +1,4 @@
-"""The last hand on what a joint follows: nothing leaves the limits, whatever is asked for.
+"""The limiter of a joint: its reference keeps the limits, whatever setpoint is received.
 
 The same law as `drivers/kit/src/limiter.rs`, where it is explained. A reference is position (rad),
 velocity (rad/s) and acceleration (rad/s2) of one joint.
@@ -6,14 +6,14 @@ velocity (rad/s) and acceleration (rad/s2) of one joint.
 
 from math import copysign, sqrt
 
-# Room for rounding: as a share of a limit, in rad and rad/s, and at an end of the range in rad.
+# Tolerance for rounding: as a fraction of a limit, in rad and rad/s, and at an end of the range in rad.
 ROUNDING, SMALL, AT_END = 1e-3, 1e-9, 1e-6
 
-# Share of the jerk limit, and least share of the acceleration limit, that close the distance to the
+# Fraction of the jerk limit, and least fraction of the acceleration limit, used to approach the
 # target; the rest is for the motion of the target itself.
 CLOSING = 0.3, 0.2
 
-# Halvings of a share for an end of the range; steps for a target, and how close is enough (rad).
+# Bisection steps for an end of the range; steps for a target, and its precision (rad).
 COARSE, STEPS, CLOSE = 16, 12, 1e-11
 
 
@@ -28,7 +28,7 @@ def after(reference, time, jerk):
 
 
 def ramp(reference, speed, acceleration, jerk):
-    """The quickest way to a constant speed: three phases, each a time (s) and a jerk (rad/s3)."""
+    """The fastest motion to a constant speed: three phases, each a time (s) and a jerk (rad/s3)."""
     _, v, a = reference
     toward = 1.0 if speed >= v + a * abs(a) / (2 * jerk) else -1.0
     missing, now = toward * (speed - v), toward * a
@@ -46,7 +46,7 @@ def ramp(reference, speed, acceleration, jerk):
 
 
 def sample(reference, speed, acceleration, jerk, time):
-    """Where the joint is `time` (s) after it began the quickest way to a constant speed."""
+    """State of the joint `time` (s) after the start of the fastest motion to a constant speed."""
     for duration, change in ramp(reference, speed, acceleration, jerk):
         if time <= duration:
             return after(reference, time, change)
@@ -56,14 +56,14 @@ def sample(reference, speed, acceleration, jerk, time):
 
 
 def end(reference, acceleration, jerk):
-    """Where the joint rests when it stops as quickly as it can (rad)."""
+    """Position (rad) at which the joint rests if it stops as fast as it can."""
     for duration, change in ramp(reference, 0.0, acceleration, jerk):
         reference = after(reference, duration, change)
     return reference[0]
 
 
 def top(reference, speed, acceleration, jerk):
-    """The highest position on the quickest way to a constant speed (rad)."""
+    """The highest position (rad) of the fastest motion to a constant speed."""
     highest = reference[0]
     for duration, change in ramp(reference, speed, acceleration, jerk):
         _, v, a = reference
@@ -117,7 +117,7 @@ def zero_share(beyond):
 
 
 def before_share(is_beyond):
-    """The largest share in 0..1 for which `is_beyond` is not true; from there on it stays true."""
+    """The largest share in 0..1 for which `is_beyond` is false; above it, it is true."""
     low, high = 0.0, 1.0
     for _ in range(COARSE):
         middle = (low + high) / 2
@@ -136,7 +136,7 @@ class Limiter:
         self.velocity, self.acceleration, self.jerk = velocity, acceleration, jerk
 
     def approach(self, reference, target, period):
-        """One period (s) towards `target`, which is where the joint shall be at its end."""
+        """One period (s) towards `target`, the wanted state at its end."""
         if self.follows(reference, target, period):
             return target
         low, high = self.extremes(reference, period)
@@ -144,15 +144,15 @@ class Limiter:
         jerk = CLOSING[0] * self.jerk
 
         def beyond(share):
-            """How far beyond the target, when the distance to it were stopped now."""
+            """The distance beyond the target at which its rate, braked from now on, reaches zero."""
             now = mixed(low, high, share)
             return end(tuple(a - b for a, b in zip(now, target)), closing, jerk)
 
         return self.within_range(low, high, zero_share(beyond))
 
     def go_on(self, reference, period):
-        """One period (s) without anything new: braking goes on, a speed is kept, and it is braked
-        early enough to rest within the range."""
+        """One period (s) without a new setpoint: braking continues, a constant speed is kept, and
+        the joint brakes early enough to rest within the range."""
         _, v, a = reference
         if a * v < 0:
             force = min(abs(a), self.acceleration)
@@ -167,12 +167,12 @@ class Limiter:
         return self.or_brake(reference, following, period)
 
     def stop(self, reference, period):
-        """One period (s) of the quickest stop within the range."""
+        """One period (s) of the fastest stop within the range."""
         following = sample(reference, 0.0, self.acceleration, self.jerk, period)
         return self.or_brake(reference, following, period)
 
     def or_brake(self, reference, following, period):
-        """`following`, or the hardest braking where only that stays within the range."""
+        """`following`, or the hardest braking if only that stays within the range."""
         if not self.stays_below(following, AT_END):
             return self.extremes(reference, period)[0]
         if not self.stays_above(following, AT_END):
@@ -185,8 +185,8 @@ class Limiter:
         return [sample(reference, v, a, j, period) for v in (-self.velocity, self.velocity)]
 
     def follows(self, reference, target, period):
-        """Whether `target` is a motion of a period (s) from `reference` within all limits, and
-        leaves a way to stay within them."""
+        """Whether `target` is a motion of one period (s) from `reference` within all limits, after
+        which they can still be kept."""
         (p, v, a), (q, w, b) = reference, target
         room = 1 + ROUNDING
         jerk = self.jerk * room * period
@@ -213,19 +213,19 @@ class Limiter:
         return wanted
 
     def most(self, v, a):
-        """The way that fading and braking together take at most (rad)."""
+        """The largest distance (rad) that fading and braking together take."""
         speed = abs(v) + a * a / (2 * self.jerk)
         return speed * (speed / (2 * self.acceleration) + 2 * self.acceleration / self.jerk)
 
     def stays_below(self, reference, room):
-        """Whether the hardest braking keeps below the upper end and `room` (rad)."""
+        """Whether the hardest braking stays below the upper end plus `room` (rad)."""
         p, v, a = reference
         if p + self.most(v, a) <= self.upper:
             return True
         return top(reference, -self.velocity, self.acceleration, self.jerk) <= self.upper + room
 
     def stays_above(self, reference, room):
-        """Whether the hardest braking keeps above the lower end less `room` (rad)."""
+        """Whether the hardest braking stays above the lower end minus `room` (rad)."""
         p, v, a = reference
         if p - self.most(v, a) >= self.lower:
             return True

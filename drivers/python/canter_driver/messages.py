@@ -33,7 +33,7 @@ class ToolCommand(ctypes.Structure):
 
 
 class ToolFeedback(ctypes.Structure):
-    """How one tool is."""
+    """Status of one tool."""
 
     _fields_ = [
         ("order", c_uint32),
@@ -45,7 +45,7 @@ class ToolFeedback(ctypes.Structure):
 
 
 class Setpoint(ctypes.Structure):
-    """What the joints shall do, once in every period."""
+    """The wanted state of the joints, sent once per period."""
 
     _fields_ = [
         ("protocol", c_uint32),
@@ -79,7 +79,7 @@ class Setpoint(ctypes.Structure):
 
 
 class State(ctypes.Structure):
-    """How the joints are, once in every period."""
+    """The measured state of the joints, sent once per period."""
 
     _fields_ = [
         ("protocol", c_uint32),
@@ -157,7 +157,7 @@ class HelloAck(ctypes.Structure):
 
 
 def schema_checksum():
-    """The checksum of the layout as this file has it (FNV-1a over sizes, offsets and
+    """The checksum of the layout in this file (FNV-1a over sizes, offsets and
     the number of fault codes)."""
     numbers = [
         PROTOCOL,

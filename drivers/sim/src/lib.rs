@@ -22,7 +22,7 @@ pub use robot::Simulated;
 /// A simulated robot with the driver's side of the protocol.
 pub type Driver = driver_kit::Driver<Simulated>;
 
-/// A simulated robot behind the protocol, on a clock of the caller's.
+/// A simulated robot with the protocol; the caller gives the times.
 ///
 /// # Errors
 /// When the options do not fit together.
@@ -33,8 +33,8 @@ pub fn driver(options: Options) -> Result<Driver, DriverError> {
 /// Runs the simulated driver until `stop` becomes true.
 ///
 /// # Errors
-/// When the options do not fit together, or the arm already has a driver, or shared memory cannot
-/// be used.
+/// When the options are not consistent, the arm already has a driver, or shared memory cannot be
+/// used.
 pub fn run(options: Options, stop: &AtomicBool) -> Result<DriverReport, DriverError> {
     let how = RunOptions {
         log: options.log.clone(),

@@ -29,7 +29,7 @@ impl Default for ToolOptions {
     }
 }
 
-/// Options of the simulated robot. Lists have one value a joint.
+/// Options of the simulated robot. Lists have one value per joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The arm it drives.
@@ -64,15 +64,15 @@ pub struct Options {
     pub gripper: Option<ToolOptions>,
     /// The tool changer.
     pub tool_changer: Option<ToolOptions>,
-    /// Where to write each setpoint received, as CSV.
+    /// File for the received setpoints, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
     pub real_time: scheduling::RealTimeRequest,
 }
 
 impl Options {
-    /// A robot of `joints` joints in its zero position, with room and speed for anything and a
-    /// gripper and a tool changer.
+    /// A robot of `joints` joints in its zero position, with wide ranges, high limits, a gripper
+    /// and a tool changer.
     pub fn new(arm: Arm, joints: usize) -> Self {
         Self {
             arm,
@@ -102,7 +102,7 @@ impl Options {
         }
     }
 
-    /// Whether the options that are the simulation's own fit together; the kit looks at the rest.
+    /// Checks the options of the simulation; the kit checks the rest.
     ///
     /// # Errors
     /// [`DriverError::Count`] or [`DriverError::Value`] with the option's name.

@@ -10,7 +10,7 @@ use crate::noise::Noise;
 use crate::servo::Servo;
 use crate::tool::Tool;
 
-/// A simulated robot: a servo a joint, a gripper and a tool changer, the same every time.
+/// A deterministic simulated robot: one servo per joint, a gripper and a tool changer.
 #[derive(Clone, Debug)]
 pub struct Simulated {
     options: Options,
@@ -85,7 +85,7 @@ impl Robot for Simulated {
             if self.waiting.len() > self.options.delay + 1 {
                 self.waiting.pop_front();
             }
-            // Until the first arrives, that is where the robot is.
+            // Until the first setpoint arrives, the robot stays there.
             let late = self.waiting.front().map_or(joints, Vec::as_slice);
             for (servo, reference) in self.servos.iter_mut().zip(late) {
                 servo.control(reference, control);

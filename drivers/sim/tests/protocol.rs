@@ -9,7 +9,7 @@ use proptest::test_runner::RngSeed;
 const PERIOD: u64 = 1_000_000;
 const WATCHDOG: u64 = 50_000_000;
 
-/// An engine of two joints and the driver, with one clock that both believe.
+/// An engine of two joints and the driver, with one common clock.
 struct Pair {
     driver: Driver,
     session: u64,
@@ -196,8 +196,8 @@ fn a_jump_or_nonsense_stops() {
     }
 }
 
-/// A stall of the machine: the engine leaves periods out, the driver reads what waited all at once.
-/// That is no jump, unless it goes further than a watchdog's time allows.
+/// A stall of the machine: the engine leaves out periods, the driver reads all waiting setpoints at
+/// once. That is not a jump, unless it is further than the time of the watchdog allows.
 #[test]
 fn setpoints_that_come_together_are_no_jump() {
     let mut pair = Pair::new(options());

@@ -7,10 +7,10 @@ use ipc::{Arm, Clock, EngineLink, Hello, HelloAck, IpcError, text_of};
 use super::{Check, Health};
 use planner::robot::Robot;
 
-/// How far a limit of the robot may be beyond the driver's: rounding of text, as a share.
+/// Largest relative excess of a limit of the robot over the driver's: rounding of text.
 const ROUNDING: f64 = 1e-6;
 
-/// Opens a session with the driver, and lets it go again.
+/// Opens a session with the driver, and ends it again.
 pub(super) fn handshake(arm: &Arm, rate_hz: f64) -> (Check, Option<HelloAck>) {
     const NAME: &str = "driver handshake";
     let period = (1e9 / rate_hz) as u64;
@@ -39,7 +39,7 @@ pub(super) fn handshake(arm: &Arm, rate_hz: f64) -> (Check, Option<HelloAck>) {
     }
 }
 
-/// Whether the robot's acceleration and jerk limits are somebody's knowledge or a default.
+/// Whether the robot's acceleration and jerk limits have a source or are defaults.
 pub(super) fn limits_known(robot: &Robot) -> Check {
     let joints = &robot.joints;
     let source = &joints.source;
@@ -60,7 +60,7 @@ pub(super) fn limits_known(robot: &Robot) -> Check {
     Check::new("robot limits", health, seen, &remedy)
 }
 
-/// Whether the driver allows what the robot's description lets the engine ask for.
+/// Whether the driver's limits allow the limits of the robot's description.
 pub(super) fn limits_agree(robot: &Robot, ack: &HelloAck) -> Check {
     const NAME: &str = "limits of robot and driver";
     let joints = &robot.joints;

@@ -27,13 +27,13 @@ pub enum Health {
 /// One check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Check {
-    /// What was looked at.
+    /// What was checked.
     pub name: &'static str,
     /// How it is.
     pub health: Health,
     /// What was seen.
     pub seen: String,
-    /// The command or setting that repairs it; empty where nothing is to be repaired.
+    /// The command or setting that corrects it; empty if there is nothing to correct.
     pub remedy: String,
 }
 
@@ -53,21 +53,21 @@ impl Check {
     }
 }
 
-/// What to look at.
+/// What to check.
 #[derive(Clone, Debug)]
 pub struct DoctorOptions {
-    /// Where to look for segments, and to measure the round trip.
+    /// The domain whose segments are checked, and in which the round trip is measured.
     pub domain: Domain,
     /// Servo rate to measure wake-ups at (Hz).
     pub rate_hz: f64,
     /// How long to measure wake-ups.
     pub wake_up: Duration,
-    /// An arm whose driver to greet. The driver must have no engine.
+    /// The arm whose driver is checked. The driver must have no engine.
     pub driver: Option<Arm>,
-    /// What is wrong with the segments of the domain, found out in another process: reading them
-    /// here could end this one.
+    /// Damage of the domain's segments, found by another process: reading them here could crash
+    /// this one.
     pub damage: Option<String>,
-    /// A robot whose limits to look at, beside those of the driver.
+    /// The robot whose limits are checked, and compared with those of the driver.
     pub robot: Option<Robot>,
 }
 
@@ -147,7 +147,7 @@ fn governor() -> Check {
     )
 }
 
-/// Room in `/dev/shm`, and whether it can be written to.
+/// Free space in `/dev/shm`, and whether it can be written to.
 fn shared_memory() -> Check {
     const NAME: &str = "shared memory";
     let remedy = "ls -lS /dev/shm, remove what fills it, or mount -o remount,size=256m /dev/shm";
@@ -190,7 +190,7 @@ fn damaged(domain: &Domain, damage: &str) -> Check {
     Check::new("left-over segments", Health::Fail, seen, &remedy)
 }
 
-/// Cleans up while it looks: what is left then cannot be cleaned up by this user.
+/// Cleans up during the check: what is left then cannot be removed by this user.
 fn leftovers(domain: &Domain) -> Check {
     const NAME: &str = "left-over segments";
     let directory = domain.directory().display();
@@ -215,7 +215,7 @@ fn leftovers(domain: &Domain) -> Check {
     Check::new(NAME, health, seen, &remedy)
 }
 
-/// Asks for each right in a thread of its own, which ends at once.
+/// Asks for each right in a separate thread, which ends at once.
 fn rights() -> Vec<Check> {
     let none = RealTimeRequest {
         priority: 0,
@@ -305,7 +305,7 @@ fn wake_up(options: &DoctorOptions) -> Check {
     Check::new("wake-up at the servo period", health, seen, remedy)
 }
 
-/// Round trips of bare messages between two threads.
+/// Round trips of plain messages between two threads.
 fn round_trip(domain: &Domain) -> Check {
     const TRIPS: u64 = 2000;
     const NAME: &str = "shared-memory round trip";

@@ -6,14 +6,14 @@ use super::SubmitError;
 use crate::queue::{Full, Given, Queue, Queued};
 use servo::{Control, Steering};
 
-/// The queue with what decides whether commands are taken.
+/// The queue, with the state that decides whether commands are taken.
 #[derive(Debug)]
 pub(super) struct Inbox {
     queue: Queue,
     capacity: usize,
     /// Commands that left the queue and are not reported yet.
     flying: usize,
-    /// The fault that is latched, until the worker has seen that it is cleared.
+    /// The latched fault, until the worker has seen that it is cleared.
     fault: Option<String>,
     closed: bool,
 }
@@ -30,8 +30,8 @@ impl Inbox {
         }
     }
 
-    /// Appends commands: all of them or none. A stop among them does not wait behind what it is
-    /// to stop.
+    /// Appends commands: all of them or none. A stop among them acts at once, before the commands
+    /// in front of it.
     pub(super) fn submit(
         &mut self,
         commands: Vec<Given>,
@@ -85,8 +85,8 @@ impl Inbox {
         self.queue.renew(epoch);
     }
 
-    /// Drops what waits and, unless it is given, what was given at another age than `epoch`;
-    /// returns how many commands that were.
+    /// Drops all waiting commands, or those of other epochs than `epoch` if it is given; returns
+    /// how many commands that were.
     pub(super) fn drop_all(&mut self, epoch: Option<u32>) -> usize {
         match epoch {
             Some(epoch) => self.queue.keep(epoch),
@@ -94,7 +94,7 @@ impl Inbox {
         }
     }
 
-    /// Tells how many commands have left the queue and are not reported yet.
+    /// Sets how many commands have left the queue and are not reported yet.
     pub(super) fn set_flying(&mut self, flying: usize) {
         self.flying = flying;
     }
@@ -109,7 +109,7 @@ impl Inbox {
         self.closed = true;
     }
 
-    /// Whether a command waits or is under way.
+    /// Whether a command waits or is being executed.
     pub(super) fn is_busy(&self) -> bool {
         self.flying > 0 || !self.queue.is_empty()
     }

@@ -9,9 +9,9 @@ use thiserror::Error;
 /// What the shares of a jog are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogSpace {
-    /// One share a joint, root first.
+    /// One fraction per joint, root first.
     Joint,
-    /// Along x, y, z and about x, y, z of the controlled point's own axes.
+    /// Along and about the x, y and z axes of the controlled point.
     Tool,
 }
 
@@ -20,34 +20,34 @@ pub enum JogSpace {
 pub struct Jog {
     /// What the shares are about.
     pub space: JogSpace,
-    /// Shares of the largest speeds, -1..=1; all 0 stops.
+    /// Fractions of the largest speeds, -1..=1; all 0 stops.
     pub speeds: Vec<f64>,
     /// The arm stops when no further request comes for this long.
     pub timeout: Duration,
 }
 
-/// Why a request to move by hand is refused.
+/// Why a jog is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum JogError {
-    /// Not as many shares as there are axes, or one that is not within -1 to 1.
-    #[error("a jog has {wanted} shares of speed from -1 to 1, got {got}")]
+    /// The number of speeds is not the number of axes, or one is not within -1 to 1.
+    #[error("a jog has {wanted} speeds from -1 to 1, got {got}")]
     Speeds {
         /// How many axes there are.
         wanted: usize,
         /// What was given.
         got: String,
     },
-    /// A program is under way or waits.
-    #[error("a program is under way; canter abort ends it")]
+    /// A program is running or waiting.
+    #[error("a program is running; canter abort ends it")]
     Program,
     /// A pause or stop is in force.
-    #[error("the arm is held; canter resume lets it go")]
+    #[error("the arm is held; canter resume releases it")]
     Held,
     /// A fault is latched.
     #[error("a fault is latched ({0}); canter recover clears it")]
     Fault(String),
-    /// There is no way in that direction.
+    /// The arm cannot move in that direction.
     #[error("{0}")]
     Motion(String),
     /// The session is over.
@@ -55,7 +55,7 @@ pub enum JogError {
     Closed,
 }
 
-/// The direction that a request means; `None` where it asks for rest.
+/// The direction of a request; `None` if it asks for rest.
 pub(super) fn direction<const N: usize>(jog: &Jog) -> Result<Option<Direction<N>>, JogError> {
     let wanted = match jog.space {
         JogSpace::Joint => N,

@@ -40,7 +40,7 @@ pub struct SessionConfig {
     pub arm: Arm,
     /// Setpoints a second, 100 to 4000.
     pub rate_hz: f64,
-    /// By the clock, or in step with the driver.
+    /// By the wall clock, or in lock-step with the driver.
     pub clock: Clock,
     /// Whether every setpoint and measured position is kept for [`Session::samples`].
     pub record: bool,
@@ -123,7 +123,7 @@ pub enum SubmitError {
     /// There is no room for all of them.
     #[error(transparent)]
     Full(#[from] Full),
-    /// A fault is latched: what is queued now would be forgotten when it is cleared.
+    /// A fault is latched: commands that are queued now would be dropped when it is cleared.
     #[error("a fault is latched ({0}); canter recover clears it")]
     Fault(String),
     /// The session is over.
@@ -131,11 +131,11 @@ pub enum SubmitError {
     Closed,
 }
 
-/// How long the worker may go on thinking after the arm rests and the session is over; what it
-/// thinks about is then of no use to anybody.
+/// How long the worker may continue to plan after the arm rests and the session is over; its result
+/// is not needed then.
 const LAST_THOUGHT: Duration = Duration::from_millis(500);
 
-/// How long the arm may take to come to rest at the end.
+/// Time limit for the arm to come to rest at the end.
 const LAST_REST: Duration = Duration::from_secs(8);
 
 /// What is asked of the worker.
@@ -155,13 +155,13 @@ struct Shared {
 }
 
 impl Shared {
-    /// The commands that wait. It is held for a few instructions only, never while planning.
+    /// The waiting commands. The lock is held for a few instructions only, never while planning.
     fn inbox(&self) -> MutexGuard<'_, Inbox> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Fills in what is known of the moment without asking the worker.
+/// Fills in the present state of the motion without asking the worker.
 struct Live(Box<dyn Fn(&mut Status) + Send + Sync>);
 
 impl fmt::Debug for Live {
@@ -187,7 +187,7 @@ pub struct Session {
     pub start: Vec<f64>,
 }
 
-/// What the worker says once the executor runs.
+/// What the worker sends once the executor runs.
 struct Begun {
     warning: Option<String>,
     driver: String,
@@ -197,7 +197,7 @@ struct Begun {
 }
 
 impl Session {
-    /// Finds the driver, agrees on a session and starts to take commands.
+    /// Finds the driver, opens a session with it and starts to take commands.
     ///
     /// # Errors
     /// [`SessionError`]: the robot's description, no driver, a driver that
@@ -255,9 +255,9 @@ impl Session {
         self.give(commands.into_iter().map(Given::from).collect())
     }
 
-    /// Appends the commands of a program that was planned: all of them or none. What the plan has
-    /// is executed as it is planned, wherever arm and modes are then what the plan began with; any
-    /// other command is planned when its turn comes, as by [`Session::submit`].
+    /// Appends the commands of a program that was planned: all of them or none. Each planned step
+    /// is executed as planned, if arm and modes are then those it was planned for. Any other
+    /// command is planned when its turn comes, as by [`Session::submit`].
     ///
     /// # Errors
     /// [`SubmitError`], and the queue is as before.
@@ -288,32 +288,32 @@ impl Session {
         Ok(ids)
     }
 
-    /// The hand on the motion, for a thread that has nothing else to do.
+    /// A handle to control the motion, for a separate thread.
     #[must_use]
     pub fn steering(&self) -> Steering {
         self.steering.clone()
     }
 
-    /// Asks for a pause, a stop, another speed. It goes straight to the real-time thread and acts
-    /// in its next period, whatever the planner is doing. Gives the number of the order, for
-    /// [`Progress::has`].
+    /// Asks for a pause, a stop or another speed. The order goes directly to the real-time thread
+    /// and acts in its next period, whatever the planner is doing. Returns the number of the order,
+    /// for [`Progress::has`].
     pub fn control(&self, control: Control) -> u32 {
         self.steering.control(control)
     }
 
-    /// Where the motion is, as of the last servo period.
+    /// The progress of the motion, as of the last servo period.
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.steering.progress()
     }
 
-    /// Moves by hand: goes on as long as requests come within each other's timeout, then stops on
-    /// its way. A change of direction is a stop and a new beginning.
+    /// Jogs the arm: it moves as long as each request comes within the timeout of the one before,
+    /// then stops on its path. A change of direction is a stop and a new start.
     ///
     /// # Errors
-    /// [`JogError`]: a program is under way, a fault is latched, there is no way in that direction.
+    /// [`JogError`]: a program is running, a fault is latched, or the arm cannot move in that direction.
     pub fn jog(&self, jog: Jog) -> Result<(), JogError> {
-        // While a program is under way the worker may be thinking; its answer is known.
+        // While a program runs, the worker may be planning; its answer is known.
         if self.shared.inbox().is_busy() {
             return Err(JogError::Program);
         }
@@ -324,16 +324,16 @@ impl Session {
         answered.recv().unwrap_or(Err(JogError::Closed))
     }
 
-    /// Asks for a new agreement with the driver, which clears the latched fault. Gives the number
+    /// Asks for a new session with the driver, which clears the latched fault. Returns the number
     /// of the fault: [`Progress::fault`] shows it until it is cleared.
     ///
     /// # Errors
-    /// [`NoFault`], and nothing is left behind that could act later.
+    /// [`NoFault`]; the request then has no later effect.
     pub fn recover(&self) -> Result<u32, NoFault> {
         self.steering.recover()
     }
 
-    /// The next thing that happened; none within the time. [`Note::Closed`] is the last.
+    /// The next note; `None` if none comes within the time. [`Note::Closed`] is the last.
     #[must_use]
     pub fn note(&self, timeout: Duration) -> Option<Note> {
         match self.notes.recv_timeout(timeout) {
@@ -343,8 +343,8 @@ impl Session {
         }
     }
 
-    /// Where the session is. What belongs to the motion is of the last servo period, what belongs
-    /// to the program is as the planner left it.
+    /// The status of the session. Values of the motion are of the last servo period; those of the
+    /// program are as of the planner's last turn.
     #[must_use]
     pub fn status(&self) -> Status {
         let status = self.shared.status.lock();
@@ -369,7 +369,7 @@ impl Session {
     }
 
     /// Stops the arm on the path, says goodbye to the driver and ends both threads. Afterwards
-    /// [`Session::samples`] has the rest of them, down to where the arm rests.
+    /// [`Session::samples`] returns the remaining samples, until the arm rests.
     pub fn close(&mut self) {
         self.end();
     }
@@ -378,7 +378,7 @@ impl Session {
         let Some(worker) = self.worker.take() else {
             return;
         };
-        // Straight to the real-time thread: the worker may be thinking.
+        // Directly to the real-time thread: the worker may be planning.
         self.steering.shut_down();
         let _ = self.orders.send(Order::Close);
         let rest = Instant::now() + LAST_REST;
@@ -390,10 +390,10 @@ impl Session {
             sleep(Duration::from_micros(500));
         }
         if worker.is_finished() {
-            // A worker that panicked has already said so.
+            // A worker that panicked has already printed it.
             let _ = worker.join();
         }
-        // A worker that still plans is left to itself: it holds neither the driver nor a file.
+        // A worker that still plans is not waited for: it holds neither the driver nor a file.
     }
 }
 

@@ -10,11 +10,11 @@ use planner::command_error::CommandError;
 pub enum Blame {
     /// A limit of a joint, or the guard of the cycle.
     Guard,
-    /// The driver, a tool, or the way to them.
+    /// The driver, a tool, or the communication with them.
     Driver,
 }
 
-/// One thing that happened, in the order of the commands.
+/// One event, in the order of the commands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -73,7 +73,7 @@ pub enum Note {
         /// How many commands were dropped.
         dropped: usize,
     },
-    /// Something went wrong; the arm is stopped until the operator recovers.
+    /// A fault; the arm is stopped until the operator recovers.
     Faulted {
         /// Who is to blame.
         blame: Blame,

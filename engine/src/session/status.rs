@@ -17,7 +17,7 @@ pub struct Status {
     pub driver: String,
     /// `unready`, `ready` or `ended`.
     pub state: &'static str,
-    /// Name of the command under way, if any.
+    /// Name of the current command, if any.
     pub command: Option<&'static str>,
     /// Commands that wait.
     pub queued: usize,
@@ -39,8 +39,7 @@ pub struct Status {
     pub orientation_wxyz: [f64; 4],
     /// Settings in force, SI.
     pub settings: Option<Settings>,
-    /// Moves that the session has planned itself; those of a program that came planned are not
-    /// among them.
+    /// Number of moves that the session planned itself; moves that came with a plan do not count.
     pub plans: u64,
     /// Servo periods.
     pub cycles: Cycles,

@@ -25,7 +25,7 @@ use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{Executor, ExecutorConfig, Monitor, Remote, SegmentSender, Steering, ToolOrder};
 
-/// How many commands are planned ahead of the one that moves.
+/// Largest number of commands in work, the one that moves among them.
 const AHEAD: usize = 8;
 /// How long a tool may take beyond its nominal time, s.
 const TOOL_PATIENCE: f64 = 5.0;
@@ -67,18 +67,18 @@ pub(super) struct Worker<'a, const N: usize> {
     monitor: Monitor<N>,
     pub(super) remote: Remote<N>,
     steering: Steering,
-    /// How many aborts were carried out: what was given at another epoch waits or is dropped.
+    /// How many aborts were carried out: commands of another epoch wait or are dropped.
     epoch: u32,
-    /// Aborts of jogs that are under way.
+    /// Aborts of jogs that are not finished yet.
     pub(super) jog_aborts: u32,
-    /// The chain in force, for who asks where the controlled point is.
+    /// The chain in use, for computing the controlled point in other threads.
     seen: Arc<Mutex<Chain<N>>>,
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     jogging: Option<Jogging>,
-    /// Tool in force for recorded samples, of the last commands that were reported.
+    /// Chains of the last reported commands, for recorded samples.
     chains: VecDeque<(u32, Chain<N>)>,
-    /// Number of the newest order when a refusal held the arm; a later `Resume` lets it go.
+    /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
     closing: bool,
@@ -182,7 +182,7 @@ impl<const N: usize> Worker<'_, N> {
             && !self.is_held()
             && self.fault.is_none()
             && self.jogging.is_none()
-            // While an abort is under way nobody knows where the next command begins.
+            // During an abort it is not known where the next command begins.
             && self.steering.aborts() == self.epoch
             && self.ends.shared.inbox().has(self.epoch)
     }
@@ -196,7 +196,7 @@ impl<const N: usize> Worker<'_, N> {
     fn read_orders(&mut self) {
         let waiting = !self.ends.shared.inbox().is_empty() && self.flight.len() < AHEAD;
         let busy = !self.work.is_empty() || waiting;
-        // In lock-step the other side waits for us.
+        // In lock-step the driver waits for this thread.
         let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();
         let wait = Duration::from_micros(if busy || stepping { 20 } else { 500 });
         let mut order = match self.ends.orders.recv_timeout(wait) {
@@ -212,18 +212,18 @@ impl<const N: usize> Worker<'_, N> {
 
     fn obey(&mut self, order: Order) {
         match order {
-            // It was waited for; the inbox is looked at in every turn.
+            // It only ends the waiting; the inbox is read in every turn.
             Order::Look => {}
             Order::Jog(jog, answer) => {
                 let result = self.jog(jog);
-                // Who asked may have gone; the dead man's switch ends the jog.
+                // The caller may have ended; the dead man's switch ends the jog.
                 let _ = answer.send(result);
             }
             Order::Close => self.closing = true,
         }
     }
 
-    /// Whether commands wait or are under way.
+    /// Whether commands wait or are being executed.
     pub(super) fn has_program(&self) -> bool {
         !self.flight.is_empty() || !self.ends.shared.inbox().is_empty()
     }
@@ -233,7 +233,7 @@ impl<const N: usize> Worker<'_, N> {
         let Some(queued) = self.ends.shared.inbox().take(self.epoch) else {
             return;
         };
-        // Read before the command is looked at: who resumes later has seen what it came to.
+        // Read before the command is planned: a later resume comes after the refusal was visible.
         let newest = self.steering.newest();
         let Given { located, planned } = queued.given;
         let command = &located.command;
@@ -326,7 +326,7 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Hands over what fits into the ring; says whether all of it did.
+    /// Sends what fits into the ring; returns whether all of it did.
     fn feed(&mut self) -> bool {
         while let Some(work) = self.work.front() {
             let taken = match work {
@@ -363,7 +363,7 @@ impl<const N: usize> Worker<'_, N> {
         status.settings = Some(self.controller.modal().settings().clone());
     }
 
-    /// What fills in a status without this thread.
+    /// Fills in a status without this thread.
     fn live(&self) -> Live {
         let (remote, chain) = (self.remote.clone(), Arc::clone(&self.seen));
         Live(Box::new(move |status: &mut Status| {
@@ -380,7 +380,7 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     pub(super) fn say(&self, note: Note) {
-        // Nobody has to listen.
+        // The receiver may have been dropped.
         let _ = self.ends.notes.send(note);
     }
 }

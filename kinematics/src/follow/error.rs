@@ -8,15 +8,15 @@ use std::fmt;
 pub struct FollowError {
     /// Path parameter.
     pub u: f64,
-    /// The joint that stands out, counted from 0.
+    /// The joint concerned, counted from 0.
     pub joint: Option<usize>,
-    /// What is in the way.
+    /// The cause.
     pub cause: FollowCause,
     /// Size of the fault in the unit of the cause.
     pub amount: f64,
 }
 
-/// What keeps an arm from following a path.
+/// Why an arm cannot follow a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FollowCause {

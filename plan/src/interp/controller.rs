@@ -13,12 +13,12 @@ use crate::run::{
 };
 use crate::world::{Change, Class, Model, StoredRun, Writer};
 
-/// A run of a plan: a new one, or one that goes on.
+/// A run of a plan: a new one, or one that is resumed.
 #[derive(Clone, Debug)]
 pub struct PulledRun {
     file: String,
     source: String,
-    /// Its number in the database, when it goes on.
+    /// Its number in the database, if it is resumed.
     id: Option<i64>,
     state: State,
 }
@@ -35,7 +35,7 @@ impl PulledRun {
         }
     }
 
-    /// The run of the database goes on: it was killed or interrupted, or its motion failed.
+    /// Resumes the run of the database: it was killed or interrupted, or its motion failed.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when it has ended.
@@ -120,7 +120,7 @@ impl From<PlanError> for Trouble {
     }
 }
 
-/// Where a plan is pulled: the world, what moves the arm, and how.
+/// What a plan is executed with: the world, the interface to the arm, and options.
 pub struct Pull<'a> {
     /// The controller's connection.
     pub writer: &'a mut Writer,
@@ -132,11 +132,11 @@ pub struct Pull<'a> {
 
 /// Opens a plan, pulls it step by step, has each step's motion executed, commits its effects
 /// together with the state of the run, and closes the plan. `observer` gets the number of each
-/// finished step. For a run that goes on the interpreter must begin with the step that was under
-/// way; the arm is first brought back to where the world has it.
+/// finished step. For a resumed run the interpreter must begin with the unfinished step; the arm is
+/// first moved back to its place in the world.
 ///
 /// # Errors
-/// [`PlanError`] of the database; what goes wrong in the plan is in the report.
+/// [`PlanError`] of the database; errors of the plan are in the report.
 pub fn pull(
     interpreter: &mut dyn PlanInterpreter,
     run: PulledRun,
@@ -192,7 +192,7 @@ fn failed(code: i64, reason: String) -> Outcome {
 /// How a run ended.
 enum End {
     Over(Outcome),
-    /// The operator stopped it; it can go on.
+    /// The operator stopped it; it can be resumed.
     Interrupted(String),
 }
 
@@ -224,7 +224,7 @@ struct Puller<'a> {
 }
 
 impl Puller<'_> {
-    /// Pulls steps until the interpreter has no more; what it said then.
+    /// Pulls steps until the interpreter has no more; returns its last code.
     fn run(
         &mut self,
         interpreter: &mut dyn PlanInterpreter,
@@ -263,7 +263,7 @@ impl Puller<'_> {
         }
     }
 
-    /// Has the commands of a step executed; then its effects come true, with the state of the run.
+    /// Executes the commands of a step, then commits its effects with the state of the run.
     fn step(&mut self, batch: &Batch) -> Result<(), Trouble> {
         let number = self.state.counters.statements + 1;
         let before = self.place.writer.model()?;
@@ -287,8 +287,8 @@ impl Puller<'_> {
         Ok(())
     }
 
-    /// What a failure of the motion means for the run. One that the operator did not want is told
-    /// to the arm with EndCanon.
+    /// The result of the run after a failure of the motion. Unless the operator stopped it, the arm
+    /// gets EndCanon.
     fn after(&mut self, failure: &MotionFailure) -> End {
         let number = self.state.counters.statements + 1;
         let reason = format!("step {number}: {failure}");
@@ -297,7 +297,7 @@ impl Puller<'_> {
         }
         let (mut end, code) = (Batch::default(), MOTION_FAILED);
         end.push(Command::EndCanon { reason: code });
-        // The motion has failed already; there is nobody left to tell.
+        // The motion has failed already; this failure is not reported.
         let _ = self.perform(&end);
         End::Over(failed(code, reason))
     }

@@ -20,8 +20,8 @@ use crate::pddl::ActionTable;
 use crate::run::RobotOptions;
 use crate::world::{Change, Durability, Writer};
 
-/// Takes one command as a line of the text language and the pointer given to
-/// [`canter_configure`]; returns 0 when it took the command.
+/// Receives one command as a line of the text language and the pointer given to
+/// [`canter_configure`]; returns 0 when it accepted the command.
 pub type CommandCallback = extern "C" fn(line: *const c_char, user: *mut c_void) -> c_int;
 
 struct Process {
@@ -84,7 +84,8 @@ fn with(call: impl FnOnce(&mut PddlInterpreter, &mut dyn CommandSink) -> Code) -
 /// Text of a C string; none for a null pointer or text that is not UTF-8.
 ///
 /// # Safety
-/// `text` is null or points to a text that ends with a zero byte and is not changed during the call.
+/// `text` is null or points to a text that ends with a zero byte and does not change during the
+/// call.
 unsafe fn text<'a>(text: *const c_char) -> Option<&'a str> {
     if text.is_null() {
         return None;
@@ -93,8 +94,8 @@ unsafe fn text<'a>(text: *const c_char) -> Option<&'a str> {
     unsafe { CStr::from_ptr(text) }.to_str().ok()
 }
 
-/// Says where the world database is and who takes the commands. To be called first; a plan that is
-/// open is dropped. Returns 0, or a positive [`Code`].
+/// Sets the world database and the function that receives the commands. To be called first; an open
+/// plan is dropped. Returns 0, or a positive [`Code`].
 ///
 /// # Safety
 /// `world` is a text that ends with a zero byte. `callback` may be called with `user` until
@@ -158,7 +159,7 @@ pub extern "C" fn InterpExecute() -> c_int {
 }
 
 /// Writes the effects of the last step to the world database: for the controller, when all commands
-/// of the step have been executed. A step whose effects are not written is as if it had not been.
+/// of the step have been executed. A step whose effects are not written counts as not executed.
 /// Returns 0, or a positive [`Code`].
 #[unsafe(no_mangle)]
 pub extern "C" fn canter_commit() -> c_int {

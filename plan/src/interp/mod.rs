@@ -13,17 +13,17 @@ use crcl::Command;
 use crate::run::Tool;
 use crate::world::Change;
 
-/// What the five functions return: 0 when all is well, else positive.
+/// Results of the five functions: 0 for success, otherwise positive.
 ///
 /// # Source
-/// T. Kramer, "Canonical Robot Commands", draft of May 24, 2012, section VII; the numbers are ours,
-/// because the draft only says "positive".
+/// T. Kramer, "Canonical Robot Commands", draft of May 24, 2012, section VII; the numbers are
+/// chosen here, because the draft only says "positive".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum Code {
     /// All is well.
     Ok = 0,
-    /// There are no more steps; EndCanon(0) was given. Only from `execute`.
+    /// There are no more steps; EndCanon(0) was sent. Only from `execute`.
     EndOfPlan = 1,
     /// `init` was not called, or `exit` was.
     NotInitialised = 2,
@@ -54,16 +54,16 @@ pub trait CommandSink {
     /// Takes one command; false when there is no room.
     fn command(&mut self, command: Command) -> bool;
 
-    /// After the last command the tool on the arm is this. A sink that cares for commands only may
-    /// leave it.
+    /// After the last command the tool on the arm is this. A sink that needs only commands may
+    /// ignore it.
     fn tool(&mut self, _tool: Option<Tool>) {}
 
-    /// What is true of the world when all commands of the step have been executed. The controller
-    /// commits it then, or drops it when a command fails.
+    /// The effects on the world when all commands of the step have been executed. The controller
+    /// commits them then, or drops them when a command fails.
     fn effects(&mut self, _changes: Vec<Change>) {}
 }
 
-/// A plan interpreter: does only what the controller tells it, and reads the database only.
+/// A plan interpreter: the controller calls it, and it only reads the database.
 ///
 /// Life cycle: `init`, then any number of plans (`open_plan`, `execute` until it is not 0,
 /// `close_plan`), then `exit`. `execute` binds symbolic poses when it is called, so the controller
@@ -72,11 +72,11 @@ pub trait PlanInterpreter {
     /// InterpInit: gets ready.
     fn init(&mut self) -> Code;
 
-    /// InterpOpenPlan: reads a whole plan and gives InitCanon.
+    /// InterpOpenPlan: reads a whole plan and sends InitCanon.
     fn open_plan(&mut self, file_name: &str, plan_type: &str, sink: &mut dyn CommandSink) -> Code;
 
-    /// InterpExecute: interprets the next step and gives its commands. At the end gives
-    /// EndCanon(0) and returns [`Code::EndOfPlan`]; on an error gives EndCanon(code).
+    /// InterpExecute: interprets the next step and sends its commands. At the end it sends
+    /// EndCanon(0) and returns [`Code::EndOfPlan`]; on an error it sends EndCanon(code).
     fn execute(&mut self, sink: &mut dyn CommandSink) -> Code;
 
     /// InterpClosePlan: closes the plan.
@@ -85,6 +85,6 @@ pub trait PlanInterpreter {
     /// InterpExit: stops.
     fn exit(&mut self) -> Code;
 
-    /// What the last error was, in words; empty when there was none.
+    /// The message of the last error; empty if there was none.
     fn last_error(&self) -> &str;
 }

@@ -35,7 +35,7 @@ pub struct PddlInterpreter {
     options: RobotOptions,
     reader: Option<Reader>,
     plan: Option<(Vec<PlanStep>, usize)>,
-    /// Text and first step of the plan that is opened next, when its run goes on.
+    /// Text and first step of the plan that is opened next, for a resumed run.
     resumed: Option<(String, usize)>,
     error: String,
 }

@@ -55,7 +55,7 @@ impl Checker<'_> {
             .push(Finding::note(code, message, span.range()).help(help));
     }
 
-    /// Role and type of a declared name; a name that differs in capitals is warned of once.
+    /// Role and type of a declared name; warns once of a name that differs in capitals.
     pub(super) fn known(&mut self, name: &str, span: Span) -> Option<(Role, Type)> {
         let declared = self.scope.declared(name)?.to_owned();
         if declared != name && self.folded.insert(name.to_owned()) {
@@ -430,7 +430,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Indexes are unique, predecessors exist, and no step waits for itself.
+    /// Checks that indexes are unique, predecessors exist, and no step waits for itself.
     fn triples(&mut self, triples: &[Triple], span: Span) {
         if triples.is_empty() {
             self.error("plan::empty", "the list is empty".into(), span);

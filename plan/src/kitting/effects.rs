@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::ast::{Action, Expression, Statement, Term};
 use super::types::Scope;
 
-/// Variables that a statement uses, and properties of objects by their name alone: whose they are
-/// is known only when the plan runs. What follows from motion is not among them.
+/// Variables that a statement uses, and properties of objects by their name alone: the objects are
+/// known only when the plan runs. Effects of motion are not included.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Effects {
     /// Read before the statement itself surely wrote them.
@@ -52,7 +52,7 @@ impl Effects {
         }
     }
 
-    /// Adds a statement that is executed perhaps: nothing is surely written.
+    /// Adds a statement that may be executed: nothing is certainly written.
     fn add_perhaps(&mut self, statement: &Statement, scope: &Scope) {
         let sure = self.sure.clone();
         self.add(statement, scope);
@@ -130,7 +130,7 @@ impl Effects {
             }
             Action::DoOne(list) => list.iter().for_each(|s| self.add_perhaps(s, scope)),
             Action::DoInAnyOrder(_) | Action::DoInPreconditionOrder(_) => {
-                // Nobody knows what comes first: each may read before another writes.
+                // The order is open: each may read before another writes.
                 let before = self.sure.clone();
                 let mut sure = before.clone();
                 for child in statement.children() {

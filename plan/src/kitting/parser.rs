@@ -10,7 +10,7 @@ pub(super) const DEEPEST: usize = 100;
 /// Most operators and property steps in one statement or field.
 const MOST_OPERATORS: usize = 300;
 
-/// Something was found that does not fit; a finding was made.
+/// An unexpected token was found; a finding was made.
 pub(super) struct Misfit;
 
 /// Result of reading something.

@@ -5,7 +5,7 @@ use super::parser::{Misfit, Parser, Read};
 use super::token::{Kind, tokens};
 use crate::finding::Finding;
 
-/// What came out of a text: as much of the plan as could be read, and what was found.
+/// The result of reading a text: as much of the plan as could be read, and the findings.
 #[derive(Clone, Debug)]
 pub struct Reading {
     /// The plan; incomplete when there are errors.
@@ -17,7 +17,7 @@ pub struct Reading {
 /// Reads a plan in the outline layout (the tree comes from labels such as `5.2.1`) or in the block
 /// layout (`begin ... end`), or, when the text starts with `{`, in JSON.
 ///
-/// Never fails and never panics: what does not fit becomes a finding, and reading goes on after it.
+/// Never fails and never panics: each error becomes a finding, and reading continues after it.
 ///
 /// ```
 /// let text = "About PlanId = \"p\" ToDo\n Start()\n Stop()";
@@ -380,7 +380,7 @@ impl Parser {
     }
 }
 
-/// An item as it is read, before its fields are understood.
+/// An item as it is read, before its fields are interpreted.
 #[derive(Default)]
 struct Item {
     fields: Vec<(super::ast::Name, Expression)>,

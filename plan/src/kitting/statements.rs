@@ -49,7 +49,8 @@ impl Parser {
         *previous = number;
     }
 
-    /// Goes on after a misfit: to the next label, or to the next line that starts with a statement.
+    /// Continues after an error: at the next label, or at the next line that starts with a
+    /// statement.
     fn recover(&mut self, start: usize, outline: bool) {
         self.at = self.at.max(start + 1);
         loop {

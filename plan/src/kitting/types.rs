@@ -25,7 +25,7 @@ pub(crate) enum Type {
     Object(Class),
     /// A list of objects of this class.
     List(Class),
-    /// A description from the library, or another thing that is no object.
+    /// A description from the library, or other data that is not an object.
     Data,
     /// Null.
     Null,
@@ -132,7 +132,7 @@ impl Scope {
         scope
     }
 
-    /// The declared name that `name` means: the same, or the same but for capitals.
+    /// The declared name for `name`: the same, or the same except for capitals.
     #[must_use]
     pub(crate) fn declared(&self, name: &str) -> Option<&str> {
         let exact = self

@@ -14,7 +14,7 @@ use crate::world::{Change, Class, Location, Model, Object, Scalar};
 /// The table of actions that comes with the crate.
 const OWN_TABLE: &str = include_str!("actions.toml");
 
-/// What actions mean. The format is described at the top of the crate's own table.
+/// The table of actions. The format is described at the top of the built-in table.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActionTable {
@@ -68,10 +68,10 @@ impl ActionTable {
         Self::default().with(OWN_TABLE)
     }
 
-    /// This table with the entries of another (TOML), which are looked at first.
+    /// This table with the entries of another (TOML), which are searched first.
     ///
     /// # Errors
-    /// [`PlanError::Table`] for an entry that makes no sense.
+    /// [`PlanError::Table`] for an invalid entry.
     pub fn with(&self, text: &str) -> Result<Self, PlanError> {
         let mut table: Self = toml::from_str(text).map_err(|e| PlanError::Table(e.to_string()))?;
         for entry in &table.action {
@@ -113,7 +113,7 @@ impl ActionTable {
     /// Commands and effects of an action in this world.
     ///
     /// # Errors
-    /// [`PlanError`] when an object is not there or a motion makes no sense.
+    /// [`PlanError`] when an object is missing or a motion is not possible.
     pub fn interpret(
         &self,
         step: &PlanStep,
@@ -140,7 +140,7 @@ impl ActionTable {
 }
 
 impl Entry {
-    /// Every argument that a step uses is one of the action's.
+    /// Checks that every argument that a step uses is one of the action's.
     fn check(&self) -> Result<(), PlanError> {
         for step in &self.steps {
             let used: Vec<&String> = match step {
@@ -173,7 +173,7 @@ impl Entry {
     }
 }
 
-/// An action while it is turned into commands; only a copy of the model is changed.
+/// The state of turning an action into commands; only a copy of the model is changed.
 struct Work<'a> {
     objects: BTreeMap<&'a str, &'a str>,
     model: Model,

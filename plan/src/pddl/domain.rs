@@ -51,7 +51,7 @@ pub struct Domain {
     /// Type and the type above it.
     pub(crate) types: BTreeMap<String, String>,
     pub(crate) actions: BTreeMap<String, Action>,
-    /// Things that were read over, such as a malformed declaration.
+    /// Warnings about skipped parts, such as a malformed declaration.
     pub warnings: Vec<String>,
 }
 

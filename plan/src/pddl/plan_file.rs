@@ -26,8 +26,8 @@ impl std::fmt::Display for PlanStep {
     }
 }
 
-/// Reads a plan file: one action a line, `(name object ...)`, with a time before and a duration
-/// after it where the planner is temporal; `;` starts a comment.
+/// Reads a plan file: one action per line, `(name object ...)`; temporal planners add a time before
+/// it and a duration after it; `;` starts a comment.
 ///
 /// # Errors
 /// [`PddlError`] with line and column.

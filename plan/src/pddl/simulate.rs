@@ -22,8 +22,8 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// Executes a plan from the start of the problem and looks whether the goal is reached. Returns the
-/// number of steps.
+/// Executes a plan from the start of the problem and checks whether the goal is reached. Returns
+/// the number of steps.
 ///
 /// # Errors
 /// [`Failure`]: an unknown action, a wrong number or type of objects, a precondition that is false,
@@ -123,7 +123,7 @@ impl State {
         }
     }
 
-    /// The first part of a condition that is false, in words; none when all is true.
+    /// The first part of a condition that is false, as text; `None` if all is true.
     fn broken(&self, condition: &Condition, binding: &Binding) -> Option<String> {
         match condition {
             Condition::And(list) => list.iter().find_map(|part| self.broken(part, binding)),

@@ -84,7 +84,7 @@ impl Machine<'_> {
                     Value::Object(id) => self.model.object(id)?.name.clone(),
                     other => {
                         let found = other.describe(self.model);
-                        return Err(PlanError::Value(format!("{found} is no end effector")));
+                        return Err(PlanError::Value(format!("{found} is not an end effector")));
                     }
                 };
                 let batch = robot.change_effector(&id)?;

@@ -22,7 +22,7 @@ impl Tool {
     }
 }
 
-/// Commands of one step, and what is true of the world when all of them have been executed.
+/// Commands of one step, and their effects on the world when all of them have been executed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
     /// The commands, in metres and radians.
@@ -54,13 +54,13 @@ impl Batch {
     }
 }
 
-/// Parts of a metre that commands are given to; what is smaller is rounding.
+/// Resolution of coordinates in commands, in parts of a metre; smaller amounts are rounding.
 const FINEST: f64 = 1e12;
 
-/// A pose as the canonical language says it: point and two axes.
+/// A pose as the canonical language writes it: point and two axes.
 #[must_use]
 pub fn canonical(pose: &Isometry3<f64>) -> Pose {
-    // Adding zero makes a negative zero positive.
+    // Adding zero turns a negative zero into a positive one.
     let rounded = |v: Vector3<f64>| v.map(|x| (x * FINEST).round() / FINEST + 0.0).into();
     let axis = |axis: Vector3<f64>| rounded(pose.rotation * axis);
     Pose::Axes {

@@ -21,13 +21,13 @@ use crate::PlanError;
 use crate::kitting::read;
 use crate::world::{Change, Model, Reader, StoredRun, Writer};
 
-/// What to do when a motion or an errand fails.
+/// What to do when a motion or a request to the factotum fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
     /// End the plan with EndCanon and a positive reason.
     Stop,
-    /// Clear the failure, bring the arm back to where the step began, and try the step again, at
-    /// most this often for one step.
+    /// Clear the failure, move the arm back to where the step began, and try the step again, at
+    /// most this often per step.
     Repair {
         /// Attempts for one step.
         attempts: usize,
@@ -58,7 +58,7 @@ impl Default for RunOptions {
 /// Executes a plan: asks the interpreter for one step at a time, has it executed, and commits the
 /// motion's effect together with the state of the plan.
 pub struct Controller<'a> {
-    // The writer is closed last, so that it leaves one file.
+    // The writer is closed last, so that one file remains.
     reader: Reader,
     writer: Writer,
     motion: &'a mut dyn Motion,
@@ -71,11 +71,11 @@ pub struct Controller<'a> {
     run: i64,
     resumed: bool,
     warnings: Vec<String>,
-    /// Why the run is left where it is, to be resumed: outcome, code, reason.
+    /// Why the run stops here and can be resumed: outcome, code, reason.
     left: Option<(&'static str, i64, String)>,
 }
 
-/// What a motion or an errand did.
+/// Result of a motion or a request to the factotum.
 #[derive(Default)]
 struct Done {
     changes: Vec<Change>,
@@ -123,7 +123,7 @@ impl<'a> Controller<'a> {
     /// Prepares a new run of a plan.
     ///
     /// # Errors
-    /// [`PlanError`] when plan, parameters or world do not fit; nothing has moved then.
+    /// [`PlanError`] when plan, parameters or world do not match; nothing has moved then.
     pub fn start(
         mut cell: Cell<'a>,
         source: &str,
@@ -181,8 +181,8 @@ impl<'a> Controller<'a> {
         })
     }
 
-    /// Prepares to go on with the last run of the database: one that was killed or interrupted, or
-    /// in which the arm or the factotum failed.
+    /// Prepares to resume the last run of the database: one that was killed or interrupted, or in
+    /// which the arm or the factotum failed.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when there is none, or it has ended.
@@ -236,7 +236,8 @@ impl<'a> Controller<'a> {
     pub fn run(&mut self, observer: &mut dyn FnMut(&Event)) -> Result<PlanRunReport, PlanError> {
         let began = Instant::now();
         match self.open() {
-            // An arm that cannot be brought back now may be helped, and the run goes on later.
+            // If the arm cannot be moved back now, an operator may help, and the run is resumed
+            // later.
             Err(failure) if self.resumed && !failure.stopped => {
                 self.left = Some(("failed", 3, format!("at the start: {failure}")));
             }
@@ -270,7 +271,7 @@ impl<'a> Controller<'a> {
         })
     }
 
-    /// InitCanon and the units, and the arm where the model has it.
+    /// InitCanon and the units; moves the arm to its place in the model.
     fn open(&mut self) -> Result<(), MotionFailure> {
         let mut batch = Batch::default();
         batch.push(Command::InitCanon);
@@ -301,9 +302,9 @@ impl<'a> Controller<'a> {
         Ok(())
     }
 
-    /// Brings the arm from wherever it is to where the model has it. The gripper is left alone: a
-    /// step that was under way is executed again from its beginning, and all steps come to the same
-    /// end when some of their motion has been made before.
+    /// Moves the arm from anywhere to its place in the model. The gripper does not move: an
+    /// unfinished step is executed again from its beginning, and all steps have the same result if
+    /// part of their motion was made before.
     fn bring_back(&mut self) -> Result<(), MotionFailure> {
         let Some(arm) = self.motion.arm() else {
             return Ok(());
@@ -364,7 +365,7 @@ impl<'a> Controller<'a> {
             ..
         } = step;
         let seconds = done.seconds;
-        // An errand takes time, but nothing of the arm's.
+        // A request to the factotum takes time, but does not move the arm.
         if done.binding.is_none() {
             state.counters.motion_s += seconds;
         }
@@ -386,7 +387,7 @@ impl<'a> Controller<'a> {
         Ok(())
     }
 
-    /// Ends the plan, or leaves it to be resumed where the operator stopped it.
+    /// Ends the plan, or leaves it for a resume if the operator stopped it.
     fn give_up(&mut self, trouble: Trouble, mark: &str) -> Result<(), PlanError> {
         match trouble {
             Trouble::Failed(code, reason) => {
@@ -430,7 +431,7 @@ impl<'a> Controller<'a> {
         }
     }
 
-    /// Changes of the world and state of the plan, together or not at all.
+    /// Commits changes of the world and state of the plan, together or not at all.
     fn commit(&mut self, changes: &[Change], state: State) -> Result<(), PlanError> {
         self.model.apply_all(changes)?;
         let outcome = state.outcome.as_ref().map(Outcome::to_json).transpose()?;

@@ -201,7 +201,7 @@ impl Context<'_> {
         }
     }
 
-    /// A coordinate or angle, in the units of the workstation as plans see it.
+    /// A coordinate or angle, in the units of the workstation.
     fn component(&self, values: &[f64; 3], property: &str) -> Option<Value> {
         let (metres, radians) = (self.model.units.metres()?, self.model.units.radians()?);
         Some(Value::Number(match property {
@@ -393,7 +393,7 @@ impl Context<'_> {
     }
 }
 
-/// Whether an object of the world meets a requirement, looked for at `place`.
+/// Whether an object of the world meets a requirement at `place`.
 ///
 /// The class, the stock keeping unit, the contents (the given number of the given kind, and nothing
 /// of another kind), the place, and all conditions must fit.

@@ -26,18 +26,18 @@ pub struct Delivery {
 /// What the factotum says about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FactotumStatus {
-    /// Ready, after this many errands.
+    /// Ready, after this many requests.
     Ready(usize),
-    /// The last errand failed.
+    /// The last request failed.
     Failed(String),
 }
 
-/// The agent that replaces, removes and refills. The controller commits what it did.
+/// The agent that replaces, removes and refills. The controller commits its changes.
 pub trait Factotum {
-    /// Does an errand.
+    /// Executes a request.
     ///
     /// # Errors
-    /// A text that says why it could not; then nothing has changed.
+    /// The reason why it failed; then nothing has changed.
     fn perform(
         &mut self,
         model: &Model,
@@ -45,7 +45,7 @@ pub trait Factotum {
         request: &Request,
     ) -> Result<Delivery, String>;
 
-    /// What an errand would do, without doing it.
+    /// The changes that a request would make, without making them.
     ///
     /// # Errors
     /// As [`Factotum::perform`].
@@ -55,13 +55,13 @@ pub trait Factotum {
     fn status(&self) -> FactotumStatus;
 }
 
-/// Things to bring, one for each requirement, as they were before the plan started.
+/// Objects to bring, one supply per requirement, as they were before the plan started.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stock {
     supplies: BTreeMap<String, Vec<Item>>,
 }
 
-/// An object of a supply; the first of a list is the supply itself, and says where it stands.
+/// An object of a supply; the first of a list is the supply itself, with its location.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Item {
     stem: String,
@@ -145,12 +145,13 @@ fn copy(model: &Model, root: ObjectId) -> Vec<Item> {
     members.iter().filter_map(item).collect()
 }
 
-/// A factotum that does its errands at once, out of a stock that never ends unless limited.
+/// A simulated factotum: it executes requests at once, from an unlimited stock unless limits are
+/// set.
 #[derive(Clone, Debug)]
 pub struct SimulatedFactotum {
     /// What it brings.
     pub stock: Stock,
-    /// How long an errand takes (s).
+    /// How long a request takes (s).
     pub seconds: f64,
     /// How often it still brings the supply of a requirement; without an entry, always.
     pub limits: BTreeMap<String, usize>,
@@ -159,7 +160,7 @@ pub struct SimulatedFactotum {
 }
 
 impl SimulatedFactotum {
-    /// A factotum with this stock, 5 s an errand.
+    /// A factotum with this stock, 5 s per request.
     #[must_use]
     pub fn new(stock: Stock) -> Self {
         Self {

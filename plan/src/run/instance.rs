@@ -23,7 +23,10 @@ impl Machine<'_> {
         let part = self.model.object(self.context(&state).object(part)?)?;
         let declared = self.program.scope.lookup(&variable.text);
         let Some((_, Type::Object(class))) = declared else {
-            return Err(PlanError::Value(format!("{} is no object", variable.text)));
+            return Err(PlanError::Value(format!(
+                "{} is not an object",
+                variable.text
+            )));
         };
         let component = derived_property(class, property).map(|(component, _)| component);
         if !component.is_some_and(|component| part.class.is_a(component)) {

@@ -67,7 +67,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Interprets the next statement. The world is not changed; the step says how it will be.
+    /// Interprets the next statement. The world is not changed; the step contains its changes.
     pub(crate) fn step(&self, state: &State, chooser: &mut dyn Chooser) -> Result<Step> {
         let mut next = state.clone();
         let Some(node) = self.next_leaf(&mut next, chooser)? else {
@@ -78,7 +78,7 @@ impl Machine<'_> {
             });
         };
         let Node::Leaf(action, span) = &self.program.nodes[node] else {
-            return Err(PlanError::Resume(format!("node {node} is no statement")));
+            return Err(PlanError::Resume(format!("node {node} is not a statement")));
         };
         next.counters.statements += 1;
         let mut step = self
@@ -173,7 +173,7 @@ impl Machine<'_> {
         let statements = state.counters.statements;
         if let Some(frame) = state.stack.last_mut() {
             if frame.next == statements {
-                let why = "a pass did nothing, so it would go on for ever".into();
+                let why = "a pass did nothing, so the loop would never end".into();
                 return Err(PlanError::Statement {
                     statement: "LoopWhile".into(),
                     why,

@@ -11,7 +11,7 @@ pub struct MotionFailure {
     pub command: usize,
     /// What happened.
     pub reason: String,
-    /// The operator wanted it: the run is not over, it can be resumed.
+    /// The operator stopped it: the run can be resumed.
     pub stopped: bool,
 }
 
@@ -56,8 +56,8 @@ pub struct Situation {
 
 /// What moves the arm: the engine, or a simulation.
 pub trait Motion {
-    /// Where the end of the arm is now, in the frame of the workstation (m); none when the model
-    /// knows better.
+    /// Pose of the end of the arm now, in the frame of the workstation (m); `None` if only the
+    /// model knows it.
     fn arm(&mut self) -> Option<Isometry3<f64>>;
 
     /// Executes all commands of the batch and returns the time it took (s) when all have ended.

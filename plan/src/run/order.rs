@@ -53,8 +53,8 @@ fn ready(count: usize, pairs: &[(usize, usize)], order: &[usize]) -> Vec<usize> 
 ///
 /// The search goes depth first with the written order as the first bound, so that the result is
 /// never slower than the written order, by the same prediction; the motion that follows the list
-/// counts, because it begins where the list ends. Lists inside the members are
-/// followed in their written order.
+/// counts, because it begins where the list ends. Lists inside the members are simulated in their
+/// written order.
 pub(crate) struct Foresight<'a> {
     pub(crate) motion: &'a mut dyn Motion,
     pub(crate) factotum: &'a dyn Factotum,
@@ -63,7 +63,7 @@ pub(crate) struct Foresight<'a> {
 
 struct Search<'p> {
     program: &'p Program,
-    /// What goes on after the list.
+    /// The continuation after the list.
     rest: Vec<Frame>,
     list: &'p [usize],
     pairs: &'p [(usize, usize)],
@@ -109,7 +109,8 @@ impl Chooser for Foresight<'_> {
                 self.follow(program, list[*member], time, (&state, &model))
             });
         }
-        // The members' own frame is done when they are: the rest of the plan goes on below it.
+        // The frame of the members ends with them: the rest of the plan continues in the frame
+        // below.
         let rest = search.rest.clone();
         let slowest =
             at.map(|(time, state, model)| time + self.tail(program, &rest, &state, &model));
@@ -239,7 +240,7 @@ impl Foresight<'_> {
                     state.bindings.insert(request.variable, value);
                     changes.extend(delivery.changes);
                 }
-                // The member is over; a Stop or Quit in it ends the whole plan.
+                // The member has ended; a Stop or Quit in it ends the whole plan.
                 Act::Exhausted => {
                     state.outcome = None;
                     return Some((time, state, model));

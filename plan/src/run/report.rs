@@ -15,7 +15,7 @@ pub enum Event {
         line: usize,
         /// Statements so far.
         number: usize,
-        /// Time of its motion or errand (s).
+        /// Time of its motion or request (s).
         seconds: f64,
     },
     /// The end effector of this name is now on the arm.
@@ -24,7 +24,7 @@ pub enum Event {
     Kit(usize),
     /// Something odd.
     Warning(String),
-    /// A motion or errand failed and is tried again.
+    /// A motion or request failed and is tried again.
     Retry(String),
 }
 

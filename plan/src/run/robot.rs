@@ -17,9 +17,9 @@ pub struct RobotOptions {
     pub settle: f64,
     /// Travel above the workstation in straight lines; otherwise along any convenient trajectory.
     pub straight: bool,
-    /// Put an object on top of what already is at its place in a container, not into it.
+    /// Put an object on top of another that is already at its place in a container.
     pub stack: bool,
-    /// Percentage of the arm's speed and acceleration to ask for; none leaves the settings alone.
+    /// Percentage of the arm's speed and acceleration to set; `None` does not change the settings.
     pub percent: Option<f64>,
 }
 
@@ -128,8 +128,8 @@ impl Robot<'_> {
         Ok(())
     }
 
-    /// From where the end of the arm is to where the model has it: up, across, down. None when it
-    /// is there.
+    /// The path from the present end of the arm to its place in the model: up, across, down. `None`
+    /// if it is there.
     pub(crate) fn way_back(&self, arm: &Isometry3<f64>) -> Result<Option<Batch>, PlanError> {
         let wanted = situation(self.model)?;
         let from_tip = wanted
@@ -151,9 +151,9 @@ impl Robot<'_> {
         Ok(Some(batch))
     }
 
-    /// Above a pose (m, frame of the workstation), turned so that what is held has the direction of
-    /// the pose, or an empty gripper could take something there. From lower down the controlled
-    /// point first rises to the travel height.
+    /// Moves above a pose (m, frame of the workstation), turned so that the held object has the
+    /// orientation of the pose, or an empty gripper could take an object there. From lower down the
+    /// controlled point first rises to the travel height.
     pub(crate) fn move_above(&self, pose: &Isometry3<f64>) -> Result<Batch, PlanError> {
         let height = self.travel_height()?;
         let rotation = match (self.model.held(), self.model.effector()) {
@@ -330,7 +330,8 @@ impl Robot<'_> {
         Ok(batch)
     }
 
-    /// An empty holder of the changing station, best the one whose name speaks of the effector.
+    /// An empty holder of the changing station; preferably one whose name contains that of the end
+    /// effector.
     fn holder_for(&self, effector: &Object) -> Result<&Object, PlanError> {
         let empty = |object: &&Object| {
             object.class == Class::EndEffectorHolder

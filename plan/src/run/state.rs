@@ -15,7 +15,7 @@ use crate::world::{Change, StoredRun};
 pub enum Outcome {
     /// Stop was executed.
     Stopped,
-    /// The plan gave up, or could not go on.
+    /// The plan gave up, or could not continue.
     Failed {
         /// Reason for EndCanon, positive: 1 Quit, 2 a statement, 3 the motion, 4 the factotum; for
         /// PDDL plans a [`crate::interp::Code`], or 100 for the motion.
@@ -88,7 +88,7 @@ pub struct Counters {
     pub gained_s: f64,
 }
 
-/// Where a plan is: program counter, variables, counters.
+/// The state of a plan: program counter, variables, counters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     pub(crate) stack: Vec<Frame>,
@@ -105,7 +105,7 @@ impl State {
         serde_json::to_string(self).map_err(|error| PlanError::Resume(error.to_string()))
     }
 
-    /// The state of a stored run, to go on from.
+    /// The state of a stored run, for resuming it.
     ///
     /// # Errors
     /// [`PlanError::Resume`] when the run has ended, or its state cannot be read.
@@ -133,7 +133,7 @@ pub enum Act {
     Nothing,
     /// Motion; its changes come true with it.
     Motion(Batch),
-    /// An errand of the factotum.
+    /// A request to the factotum.
     Errand(Request),
     /// The plan is over, by a statement.
     End,

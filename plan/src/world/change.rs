@@ -9,7 +9,7 @@ use super::{Location, Object, ObjectId, Scalar};
 pub enum Change {
     /// A new object; its number must be fresh ([`super::Model::fresh`]).
     Create(Object),
-    /// The object is gone. Objects located relative to it must be gone or moved before.
+    /// The object is removed. Objects located relative to it must be removed or moved before.
     Delete(ObjectId),
     /// The object is somewhere else.
     Place {
@@ -27,7 +27,7 @@ pub enum Change {
         /// The value.
         value: Scalar,
     },
-    /// The end of the arm rests at this pose (m) in the frame of the workstation. The end effector
-    /// on it is placed by a change of its own ([`super::Model::arm_changes`]).
+    /// The end of the arm rests at this pose (m) in the frame of the workstation. A separate change
+    /// places the end effector on it ([`super::Model::arm_changes`]).
     Arm(Isometry3<f64>),
 }

@@ -116,7 +116,7 @@ fn check_properties(model: &Model, object: &Object, concerns: &mut Concerns) {
         concerns.error(
             "sku",
             &object.name,
-            format!("{property} is {id}, which nobody describes"),
+            format!("{property} is {id}, which has no description"),
         );
     }
 }

@@ -123,7 +123,7 @@ struct VolumeEntry {
 /// Reads a workstation from TOML.
 ///
 /// # Errors
-/// [`PlanError::Import`] with line and column, or what is wrong with which object.
+/// [`PlanError::Import`] with line and column, or with the object and what is wrong with it.
 pub fn import_toml(text: &str) -> Result<Model, PlanError> {
     let file: File = toml::from_str(text).map_err(|e| PlanError::Import(e.to_string()))?;
     model_of(file)
@@ -141,7 +141,7 @@ pub fn import_json(text: &str) -> Result<Model, PlanError> {
 /// Writes the world as TOML that [`import_toml`] reads.
 ///
 /// # Errors
-/// [`PlanError::Import`] for an unknown unit or a reference to nothing.
+/// [`PlanError::Import`] for an unknown unit or a reference to a missing object.
 pub fn export_toml(model: &Model) -> Result<String, PlanError> {
     toml::to_string(&file_of(model)?).map_err(|e| PlanError::Import(e.to_string()))
 }
@@ -190,7 +190,7 @@ fn pose_in(place: &Place, f: Factors, whose: &str) -> Result<Isometry3<f64>, Pla
     }
 }
 
-/// Twelve significant digits: conversions of units leave no dust in files.
+/// Twelve significant digits: conversions of units leave no rounding errors in files.
 fn tidy(value: f64) -> f64 {
     let rounded = format!("{value:.11e}").parse().unwrap_or(value);
     if rounded == 0.0 { 0.0 } else { rounded }

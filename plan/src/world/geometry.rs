@@ -53,7 +53,7 @@ impl Bounds {
     }
 }
 
-/// How far above or below a surface (m) a thing may be put and still count as put on it.
+/// Largest distance (m) above or below a surface at which an object counts as put on it.
 const SUPPORT_SLACK: f64 = 0.01;
 
 impl Model {
@@ -109,7 +109,7 @@ impl Model {
             let Some(shape) = self.shape(object) else {
                 continue;
             };
-            // An object that is only known to be in something is as high as that something.
+            // An object whose place in a container is unknown is as high as the container.
             let Ok(pose) = self.workstation_from(object.id) else {
                 continue;
             };

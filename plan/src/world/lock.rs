@@ -16,9 +16,9 @@ const ATTEMPTS: usize = 100;
 /// An exclusive lock on a world database, held until this value is dropped.
 ///
 /// It is an advisory lock of the operating system on a file beside the database (`world.db-lock`),
-/// so it ends with the process, however that ends. The file says who holds the lock. The lock is
-/// not on the database file itself: closing a second handle of that file would release the locks
-/// that SQLite holds on it.
+/// so it ends with the process, however that ends. The file contains the holder of the lock. The
+/// lock is not on the database file itself: closing a second handle of that file would release the
+/// locks that SQLite holds on it.
 #[derive(Debug)]
 pub(super) struct Lock {
     path: PathBuf,
@@ -26,7 +26,7 @@ pub(super) struct Lock {
 }
 
 impl Lock {
-    /// Takes the lock of the database in `path`, which need not exist yet.
+    /// Locks the database in `path`, which need not exist yet.
     ///
     /// # Errors
     /// [`PlanError::InUse`] when another process or another writer of this one holds it;
@@ -58,7 +58,7 @@ impl Lock {
                 }
                 Err(TryLockError::Error(error)) => return Err(failed(error)),
             }
-            // The holder before this one may have removed the file after it was opened here.
+            // The previous holder may have removed the file after it was opened here.
             if is_at(&file, &path) {
                 introduce(&mut file).map_err(failed)?;
                 return Ok(Self { path, file });
@@ -68,7 +68,7 @@ impl Lock {
         Err(failed(busy))
     }
 
-    /// Whether the lock file is still in its place: without it a second writer would be let in.
+    /// Whether the lock file is still in its place: without it a second writer could start.
     pub(super) fn is_in_place(&self) -> bool {
         is_at(&self.file, &self.path)
     }
@@ -76,7 +76,7 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // A file that stays behind is taken over by the next writer.
+        // A left-over file is reused by the next writer.
         if self.is_in_place() {
             let _ = fs::remove_file(&self.path);
         }
@@ -128,7 +128,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     }
 }
 
-/// Writes into the lock file who holds it: program, subcommand and process id.
+/// Writes the holder into the lock file: program, subcommand and process id.
 fn introduce(file: &mut File) -> io::Result<()> {
     let mut arguments = std::env::args_os();
     let program = arguments.next().map(PathBuf::from).unwrap_or_default();

@@ -262,7 +262,7 @@ impl Model {
     /// workstation): the arm itself and the end effector that it carries.
     ///
     /// # Errors
-    /// [`PlanError::Missing`] without a robot, [`PlanError::Chain`] when nobody knows where it is.
+    /// [`PlanError::Missing`] without a robot, [`PlanError::Chain`] when its place is unknown.
     pub fn arm_changes(&self, pose: &Isometry3<f64>) -> Result<Vec<Change>, PlanError> {
         let mut changes = vec![Change::Arm(*pose)];
         if let Some(effector) = self.effector() {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Class, Location};
 
-/// Number of an object; never used again after the object is gone.
+/// Number of an object; never used again after the object is removed.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]

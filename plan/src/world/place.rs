@@ -17,9 +17,9 @@ pub enum Relation {
     PoseIn,
     /// A pose, and the object is on the reference object.
     PoseOn,
-    /// In the reference object, nobody says where: a chain through this link cannot be computed.
+    /// In the reference object, at an unknown place: a chain through this link cannot be computed.
     In,
-    /// On the reference object, nobody says where: a chain through this link cannot be computed.
+    /// On the reference object, at an unknown place: a chain through this link cannot be computed.
     On,
 }
 

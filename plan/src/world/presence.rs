@@ -12,7 +12,7 @@ type Identity = (u64, u64);
 
 /// The files of an open database: the database and its write-ahead log.
 ///
-/// SQLite goes on with a file that was deleted or replaced, and what it commits is lost. This value
+/// SQLite continues with a file that was deleted or replaced, and its commits are lost. This value
 /// compares what is in the folder with what was there when the database was opened.
 #[derive(Debug)]
 pub(super) struct Presence {
@@ -70,7 +70,8 @@ impl Presence {
         Ok(())
     }
 
-    /// Checks that no other program has written the database file since our last commit.
+    /// Checks that no other program has written the database file since the last commit of this
+    /// process.
     ///
     /// # Errors
     /// [`PlanError::Lost`].

@@ -24,8 +24,8 @@ pub enum Durability {
 /// The one connection that may write the world database.
 ///
 /// As long as it is open no other process can open a second one; readers are free. Before and after
-/// each change it checks that the files of the database are still in their place and that nobody
-/// else has changed them.
+/// each change it checks that the files of the database are still in their place and unchanged by
+/// others.
 #[derive(Debug)]
 pub struct Writer {
     // Closed before the lock is released.
@@ -103,7 +103,7 @@ impl Writer {
         load(&transaction)
     }
 
-    /// Replaces the whole world by `model`; runs in the world that was there are forgotten.
+    /// Replaces the whole world by `model`; runs in the old world are deleted.
     ///
     /// # Errors
     /// [`PlanError::Database`] or [`PlanError::Lost`].

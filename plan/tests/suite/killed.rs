@@ -37,7 +37,7 @@ impl Motion for Slow {
     }
 }
 
-/// Starts the plan in this database, or goes on with it.
+/// Starts the plan in this database, or resumes it.
 fn run(path: &Path, motion: &mut dyn Motion) -> PlanRunReport {
     let source = repository_text("examples/kitting/kit-abc.plan");
     let writer = Writer::open(path, Durability::Process).unwrap();
@@ -99,7 +99,7 @@ fn spawn(path: &Path) -> std::process::Child {
         .unwrap()
 }
 
-/// Killed at 50 moments: the database opens, is consistent, and the run goes on to the same end.
+/// Killed at 50 times: the database opens, is consistent, and the resumed run has the same result.
 #[test]
 fn a_killed_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -170,7 +170,7 @@ fn our_plan_makes_three_kits() {
     assert_three_kits(&result);
 }
 
-/// Twelve kits fill a box; supplies run empty on the way and come again in both ways.
+/// Twelve kits fill a box; supplies run empty meanwhile and are replaced in both ways.
 #[test]
 fn supplies_are_refilled_and_a_box_fills() {
     for trial in [Trial::own(12)] {
@@ -293,7 +293,8 @@ fn no_change_without_its_motion() {
     }
 }
 
-/// A run that the arm failed in goes on where it was, to the same end; one that ended does not.
+/// A run in which the arm failed is resumed where it was, with the same result; one that ended is
+/// not.
 #[test]
 fn a_failed_run_is_resumed() {
     let good = Trial::own(1).run();

@@ -22,7 +22,7 @@ ToDo
   Bind(Box, WORKSTATION, ANY, QUIT)
 ";
 
-/// Statements of a body, one per line; the result is told by what was executed.
+/// Statements of a body, one per line; the result is what was executed.
 fn run(body: &str) -> Result {
     let source = format!("{HEAD}{body}\nStop()\n");
     Trial::new(&source, "examples/kitting/workstation.toml", 3).run()

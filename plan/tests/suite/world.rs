@@ -245,7 +245,7 @@ fn old_databases_are_migrated() {
     assert!(error.to_string().contains("version 99"), "{error}");
 }
 
-/// Chains through relative locations, cycles and missing objects are told apart.
+/// Chains through relative locations, cycles and missing objects are distinguished.
 #[test]
 fn bad_chains_are_refused() {
     let text = r#"
@@ -272,6 +272,6 @@ fn bad_chains_are_refused() {
     assert!(
         errors(&model)
             .iter()
-            .any(|error| error.contains("x, which nobody describes"))
+            .any(|error| error.contains("x, which has no description"))
     );
 }

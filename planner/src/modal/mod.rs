@@ -88,16 +88,16 @@ impl Modal {
         (self.length, self.angle)
     }
 
-    /// Refuses everything but InitCanon from now on; what an aborted program leaves.
+    /// Refuses everything except InitCanon from now on, as after an aborted program.
     pub fn abort(&mut self) {
         self.state = CanonState::Ended;
     }
 
-    /// Turns one command into a task, with the arm's end at
-    /// `workstation_from_flange` when the command starts.
+    /// Turns one command into a task; the arm's end is at `workstation_from_flange` when the
+    /// command starts.
     ///
     /// # Errors
-    /// A [`CommandError`]; the modes are then as before.
+    /// A [`CommandError`]; the modes are then unchanged.
     pub fn resolve(
         &mut self,
         command: &Command,
@@ -365,7 +365,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), ..Default::default() })]
 
-        /// A change of units changes the reading of later numbers and nothing physical.
+        /// A change of units changes how later numbers are read and no physical value.
         #[test]
         fn units_change_nothing_physical(changes in prop::collection::vec(unit_change(), 0..12)) {
             let mut modal = modal();

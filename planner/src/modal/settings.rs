@@ -5,7 +5,7 @@ use crcl::Command;
 use serde::Serialize;
 use trajectory::ToolLimits;
 
-/// Fraction of the maxima that is in force before a program sets its own.
+/// Fraction of the maxima that applies before a program sets another.
 ///
 /// # Source
 /// NIST's KittingViewer (2013) starts at 10 % of both.
@@ -107,7 +107,7 @@ fn positive(what: &str, value: f64, help: &str) -> Result<(), CommandError> {
 }
 
 fn absolute(what: &str, value: f64, maximum: f64, unit: &str) -> Result<f64, CommandError> {
-    // One unit in the last place is a unit conversion, not a wish for more.
+    // An excess of one unit in the last place comes from unit conversion.
     if value > maximum * (1.0 + 4.0 * f64::EPSILON) {
         return Err(CommandError::range(format!(
             "{what} must be at most the robot's {maximum} {unit}, got {value} {unit}"

@@ -6,7 +6,7 @@ use trajectory::timing::Limit;
 /// A limit used to this share is active.
 pub(super) const ACTIVE: f64 = 0.98;
 
-/// A stretch of the move over which one limit decides the speed.
+/// An interval of the move in which one limit is active.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ActiveLimit {
     /// Name of the limit: `tool speed`, `velocity of elbow`, ...
@@ -17,7 +17,7 @@ pub struct ActiveLimit {
     pub end_s: f64,
 }
 
-/// A limit as people call it, with the name of its joint.
+/// The name of a limit for display, with the name of its joint.
 pub(super) fn name(limit: Limit, joints: &[String]) -> String {
     let named = |quantity: &str, joint: usize| match joints.get(joint) {
         Some(name) => format!("{quantity} of {name}"),

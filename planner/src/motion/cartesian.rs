@@ -12,14 +12,14 @@ use trajectory::{
 use super::{Blend, BlockedCause, Draft, MotionError, Planner};
 use crate::task::Move;
 
-/// Longest way of the tool between two solved points, m.
+/// Longest distance of the tool between two solved points, m.
 const STEP_M: f64 = 4e-3;
 /// Largest turn of the tool between two solved points, rad.
 const STEP_RAD: f64 = 0.02;
 /// Largest deviation of the fitted joint path between solved points, m and rad.
 const FIT: f64 = 5e-7;
-/// Share of the time by which a motion may be slowed down as a whole before another time law is
-/// looked for.
+/// Fraction of the time by which a motion may be slowed down uniformly before another time law is
+/// computed.
 const ENOUGH: f64 = 1e-3;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
@@ -50,7 +50,7 @@ impl<const N: usize> Planner<N> {
         let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
         let trajectory = self.finite(timed.trajectory, &points, &|_| 1)?;
         let draft = Draft {
-            // The joints of a seven-joint arm may take another way along the same line.
+            // The joints of a seven-joint arm may take another path along the same line.
             least: if N > 6 {
                 0.0
             } else {
@@ -177,8 +177,8 @@ impl<const N: usize> Planner<N> {
             .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
-    /// Why the way is blocked, or, where the pose ahead is beyond what the arm reaches and the
-    /// tolerance allows, that: no other way would help.
+    /// Why the path is blocked. If the pose ahead is out of reach by more than the tolerance, that
+    /// is the reason: no other path would help.
     #[cold]
     fn blamed(&self, blocked: MotionError, motion: &Move, start: &SVector<f64, N>) -> MotionError {
         let MotionError::Blocked { pose, .. } = &blocked else {
@@ -240,7 +240,7 @@ fn is_still(poses: &[Isometry3<f64>]) -> bool {
     })
 }
 
-/// When a time law that never goes back reaches `u`, s.
+/// The time at which a monotonic time law reaches `u`, s.
 fn moment(law: &Trajectory<1>, u: f64) -> f64 {
     let pieces = law.pieces();
     let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
@@ -259,8 +259,8 @@ fn moment(law: &Trajectory<1>, u: f64) -> f64 {
     law.times()[next.saturating_sub(1)] + high
 }
 
-/// A curve of the tool, whether it rests at both ends in its own parameter, and the
-/// pose of the command that a parameter is on the way to.
+/// A curve of the tool, whether it is at rest at both ends in its own parameter, and the next pose
+/// of the command after a parameter.
 struct Way<'a> {
     curve: &'a dyn ToolCurve,
     still_ends: bool,
@@ -333,7 +333,7 @@ fn steps_between(curve: &dyn ToolCurve, from: f64, to: f64) -> usize {
     (steps as usize).clamp(1, 100_000)
 }
 
-/// The grid with a point more in each interval where the fit leaves the curve.
+/// The grid with one more point in each interval in which the fit leaves the curve.
 fn refined<const N: usize>(
     chain: &Chain<N>,
     points: &[FollowPoint<N>],

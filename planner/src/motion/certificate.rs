@@ -29,15 +29,15 @@ pub struct CrossingReport {
     pub time_s: f64,
 }
 
-/// Peak of each limited quantity, divided by its limit: bounds for all times, and at most a
-/// hundredth above what is reached. 0 where there is no limit.
+/// Peak of each limited quantity, divided by its limit: bounds for all times, at most one percent
+/// above the largest value. 0 if there is no limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peaks {
-    /// Joint velocity, one a joint.
+    /// Joint velocity, one per joint.
     pub joint_velocity: Vec<f64>,
-    /// Joint acceleration, one a joint.
+    /// Joint acceleration, one per joint.
     pub joint_acceleration: Vec<f64>,
-    /// Joint jerk, one a joint.
+    /// Joint jerk, one per joint.
     pub joint_jerk: Vec<f64>,
     /// Speed of the controlled point.
     pub tool_speed: f64,
@@ -105,11 +105,11 @@ pub struct LimitReport {
 pub struct MoveCertificate {
     /// Time of the move, s.
     pub duration_s: f64,
-    /// No move through the same poses to the same joints within the limits is
-    /// shorter, s.
+    /// Lower bound of the time of all moves through the same poses to the same joints within the
+    /// limits, s.
     pub lower_bound_s: f64,
-    /// Which limit decides the speed when; where none does, the tolerance of
-    /// poses or the change from one limit to the next.
+    /// The intervals in which limits are active. Where none is, the tolerance of poses or the
+    /// change from one limit to the next limits the speed.
     pub active: Vec<ActiveLimit>,
     /// Every intermediate pose, in the order of the command.
     pub poses: Vec<CrossingReport>,
@@ -117,13 +117,13 @@ pub struct MoveCertificate {
     pub in_order: bool,
     /// Peaks of limits as ratios; at most 1.
     pub peaks: Peaks,
-    /// The same with the time at which each is attained; every finite limit.
+    /// The peaks of all finite limits, with the time at which each is attained.
     pub limits: Vec<LimitReport>,
     /// Bound of the distance from the straight line at all times, m; only for straight moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub straightness_m: Option<f64>,
-    /// Bound of the distance from the leg travelled at all times, m; only for smooth moves. At
-    /// most the tolerance; well within it, it need not be near to what is reached.
+    /// Bound of the distance from the leg travelled at all times, m; only for smooth moves. At most
+    /// the tolerance; if it is well within the tolerance, it need not be tight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub corridor_m: Option<f64>,
     /// Distance from the last pose at the end, m.
@@ -134,7 +134,7 @@ pub struct MoveCertificate {
     pub joint_margin: f64,
 }
 
-/// The kinematics of an arm, for bounds of what its tool does.
+/// The kinematics of an arm, for bounds of its tool's motion.
 pub(super) struct Arm<'a, const N: usize>(pub &'a Chain<N>);
 
 impl<const N: usize> JointsToTool<N> for Arm<'_, N> {
@@ -153,7 +153,7 @@ impl<const N: usize> JointsToTool<N> for Arm<'_, N> {
     }
 }
 
-/// The way the tool takes, held against the poses of the command.
+/// The path of the tool, compared with the poses of the command.
 pub(super) struct Way {
     pub poses: Vec<CrossingReport>,
     pub in_order: bool,
@@ -163,7 +163,7 @@ pub(super) struct Way {
     pub end_angle_rad: f64,
 }
 
-/// `start` is where the arm stands before the move.
+/// `start` is the joint position before the move.
 pub(super) fn way<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
@@ -199,7 +199,7 @@ pub(super) fn corridor(motion: &Move) -> f64 {
     (motion.tolerance + FIT).max(super::STRAIGHT)
 }
 
-/// How far the joints may leave the planned way, m.
+/// How far the joints may leave the planned path, m.
 const FIT: f64 = 1e-6;
 
 /// The legs of a smooth move, from pass to pass.
@@ -218,9 +218,9 @@ fn legs(motion: &Move, start: &Isometry3<f64>, crossings: &[CrossingReport]) -> 
         .collect()
 }
 
-/// How each intermediate pose is passed at the time known from the planned way, which is that of
-/// the closest approach. Where the joints leave the planned way by the last digits, and with them
-/// the ball, the closest moment near that time counts.
+/// How each intermediate pose is passed at the time of its closest approach in the planned path. If
+/// the joints leave the planned path, and so the ball, by rounding, the closest time near it
+/// counts.
 fn crossings<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
@@ -297,15 +297,15 @@ fn holds(pass: &CrossingReport, since: f64) -> bool {
         && pass.angle_rad <= pass.angular_tolerance_rad.max(EXACT_ANGLE)
 }
 
-/// What counts as exact where the tolerance is zero, m: a hundredth of the
-/// repeatability of the best arms.
+/// Distance that counts as exact if the tolerance is zero, m: a hundredth of the repeatability of
+/// the best arms.
 const EXACT: f64 = 2e-7;
 /// The same of an orientation, rad.
 const EXACT_ANGLE: f64 = 1e-6;
-/// How near to the planned time of a pass the joints pass the pose, s.
+/// Largest difference between the planned time of a pass and that of the joints, s.
 const NEAR: f64 = 2e-3;
 
-/// Least value of a function with one valley between two times, by golden section.
+/// Minimum of a unimodal function between two times, by golden section.
 fn closest((mut low, mut high): (f64, f64), distance: impl Fn(f64) -> f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let mut left = high - GOLDEN * (high - low);

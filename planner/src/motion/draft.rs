@@ -2,7 +2,7 @@
 
 use trajectory::{MotionBounds, Trajectory};
 
-/// A motion of the joints with what is known of it.
+/// A motion of the joints, with the data known about it.
 #[derive(Clone, Debug)]
 pub(super) struct Draft<const N: usize> {
     /// The motion.
@@ -11,7 +11,7 @@ pub(super) struct Draft<const N: usize> {
     pub crossings: Vec<f64>,
     /// Its bounds, once they were computed: then it keeps every limit.
     pub bounds: Option<MotionBounds<N>>,
-    /// No motion along its way is shorter, s; 0 where that is not known.
+    /// Lower bound of the time along its path, s; 0 if not known.
     pub least: f64,
 }
 
@@ -26,10 +26,10 @@ impl<const N: usize> Draft<N> {
         }
     }
 
-    /// The motion and its bounds, slowed down where they exceed a limit.
+    /// The motion and its bounds, slowed down if they exceed a limit.
     pub(super) fn bounded(self, bounds: MotionBounds<N>) -> (Self, MotionBounds<N>) {
         let slower = bounds.slower() * (1.0 + 1e-12);
-        // What is not a number is left to the certificate to refuse.
+        // The certificate refuses NaN.
         if slower.is_nan() || slower <= 1.0 + 1e-12 || self.trajectory.duration() <= 0.0 {
             return (self, bounds);
         }

@@ -6,8 +6,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A joint jumps between two pieces, or from where the arm stands.
-    #[error("piece {piece} begins {jump:.1e} from where the arm is")]
+    /// A joint position jumps between two pieces, or from the start.
+    #[error("piece {piece} begins {jump:.1e} away from the position of the arm")]
     Position {
         /// The piece that begins elsewhere.
         piece: usize,

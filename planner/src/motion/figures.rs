@@ -1,7 +1,7 @@
 //! Numbers as messages show them.
 
-/// A number with so many decimals, and with more where these would all be zero: a small amount is
-/// not called 0.
+/// A number with this many decimals, or more if these would all be zero: a small amount is not
+/// shown as 0.
 pub(super) fn figures(value: f64, decimals: usize) -> String {
     let size = value.abs();
     if size >= 1e12 {

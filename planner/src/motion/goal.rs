@@ -12,13 +12,13 @@ use crate::task::Move;
 
 /// How many configurations are planned in full, the most promising first.
 const TRIED: usize = 4;
-/// Values of the free parameter of a seven-joint arm that are looked at.
+/// Number of values of the free parameter of a seven-joint arm that are tried.
 const SWEEP: usize = 48;
-/// Configurations of a seven-joint arm count as one when no joint differs by more, rad.
+/// Configurations of a seven-joint arm count as equal if no joint differs by more, rad.
 const ALIKE: f64 = 0.3;
-/// Distance from a limit, rad, from which a seven-joint arm moves on with ease.
+/// Distance from a limit, rad, from which a seven-joint arm can move on well.
 const ROOM: f64 = 0.35;
-/// Smallest singular value (lengths in units of 0.3 m) from which it does.
+/// Smallest singular value (lengths in units of 0.3 m) from which it can move on well.
 const NIMBLE: f64 = 0.15;
 
 impl<const N: usize> Planner<N> {
@@ -86,15 +86,15 @@ impl<const N: usize> Planner<N> {
         Ok(goals)
     }
 
-    /// Time for the slowest joint at constant velocity, s: cheap, and a good order. Longer
-    /// for goals from which the arm would not move on with ease.
+    /// Time for the slowest joint at constant velocity, s: quick to compute, and a good order.
+    /// Longer for goals from which the arm cannot move on well.
     fn time_estimate(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
         let way = (goal - start).abs().component_div(&self.limits.velocity);
         way.max() / self.ease(goal)
     }
 
-    /// How well a seven-joint arm can move on from a configuration: 1 well, towards 0 at a
-    /// limit or a singular pose, which its spare joint could have avoided. 1 for other arms.
+    /// How well a seven-joint arm can move on from a configuration: 1 is well, near 0 at a limit or
+    /// a singular pose. 1 for other arms.
     fn ease(&self, q: &SVector<f64, N>) -> f64 {
         if N <= 6 {
             return 1.0;
@@ -107,7 +107,7 @@ impl<const N: usize> Planner<N> {
         (room / ROOM).min(smallest / NIMBLE).clamp(1e-3, 1.0)
     }
 
-    /// The fastest way in joint space that keeps every limit of joints and tool.
+    /// The fastest motion in joint space that keeps every limit of joints and tool.
     pub(super) fn joint_move(
         &self,
         motion: &Move,
@@ -120,8 +120,8 @@ impl<const N: usize> Planner<N> {
         if free.trajectory.duration() <= alone {
             return Ok(free);
         }
-        // The tool is too fast: either everything slower, or a line in joint
-        // space that is slow only where the tool is fast.
+        // The tool is too fast: the faster of two is used, the whole motion slowed down, or a line
+        // in joint space that is slow only where the tool is fast.
         match self.timed_line(motion, start, goal) {
             Ok(line) => {
                 let line = self.slowed(Draft::of(line), motion);
@@ -163,7 +163,7 @@ impl<const N: usize> Planner<N> {
         Ok(time_path(&line, &self.limits, &motion.limits, &options)?.trajectory)
     }
 
-    /// The report of the solver in the words of a command.
+    /// The report of the solver as an error of the command.
     pub(super) fn refusal(&self, pose: usize, report: &IkReport<N>) -> MotionError {
         match report.failure {
             IkFailure::OutOfReach { distance } => MotionError::OutOfReach {

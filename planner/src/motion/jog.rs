@@ -1,5 +1,5 @@
-//! Moves by hand: as far as the arm can go in a direction, at a share of its speed. Whoever jogs
-//! ends the move before its end; so jogging has the same limits, path and guard as any move.
+//! Jogging: a move in one direction, as far as the arm can go, at a fraction of its speed. It is
+//! stopped before its end, so jogging has the same limits, path and guard as any move.
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use trajectory::ToolLimits;
@@ -7,21 +7,21 @@ use trajectory::ToolLimits;
 use super::{JogRefusal, MotionError, PlannedMove, Planner};
 use crate::task::{Move, Shape};
 
-/// The farthest that one jog goes: of the tool in m, of the tool and of a joint in rad.
+/// Longest jog: of the tool in m, of the tool and of a joint in rad.
 const FAR: (f64, f64, f64) = (1.0, 1.5, 3.0);
 /// The nearest that is worth a move, m or rad.
 const NEAR: f64 = 1e-4;
 /// Distance kept from the end of a joint's range, rad or m.
 const MARGIN: f64 = 1e-3;
-/// How often a way that is blocked is tried shorter.
+/// How often a blocked path is tried with a shorter length.
 const TRIES: usize = 8;
 
-/// Where to jog, as shares of the largest speeds, -1..=1.
+/// The direction of a jog, as fractions of the largest speeds, -1..=1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Direction<const N: usize> {
     /// Each joint by itself, all in proportion.
     Joints(SVector<f64, N>),
-    /// The controlled point along and about its own axes.
+    /// Along and about the axes of the controlled point.
     Tool {
         /// Along x, y, z.
         linear: Vector3<f64>,
@@ -123,7 +123,7 @@ impl<const N: usize> Planner<N> {
             };
             match self.plan(&motion, start) {
                 Ok(planned) => return Ok(planned),
-                // Nearly as far as it goes, or half of it where that is not known.
+                // Nearly as far as possible, or half the length if that is not known.
                 Err(error) => {
                     time *= match &error {
                         MotionError::Blocked { percent, .. } => (percent * 0.0098).min(0.98),
@@ -151,8 +151,8 @@ mod tests {
         (controller.planner().clone(), home, robot.motion_limits())
     }
 
-    /// All joints that jog keep the proportion asked for, at their shares of the speed, up to the
-    /// end of the first range.
+    /// All joints move in the proportion asked for, at their fractions of the speed, until the
+    /// first reaches the end of its range.
     #[test]
     fn joints_go_to_the_end_of_the_range_in_proportion() {
         let (planner, home, most) = ur5e();
@@ -170,14 +170,14 @@ mod tests {
             assert!(peaks.velocity[joint].abs() <= allowed + 1e-9);
             assert!((limits.lower[joint]..=limits.upper[joint]).contains(&planned.end[joint]));
         }
-        // Once there, there is no way on.
+        // At the end, no further jog is possible.
         let on = planner.jog(&Direction::Joints(shares), &planned.end, &most);
         let at_the_end = |error| matches!(error, MotionError::Jog(JogRefusal::EndOfRange { .. }));
         assert!(on.map_or_else(at_the_end, |_| true));
     }
 
-    /// The tool goes straight along its own axis, as far as the arm reaches; again and again from
-    /// where it came to, it ends with a refusal that says why.
+    /// The tool moves straight along its own axis, as far as the arm reaches; repeated from there,
+    /// the jog ends with an error that says why.
     #[test]
     fn the_tool_goes_straight_as_far_as_it_can() {
         let (planner, home, most) = ur5e();

@@ -9,8 +9,8 @@ use super::draft::Draft;
 use crate::task::{Move, Shape};
 
 impl<const N: usize> Planner<N> {
-    /// No motion between the same ends within the limits is shorter, s: of each joint alone, of
-    /// the tool alone through the poses, and of what is known of the way.
+    /// Lower bound of the time of all motions between the same ends within the limits, s: from each
+    /// joint alone, from the tool alone through the poses, and from the known path.
     pub(super) fn least_time(
         &self,
         motion: &Move,
@@ -22,7 +22,7 @@ impl<const N: usize> Planner<N> {
         poses.extend_from_slice(&motion.poses);
         let mut options = SmoothOptions::new(motion.tolerance, motion.limits);
         match motion.shape {
-            // Any way will do.
+            // Any path is allowed.
             Shape::Joint => options.corridor = Some(f64::INFINITY),
             Shape::Straight => options.tolerance = 0.0,
             Shape::Smooth => {}
@@ -40,7 +40,7 @@ impl<const N: usize> Planner<N> {
         least.min(draft.trajectory.duration())
     }
 
-    /// The least time of the joint that needs most from rest to rest, s.
+    /// The least time from rest to rest of the slowest joint, s.
     fn least_of_joints(&self, start: &SVector<f64, N>, end: &SVector<f64, N>) -> f64 {
         let (way, limits) = ((end - start).abs(), self.limits());
         let time = |j: usize| {

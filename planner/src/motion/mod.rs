@@ -1,7 +1,7 @@
-//! From a self-contained move and a start at rest to a certified trajectory.
+//! Plans a certified trajectory for a self-contained move from a start at rest.
 //!
-//! The planner is a pure function: the same move, arm and start give the same
-//! bytes. The dry run, the real run and the benchmarks call it alike.
+//! The planner is a pure function: the same move, arm and start give the same bytes. The dry run,
+//! the real run and the benchmarks all call it.
 
 mod active;
 mod blocked_cause;
@@ -39,8 +39,8 @@ use crate::task::{Move, Shape};
 /// Joint ratios may exceed 1 by rounding only.
 const ROUNDING: f64 = 1e-9;
 
-/// A move that may be executed: its trajectory, its certificate and how the
-/// smooth path came about.
+/// A move that may be executed: its trajectory, its certificate and how its smooth path was
+/// planned.
 #[derive(Clone, Debug)]
 pub struct PlannedMove<const N: usize> {
     /// Joints against time, rest to rest.
@@ -49,11 +49,11 @@ pub struct PlannedMove<const N: usize> {
     pub certificate: MoveCertificate,
     /// Joints at the end, at rest.
     pub end: SVector<f64, N>,
-    /// For a smooth move: how its way was found.
+    /// For a smooth move: how its path was planned.
     pub blend: Option<Blend>,
 }
 
-/// How the way of a smooth move was found.
+/// How the path of a smooth move was planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
     /// Radius of the balls it was planned for, m: at most that of the command.
@@ -118,8 +118,8 @@ impl<const N: usize> Planner<N> {
     /// Plans a move from `start`, at rest; checks all of it before it returns.
     ///
     /// # Errors
-    /// [`MotionError`] when any part of the move cannot be made; then nothing
-    /// of it may be executed.
+    /// [`MotionError`] when any part of the move is not possible; then nothing of it may be
+    /// executed.
     pub fn plan(
         &self,
         motion: &Move,
@@ -128,11 +128,11 @@ impl<const N: usize> Planner<N> {
         (self.kernel.plan)(self, motion, start)
     }
 
-    /// Plans the way from `start`, at rest, as far as the arm can go in a direction, within the
+    /// Plans a path from `start`, at rest, as far as the arm can go in a direction, within the
     /// limits `most` of the controlled point.
     ///
     /// # Errors
-    /// [`MotionError`] when it cannot go in that direction at all.
+    /// [`MotionError`] when it cannot move in that direction at all.
     pub fn jog(
         &self,
         direction: &Direction<N>,
@@ -171,9 +171,9 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The smooth motion in the tolerance asked for; where its certificate fails after
-    /// the joints are taken into account, in a quarter of it, and at last with a stop at each pose.
-    /// Never slower than with a stop at each pose.
+    /// The smooth motion within the tolerance asked for. If its certificate with the joints fails,
+    /// a quarter of the tolerance is tried, then a stop at each pose. Never slower than with a stop
+    /// at each pose.
     fn smooth_move(
         &self,
         motion: &Move,
@@ -209,7 +209,7 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// Proves what the command asked for of a motion that keeps the limits.
+    /// Proves that a motion within the limits does what the command asked for.
     fn certify(
         &self,
         motion: &Move,
@@ -217,7 +217,7 @@ impl<const N: usize> Planner<N> {
         draft: Draft<N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         if draft.trajectory.pieces().is_empty() {
-            // Nothing to do: the arm is there. What is proved is that standing still is right.
+            // Nothing to do: the arm is there. The certificate is that of a motion at rest.
             let still = Trajectory::new(vec![realtime::Piece::hold(*start, 0.0)]);
             let crossings = draft.crossings.clone();
             let still = Draft {
@@ -243,7 +243,7 @@ impl<const N: usize> Planner<N> {
         })
     }
 
-    /// What holds of a motion from one place to another.
+    /// The certificate of a motion from one pose to another.
     fn certificate(
         &self,
         motion: &Move,
@@ -330,7 +330,7 @@ impl<const N: usize> Planner<N> {
         below.min(above)
     }
 
-    /// A joint as a message calls it: by its name, with the word joint in it.
+    /// The name of a joint for messages, with the word joint.
     fn joint_name(&self, joint: usize) -> String {
         match self.joint_names.get(joint) {
             Some(name) if name.to_lowercase().contains("joint") => name.clone(),
@@ -339,7 +339,7 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// A joint quantity (rad or m) with its unit.
+    /// A joint quantity with its unit, for messages.
     fn amount(&self, joint: usize, value: f64) -> JointAmount {
         match self.chain().prismatic().get(joint) {
             Some(true) => JointAmount::Length(value),
@@ -351,8 +351,8 @@ impl<const N: usize> Planner<N> {
 /// Largest jump of a joint between two pieces, and from the start, rad or m.
 const JUMP: f64 = 1e-9;
 
-/// Position may not jump anywhere, and nothing may move at either end; velocity
-/// and acceleration follow from the limits of the pieces.
+/// Positions must not jump, and both ends must be at rest; velocity and acceleration follow from
+/// the limits of the pieces.
 fn check_smooth<const N: usize>(
     trajectory: &Trajectory<N>,
     start: &SVector<f64, N>,
@@ -381,10 +381,10 @@ fn check_smooth<const N: usize>(
 const STRAIGHT: f64 = 1e-5;
 /// Largest distance and angle from the last pose, m and rad.
 const ARRIVED: (f64, f64) = (1e-6, 1e-6);
-/// Largest error of the place of the tool in bounds of its way, m.
+/// Largest error of the tool's position in bounds of its path, m.
 const PLACE: f64 = 1e-7;
 
-/// Whether a certificate says what the command asked for.
+/// Checks that a certificate proves what the command asked for.
 fn check(certificate: &MoveCertificate, motion: &Move) -> Result<(), Fault> {
     let broken = |ratio: f64| ratio.is_nan() || ratio > 1.0 + ROUNDING;
     if let Some(worst) = certificate.limits.iter().find(|limit| broken(limit.ratio)) {

@@ -53,32 +53,32 @@ pub enum MotionError {
         /// Orientation error of the nearest configuration found, degrees.
         degrees: f64,
     },
-    /// The way to the pose leaves what the arm can do.
+    /// The arm cannot follow the path to the pose.
     #[error(
-        "the way cannot be followed at {percent:.1} % of its length, towards pose {pose}: {cause}"
+        "the path cannot be followed at {percent:.1} % of its length, towards pose {pose}: {cause}"
     )]
     Blocked {
-        /// Pose that the arm was on its way to.
+        /// Pose that the path leads to.
         pose: usize,
-        /// Where on the way, percent of the path parameter.
+        /// Where on the path, percent of the path parameter.
         percent: f64,
-        /// What is in the way.
+        /// What blocks the path.
         cause: BlockedCause,
     },
-    /// There is no way in the direction of a jog.
+    /// The arm cannot move in the direction of a jog.
     #[error("{0}")]
     Jog(#[from] JogRefusal),
     /// The smooth path could not be made.
     #[error("no smooth path: {0}")]
     Smooth(#[from] SmoothError),
-    /// No time law could be made along the way.
+    /// No time law was found for the path.
     #[error("the motion cannot be timed: {0}")]
     Timing(#[from] TimingError),
-    /// No motion from joints to joints could be made.
+    /// No motion between the joint positions could be planned.
     #[error("the motion cannot be timed: {0}")]
     PointToPoint(#[from] OtgError),
-    /// The way of the joints has fewer than two points.
-    #[error("the motion cannot be timed: its way has fewer than two points")]
+    /// The joint path has fewer than two points.
+    #[error("the motion cannot be timed: its path has fewer than two points")]
     NoWay,
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]

@@ -5,15 +5,15 @@ use crate::task::{Move, Shape};
 use nalgebra::SVector;
 
 impl<const N: usize> Planner<N> {
-    /// Refuses a straight or smooth move with a pose that lies beyond the ball of reach, before
-    /// any curve is laid: a curve of kilometres would be followed in steps of millimetres. A joint
-    /// move lays no curve and is refused by the inverse kinematics, with the same words.
+    /// Refuses a straight or smooth move with a pose outside the ball of reach, before a curve is
+    /// planned: a curve of kilometres would be followed in steps of millimetres. A joint move has
+    /// no curve; the inverse kinematics refuses it with the same message.
     ///
-    /// An intermediate pose may be missed by the tolerance, but not by more than the radius of the
-    /// ball: a larger tolerance brings the arm no nearer.
+    /// An intermediate pose may be out of reach by the tolerance, but by no more than the radius of
+    /// the ball: a larger tolerance does not help.
     ///
     /// # Errors
-    /// What the inverse kinematics says about the first such pose.
+    /// The error of the inverse kinematics for the first such pose.
     pub(super) fn check_reach(
         &self,
         motion: &Move,
@@ -31,7 +31,7 @@ impl<const N: usize> Planner<N> {
             } else {
                 0.0
             };
-            // Written so that a distance that is no number is refused too.
+            // Written so that NaN is refused too.
             let inside = distance <= radius + slack + ROUNDING_M;
             if inside {
                 continue;
@@ -48,5 +48,5 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// How far beyond the ball rounding may put a pose, m.
+/// Tolerance of the ball's radius for rounding, m.
 const ROUNDING_M: f64 = 1e-9;

@@ -7,9 +7,9 @@ use trajectory::Trajectory;
 use super::{BlockedCause, MotionError, Planner};
 
 impl<const N: usize> Planner<N> {
-    /// Gives the trajectory back when all its numbers are finite. Next to a singular pose the
-    /// derivatives of the joints along the path grow until nothing can be computed with them; the
-    /// refusal then names the point of the path that is nearest to one.
+    /// Returns the trajectory if all its numbers are finite. Next to a singular pose the
+    /// derivatives of the joints along the path become too large to compute with; the error then
+    /// names the point of the path that is nearest to the singular pose.
     ///
     /// # Errors
     /// [`MotionError::Blocked`].

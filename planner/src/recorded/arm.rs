@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::robot::{JointLimits, Robot};
 
-/// Joints, frames and limits of an arm whose base stands in the workstation.
+/// Joints, frames and limits of an arm with its base in the workstation.
 pub(super) struct Arm<'a> {
     workstation_from_base: Isometry3<f64>,
     joints: Vec<Joint>,
@@ -123,7 +123,7 @@ impl<'a> Arm<'a> {
         state.carried(&(self.last_from_flange * flange_from_tool))
     }
 
-    /// How far the controlled point moves at most for each radian or metre of each joint, m.
+    /// Largest distance of the controlled point per radian or metre of each joint, m.
     pub(super) fn levers(&self, flange_from_tool: &Isometry3<f64>) -> Vec<f64> {
         let end = self.last_from_flange * flange_from_tool;
         let mut beyond = end.translation.vector.norm();
@@ -137,8 +137,8 @@ impl<'a> Arm<'a> {
         levers
     }
 
-    /// Largest move (m) and turn (rad) of the controlled point when each joint moves by at most
-    /// what `by` says.
+    /// Largest distance (m) and rotation (rad) of the controlled point if each joint moves by at
+    /// most its entry in `by`.
     pub(super) fn spread(&self, levers: &[f64], by: impl Fn(usize) -> f64) -> (f64, f64) {
         let (mut way, mut turn) = (0.0, 0.0);
         for (index, joint) in self.joints.iter().enumerate() {

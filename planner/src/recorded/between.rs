@@ -3,7 +3,7 @@
 
 use crate::robot::JointLimits;
 
-/// How far a joint can get from rest, or have left before rest, within `time` (s): position,
+/// How far a joint can move from rest, or before coming to rest, within `time` (s): position,
 /// velocity, acceleration.
 pub(super) fn from_rest(limits: &JointLimits, joint: usize, time: f64) -> [f64; 3] {
     let (velocity, acceleration, jerk) = (

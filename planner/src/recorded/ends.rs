@@ -30,9 +30,9 @@ pub(super) fn start(recording: &Recording<'_>, report: &mut RuleReport) {
     }
 }
 
-/// The last row of a move: the move ends before the next row, so this one may be as far from rest
-/// and from the goal as the joints can stop from until then. Where the arm rests at the next row, it
-/// rests in the goal.
+/// The last row of a move. The move ends before the next row, so here the joints may be as far from
+/// rest and from the goal as they can still stop in until then. If the arm rests at the next row,
+/// it rests at the goal.
 pub(super) fn end(
     recording: &Recording<'_>,
     span: &Span<'_>,
@@ -42,7 +42,7 @@ pub(super) fn end(
     let Some(goal) = motion.poses.last() else {
         return;
     };
-    // Without rows of its own a move is over within a period after the row before it.
+    // A move without rows ends within a period after the row before it.
     let last = if span.own.is_empty() {
         span.own.start.saturating_sub(1)
     } else {

@@ -14,7 +14,7 @@ pub enum Side {
     AtLeast,
 }
 
-/// A number that was found and the limit that it is held against, in one unit.
+/// A value and its limit, in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measure {
     /// What was found.
@@ -44,7 +44,7 @@ impl Measure {
         }
     }
 
-    /// Whether the value is on the right side; what is not a number never is.
+    /// Whether the value is on the right side of the limit; NaN never is.
     pub(super) fn holds(&self) -> bool {
         match self.side {
             Side::AtMost => self.value <= self.limit,
@@ -131,7 +131,7 @@ impl std::fmt::Display for Finding {
     }
 }
 
-/// What was found so far: for each rule and subject the worst.
+/// The findings so far: for each rule and subject the worst.
 #[derive(Debug, Default)]
 pub(super) struct RuleReport {
     findings: Vec<Finding>,
@@ -150,7 +150,7 @@ impl RuleReport {
         }
     }
 
-    /// Holds a number against a rule at a time (s); tells whether it holds.
+    /// Checks a number against a rule at a time (s); returns whether it holds.
     pub(super) fn hold(
         &mut self,
         rule: Rule,
@@ -182,7 +182,7 @@ impl RuleReport {
         false
     }
 
-    /// A command that may not be executed where it stands.
+    /// Adds a command that may not be executed at its place in the program.
     pub(super) fn refuse(&mut self, reason: String, time_s: f64) {
         let subject = Subject::The("the command");
         let measure = Measure::at_most(f64::NAN, f64::NAN, "");

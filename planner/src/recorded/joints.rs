@@ -4,7 +4,7 @@ use super::finding::{Measure, RuleReport, Subject};
 use super::rule::Rule;
 use super::span::{Recording, Span};
 
-/// Ratios to a limit up to this pass: finite arithmetic on both sides.
+/// Largest accepted ratio to a limit: tolerance for rounding on both sides.
 pub(super) const ALLOWED: f64 = 1.0 + 1e-9;
 
 /// Rounding of positions, velocities and accelerations where pieces of a motion meet.
@@ -35,11 +35,11 @@ pub(super) fn limits(recording: &Recording<'_>, span: &Span<'_>, report: &mut Ru
 
 /// Each sample against the one before it.
 ///
-/// A motion of bounded jerk leads from one sample to the next just if the three weighted means of
-/// its jerk are possible. With `y` from 1 at the one to 0 at the other, the weights are 1 for the
-/// acceleration, `h (y - 1/2)` for the velocity and `h^2 (y^2 - y + 1/6) / 2` for the position:
-/// the errors of the trapezoid rule without and with its first correction. Their integrals are
-/// `h`, `h^2 / 4` and `sqrt(3) / 54 h^3`.
+/// A motion of bounded jerk leads from one sample to the next if and only if three weighted means
+/// of its jerk are possible. With `y` from 1 at the one to 0 at the other, the weights are 1 for
+/// the acceleration, `h (y - 1/2)` for the velocity and `h^2 (y^2 - y + 1/6) / 2` for the position:
+/// the errors of the trapezoid rule without and with its first correction. Their integrals are `h`,
+/// `h^2 / 4` and `sqrt(3) / 54 h^3`.
 ///
 /// # Source
 /// Trapezoid rule and Euler-Maclaurin correction: P. Davis, P. Rabinowitz, Methods of Numerical

@@ -39,10 +39,10 @@ use arm::Arm;
 use finding::RuleReport;
 use span::{Recording, Span};
 
-/// Holds recorded rows against the program they came from.
+/// Checks recorded rows against their program.
 ///
 /// Rows are in the order of time; a command's rows follow the last row of the command before it.
-/// Recordings of runs that were paused or slowed down are judged like any other.
+/// Recordings of runs that were paused or slowed down are checked like any other.
 #[must_use]
 pub fn verify_program(
     robot: &Robot,
@@ -84,7 +84,7 @@ pub fn verify_program(
     verdict
 }
 
-/// The period of rows that can be judged at all: every number finite, times growing.
+/// The period of rows that can be checked: every number finite, times growing.
 fn readable(robot: &Robot, rows: &[RecordedSample], report: &mut RuleReport) -> Option<f64> {
     if let Some(bad) = rows.iter().find(|row| !row.is_sound(robot.dof())) {
         let measure = Measure::at_most(f64::NAN, f64::MAX, "");
@@ -99,7 +99,7 @@ fn readable(robot: &Robot, rows: &[RecordedSample], report: &mut RuleReport) -> 
     time::period(rows, report)
 }
 
-/// Holds one command against every rule that applies to it.
+/// Checks one command against every rule that applies to it.
 fn command(recording: &Recording<'_>, span: &Span<'_>, mut report: RuleReport) -> CommandVerdict {
     let mut verdict = CommandVerdict {
         index: span.index,
@@ -171,8 +171,8 @@ fn moved(
         .extend(ends::last_pass(recording, span, motion));
 }
 
-/// How long a command that moves nothing takes at least, s. In a run a tool is done when its
-/// driver says so.
+/// The least time of a command that moves nothing, s. In a run a tool is done when its driver says
+/// so.
 fn least_time(recording: &Recording<'_>, span: &Span<'_>, task: &Task) -> Option<f64> {
     match task {
         Task::Dwell { seconds } => Some(*seconds),

@@ -21,7 +21,7 @@ pub struct RecordedSample {
     pub run: Option<RunColumns>,
 }
 
-/// The columns that a run has beside those of a plan.
+/// The columns that a run has in addition to those of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunColumns {
     /// Planned time since the start of the command, s.
@@ -59,5 +59,5 @@ impl RecordedSample {
     }
 }
 
-/// Joint velocities and accelerations up to this are rest: rounding.
+/// Joint velocities and accelerations up to this count as rest (rounding).
 const REST: f64 = 1e-9;

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-/// A rule that a recorded motion is held against.
+/// A rule that a recorded motion is checked against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Rule {
@@ -106,8 +106,8 @@ impl Rule {
         self.words().1
     }
 
-    /// Whether it is a limit of joint or tool motion, so that the ratio to it tells how much of it
-    /// was used.
+    /// Whether it is a limit of joint or tool motion, with a ratio that tells how much of it was
+    /// used.
     pub(super) fn is_limit(self) -> bool {
         matches!(
             self,
@@ -148,11 +148,11 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "joint-velocity",
-        "no joint velocity is beyond the limit of the joint",
+        "no joint velocity is above the limit of the joint",
     ),
     (
         "joint-acceleration",
-        "no joint acceleration is beyond the limit of the joint",
+        "no joint acceleration is above the limit of the joint",
     ),
     (
         "joint-jerk",
@@ -168,27 +168,27 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "tool-speed",
-        "the controlled point is not faster than the speed in force",
+        "the controlled point is not faster than the speed that applies",
     ),
     (
         "tool-acceleration",
-        "the controlled point does not accelerate more than the acceleration in force; not held while a run changes its speed along the path",
+        "the acceleration of the controlled point is not above the one that applies; not checked while a run changes its speed along the path",
     ),
     (
         "tool-jerk",
-        "between two samples the acceleration of the controlled point changes by no more than the robot's jerk limit times h; not held while a run changes its speed along the path",
+        "between two samples the acceleration of the controlled point changes by no more than the robot's jerk limit times h; not checked while a run changes its speed along the path",
     ),
     (
         "angular-speed",
-        "the tool does not turn faster than the angular speed in force",
+        "the tool does not turn faster than the angular speed that applies",
     ),
     (
         "angular-acceleration",
-        "the angular acceleration of the tool is not beyond the one in force; not held while a run changes its speed along the path",
+        "the angular acceleration of the tool is not above the one that applies; not checked while a run changes its speed along the path",
     ),
     (
         "angular-jerk",
-        "between two samples the angular acceleration of the tool changes by no more than the robot's angular jerk limit times h; not held while a run changes its speed along the path",
+        "between two samples the angular acceleration of the tool changes by no more than the robot's angular jerk limit times h; not checked while a run changes its speed along the path",
     ),
     (
         "standstill",
@@ -196,7 +196,7 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "duration",
-        "a Dwell takes at least its time, and in a plan a gripper or tool changer its nominal time, as far as samples h apart can tell",
+        "a Dwell takes at least its time, and in a plan a gripper or tool changer its nominal time, as far as samples h apart show",
     ),
     (
         "rest",
@@ -204,7 +204,7 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "end",
-        "each move ends in its last pose, within 1e-6 m and 1e-6 rad; at a sample up to h before the end, as far away as a stop in h leads",
+        "each move ends in its last pose, within 1e-6 m and 1e-6 rad; at a sample up to h before the end, no further away than a stop in h",
     ),
     (
         "straight-line",
@@ -216,7 +216,7 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "orientation-in-step",
-        "on a straight move the tool turns about one axis, in step with the way, within 1e-5 rad and what 2e-6 m of the way make",
+        "on a straight move the tool turns about one axis, in proportion to the distance, within 1e-5 rad and the rotation over 2e-6 m",
     ),
     (
         "pass",
@@ -224,11 +224,11 @@ const WORDS: [(&str, &str); 27] = [
     ),
     (
         "corridor",
-        "between two passes the controlled point stays as near to the straight leg as the tolerance says (and 1e-5 m)",
+        "between two passes the distance of the controlled point from the straight leg is at most the tolerance (and 1e-5 m)",
     ),
     (
         "pass-orientation",
-        "where an intermediate pose is passed, the orientation is within the angular tolerance that goes with the tolerance",
+        "where an intermediate pose is passed, the orientation is within the angular tolerance that follows from the tolerance",
     ),
     (
         "path-time",

@@ -24,7 +24,7 @@ pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut
         let moved = (0..recording.arm.dof())
             .map(|joint| (to.joints[joint] - from.joints[joint]).abs())
             .fold(0.0, f64::max);
-        // At rest the next command may begin, or a tool work.
+        // At rest the next command may begin, or a tool may work.
         let begins = from.command != to.command || (to.rests() && now.path_time_s == 0.0);
         let since = if begins { 0.0 } else { before.path_time_s };
         let grown = now.path_time_s - since;
@@ -40,7 +40,8 @@ pub(super) fn path_time(recording: &Recording<'_>, span: &Span<'_>, report: &mut
     }
 }
 
-/// Measured joints follow, and the measured point is theirs.
+/// Checks that the measured joints follow, and that the measured point is that of the measured
+/// joints.
 pub(super) fn measured(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     for row in &recording.rows[span.own.clone()] {
         let Some(run) = &row.run else { continue };

@@ -19,7 +19,7 @@ use super::straight::STRAIGHT;
 use super::verdict::PassFound;
 use crate::task::Move;
 
-/// Places between two samples that are looked at.
+/// Number of places between two samples that are checked.
 const PARTS: usize = 8;
 
 /// A smooth move with what was recorded of it.
@@ -30,7 +30,7 @@ pub(super) struct SmoothMove<'a> {
     pub motion: &'a Move,
     /// Largest angle at a pass, rad.
     pub angular_tolerance: f64,
-    /// How far the controlled point moves at most for each radian or metre of each joint, m.
+    /// Largest distance of the controlled point per radian or metre of each joint, m.
     pub levers: Vec<f64>,
 }
 
@@ -45,20 +45,20 @@ struct Approach {
     angle: f64,
 }
 
-/// What the motion may be doing, as far as samples tell.
+/// The legs that the motion may be on, as far as samples show.
 struct Way {
     /// Whether it may be on a leg: position alone, and with the orientation at every pass.
     on: Vec<[bool; 2]>,
     /// How near it came to each pose while on the leg to it.
     best: Vec<Option<Approach>>,
-    /// When it left the last corridor that it might have been in: time (s), distance (m), leg.
+    /// Where it left the last possible corridor: time (s), distance (m), leg.
     lost: Option<(f64, f64, usize)>,
     /// The legs among which those are that it may be on.
     legs: Range<usize>,
 }
 
 impl SmoothMove<'_> {
-    /// Holds it against its rules; how each intermediate pose was passed.
+    /// Checks it against its rules; returns how each intermediate pose was passed.
     pub(super) fn check(&self, report: &mut RuleReport) -> Vec<PassFound> {
         let legs = self.motion.poses.len();
         let mut way = Way {
@@ -121,8 +121,8 @@ impl SmoothMove<'_> {
         }
     }
 
-    /// Behind its last row the move goes on for less than the time to the next row, and comes to
-    /// rest: poses may be passed that lie as near to the last one as that leads.
+    /// After its last row the move continues for less than the time to the next row, and comes to
+    /// rest: poses within that distance of the last one may be passed.
     fn unseen(&self, on: &mut [[bool; 2]]) {
         let last = self.span.own.end - 1;
         let Some(goal) = self.motion.poses.last() else {
@@ -155,7 +155,7 @@ impl SmoothMove<'_> {
         }
         if !arrived {
             let missed = |near: &Option<Approach>| near.is_none_or(|near| !near.passes[0]);
-            // The first pose that is missed; those behind it were not looked for.
+            // The first pose that is missed; later ones were not searched for.
             match way.best.iter().position(missed) {
                 Some(index) => {
                     let near = way.best[index];
@@ -227,8 +227,8 @@ impl SmoothMove<'_> {
         (point - from - way * share).norm()
     }
 
-    /// How near the motion comes to the pose at the end of a leg from row `row` to the next; by
-    /// the nearer row where it is clearly out of its ball.
+    /// How near the motion comes to the pose at the end of a leg between row `row` and the next; if
+    /// it is clearly outside the ball, by the nearer row.
     fn approach(&self, row: usize, leg: usize) -> Approach {
         let rows = self.recording.rows;
         let (from, to) = (&rows[row], &rows[row + 1]);
@@ -328,7 +328,7 @@ impl<'a> Between<'a> {
             let turn = angle_between(&a.rotation, &b.rotation);
             for pose in [a, b] {
                 if off(pose) <= tolerance + slack.0 {
-                    // Between two places it may be nearer by half of what it turns.
+                    // Between two places it may be nearer by half of the rotation between them.
                     let near = angle_between(&pose.rotation, rotation) - turn / 2.0;
                     angle = angle.min(near.max(0.0));
                 }
@@ -361,7 +361,7 @@ fn nearer(known: Option<Approach>, other: Approach) -> Approach {
     }
 }
 
-/// Where a function with one valley is least, by golden section.
+/// The minimum of a unimodal function, by golden section.
 fn least((mut low, mut high): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let mut left = high - GOLDEN * (high - low);

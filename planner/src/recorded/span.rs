@@ -39,7 +39,7 @@ impl Recording<'_> {
 pub(super) struct Span<'a> {
     pub index: usize,
     pub located: &'a Located,
-    /// What the command means; none where it may not be executed.
+    /// The task of the command; `None` if it may not be executed.
     pub task: Option<Task>,
     /// Its own rows; the row before them is where it starts.
     pub own: Range<usize>,
@@ -47,11 +47,11 @@ pub(super) struct Span<'a> {
     pub start: Isometry3<f64>,
     /// From the flange to the controlled point, before it and after it.
     pub tools: [Isometry3<f64>; 2],
-    /// Those of the commands behind it that have no rows: a run shows them at its end.
+    /// Those of the later commands without rows: a run shows them at its end.
     pub later_tools: Vec<Isometry3<f64>>,
     /// Nominal time of a gripper or tool changer, s.
     pub tool_time: f64,
-    /// The first row behind its own, if the arm still rests there: no move was in between.
+    /// The first row after its own, if the arm still rests there: no move was in between.
     pub rest_after: Option<usize>,
 }
 
@@ -71,8 +71,8 @@ impl Span<'_> {
     }
 }
 
-/// Gives each command its rows, and resolves it from where the arm stands by then. With each comes
-/// what was found of it so far; `whole` is about the recording.
+/// Gives each command its rows, and resolves it from the position of the arm then. Returns each
+/// with its findings so far; `whole` is about the recording.
 pub(super) fn spans<'a>(
     recording: &Recording<'_>,
     mut modal: Modal,
@@ -126,7 +126,7 @@ pub(super) fn spans<'a>(
     spans
 }
 
-/// Where the arm is seen at rest behind a command.
+/// Finds where the arm is at rest after a command.
 fn find_rests(spans: &mut [(Span<'_>, RuleReport)]) {
     let mut rest = None;
     for (span, _) in spans.iter_mut().rev() {
@@ -152,8 +152,8 @@ fn show_later_tools(spans: &mut [(Span<'_>, RuleReport)]) {
     }
 }
 
-/// Where the flange is after a command: where the rows show it at rest, or else where the
-/// program says.
+/// Pose of the flange after a command: where the rows show it at rest, otherwise as the program
+/// says.
 fn flange_after(
     recording: &Recording<'_>,
     span: &Span<'_>,

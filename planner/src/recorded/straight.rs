@@ -9,14 +9,14 @@ use super::span::{Recording, Span};
 
 /// Largest distance from the line, m.
 pub(super) const STRAIGHT: f64 = 1e-5;
-/// Most that the controlled point goes back along the line (m), and the tool turns back or out of
-/// step (rad): what the joints' fit to the line may make.
+/// Largest distance by which the controlled point may go back along the line (m), and angle by
+/// which the tool may turn back or out of proportion (rad): effects of the joints' fit to the line.
 const BACK: (f64, f64) = (2e-6, 1e-5);
-/// Turns nearer to half a circle than this may go either way round, rad.
+/// Rotations nearer to half a turn than this may go in either direction, rad.
 const HALF_TURN: f64 = 1e-6;
 
-/// Holds the states of a straight move from `span.start` to `goal` against its rules; the largest
-/// distance from the line, m.
+/// Checks the states of a straight move from `span.start` to `goal` against its rules; returns the
+/// largest distance from the line, m.
 pub(super) fn straight(
     recording: &Recording<'_>,
     span: &Span<'_>,
@@ -49,7 +49,7 @@ pub(super) fn straight(
     worst
 }
 
-/// A line of the controlled point with the turn about one axis of the tool.
+/// A line of the controlled point with the rotation about one axis of the tool.
 #[derive(Clone, Copy)]
 struct Line {
     origin: Vector3<f64>,
@@ -74,8 +74,8 @@ impl Line {
         }
     }
 
-    /// What is held against the rules at one state; `reached` is the greatest way (m) and angle
-    /// (rad) so far.
+    /// The values to check at one state; `reached` is the greatest distance (m) and angle (rad) so
+    /// far.
     fn measures(
         &self,
         state: &ToolState,
@@ -85,7 +85,7 @@ impl Line {
         let (angle, tilt) = self.turned(&state.pose.rotation);
         let (way_back, turn_back) = (reached.0 - along, reached.1 - angle);
         *reached = (reached.0.max(along), reached.1.max(angle));
-        // On a line of no length the tool turns on the spot, in step with nothing.
+        // On a line of no length the tool turns on the spot, so there is no proportion to check.
         let rate = if self.length > 0.0 {
             self.turn.norm() / self.length
         } else {
@@ -140,7 +140,7 @@ impl Line {
         };
         let along = vector.dot(&axis);
         let tilt = 2.0 * (vector - axis * along).norm().min(1.0).asin();
-        // Half angles lie in the first quadrant; rounding may lead a little out of it.
+        // Half angles are in the first quadrant, except for rounding.
         let sign = if real + along < 0.0 { -1.0 } else { 1.0 };
         (2.0 * (sign * along).atan2(sign * real), tilt)
     }
@@ -155,7 +155,7 @@ impl Line {
     }
 }
 
-/// Rotation vector of a turn, the shorter way, rad.
+/// Rotation vector of a rotation, the shorter way, rad.
 fn turn_of(turn: &UnitQuaternion<f64>) -> Vector3<f64> {
     let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
     let vector = turn.imag() * sign;

@@ -7,8 +7,8 @@ use super::rule::Rule;
 /// Largest error of a time, in periods: rounding of the written numbers.
 const ROUNDING: f64 = 1e-6;
 
-/// Holds the time column against its rule; the period (s), or none where times do not grow and
-/// nothing else can be said.
+/// Checks the time column against its rule; returns the period (s), or `None` if times do not grow
+/// and nothing else can be checked.
 pub(super) fn period(rows: &[RecordedSample], report: &mut RuleReport) -> Option<f64> {
     let subject = Subject::The("the time column");
     let first = rows.first().map_or(f64::NAN, |row| row.t_s);
@@ -20,7 +20,7 @@ pub(super) fn period(rows: &[RecordedSample], report: &mut RuleReport) -> Option
     };
     let mut grows = !rows.is_empty();
     for (step, time) in steps() {
-        // A step of zero is none.
+        // A step of zero is not a step.
         let measure = Measure::at_least(step, f64::MIN_POSITIVE, "s");
         grows &= report.hold(Rule::Time, subject, time, measure);
     }

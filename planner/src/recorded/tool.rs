@@ -14,7 +14,7 @@ use super::span::{Recording, Span};
 const POSE: (f64, f64) = (1e-9, 1e-8);
 
 /// The pose columns are those of the joint columns. While the tool changes, the controlled point
-/// is that of either tool; a run shows the next tools at rest, behind the move before.
+/// may be that of either tool; a run shows the next tools at rest, after the move before.
 pub(super) fn pose(recording: &Recording<'_>, span: &Span<'_>, report: &mut RuleReport) {
     for row in &recording.rows[span.own.clone()] {
         let flange = recording.arm.flange(&row.joints);
@@ -55,7 +55,7 @@ pub(super) fn states(recording: &Recording<'_>, span: &Span<'_>) -> Vec<ToolStat
 const POINT: Subject = Subject::The("the controlled point");
 const TOOL: Subject = Subject::The("the tool");
 
-/// The caps of the tool, at every sample and from each to the next.
+/// The limits of the tool, at every sample and between samples.
 pub(super) fn caps(
     recording: &Recording<'_>,
     span: &Span<'_>,
@@ -112,7 +112,7 @@ pub(super) fn caps(
     }
 }
 
-/// Whether planned time and time pass alike between two rows; always so in a plan.
+/// Whether planned time and time pass equally between two rows; always true in a plan.
 fn at_full_speed(from: &RecordedSample, to: &RecordedSample) -> bool {
     let (Some(a), Some(b)) = (&from.run, &to.run) else {
         return true;

@@ -36,10 +36,10 @@ pub struct CommandVerdict {
     /// For a straight move: largest distance from the line, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub straightness_m: Option<f64>,
-    /// Largest ratio to a limit of joint or tool that the samples prove, and of what.
+    /// Largest ratio to a limit of joint or tool that the samples prove, and which limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak: Option<(f64, String)>,
-    /// What is wrong, in words; empty if nothing is.
+    /// What is wrong, as text; empty if nothing is.
     pub findings: Vec<String>,
     /// What is wrong, as data, in the order of `findings`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -57,7 +57,7 @@ pub struct ProgramVerdict {
     pub samples: usize,
     /// The commands, in order.
     pub commands: Vec<CommandVerdict>,
-    /// What is wrong with the samples as a whole, in words.
+    /// What is wrong with the samples as a whole, as text.
     pub findings: Vec<String>,
     /// What is wrong with the samples as a whole, as data, in the order of `findings`.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -36,7 +36,7 @@ struct Document {
     mounted: Option<Spanned<String>>,
 }
 
-/// Limits that the URDF does not give, one a joint.
+/// Limits that the URDF does not give, one per joint.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Joints {
@@ -243,7 +243,7 @@ impl Files<'_> {
             acceleration: of(
                 "acceleration_per_s2",
                 &given.acceleration_per_s2,
-                // One bound serves both directions, so the smaller of the two holds.
+                // One bound is for both directions, so the smaller of the two is used.
                 each(|joint| match (joint.acceleration, joint.deceleration) {
                     (Some(up), Some(down)) => Some(up.min(down)),
                     (up, down) => up.or(down),
@@ -263,7 +263,7 @@ impl Files<'_> {
         if values.get_ref().len() == dof {
             return Ok(());
         }
-        let expected = format!("{dof} numbers, one a joint");
+        let expected = format!("{dof} numbers, one per joint");
         Err(self.value(values.span(), key, &expected))
     }
 

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Makes a robot folder from a URDF: copies it to `folder/robot.urdf` and writes a
-/// `folder/robot.toml` whose defaults are marked as ours. Returns the robot, loaded.
+/// `folder/robot.toml` whose defaults are marked as Canter's. Returns the loaded robot.
 ///
 /// `tip` names the link at the flange; it is needed when several could be it.
 ///
@@ -37,7 +37,7 @@ pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robo
     let is_new = !folder.exists();
     let written = write(folder, &urdf, &toml);
     if written.is_err() && is_new {
-        // Half of a robot is of no use; that it cannot be written is what is reported.
+        // An incomplete folder is removed; the write error is reported.
         let _ = std::fs::remove_dir_all(folder);
     }
     written.map(|()| robot)
@@ -59,7 +59,7 @@ fn unwritable(path: &Path, message: String) -> RobotError {
     }
 }
 
-/// Text of a `robot.toml` for a model, every default marked as ours.
+/// Text of a `robot.toml` for a model, every default marked as Canter's.
 fn defaults(model: &Model) -> String {
     let velocity: Vec<f64> = model
         .joints
@@ -73,7 +73,7 @@ fn defaults(model: &Model) -> String {
         r#"description = {name}
 tip_link = {tip}
 
-# One value a joint, root first; rad for turning joints, m for sliding ones.
+# One value per joint, root first; rad for turning joints, m for sliding ones.
 # What the URDF gives goes before what stands here.
 [joints]
 source = "canter default"
@@ -124,7 +124,7 @@ fn tidy(value: f64) -> f64 {
     ((value * 1e3).round() / 1e3).max(1e-3)
 }
 
-/// Zero where the joint can stand there, else the middle of its range.
+/// Zero if it is within the joint's range, otherwise the middle of the range.
 fn middle(lower: f64, upper: f64) -> f64 {
     if lower <= 0.0 && upper >= 0.0 {
         0.0

@@ -13,7 +13,7 @@ pub(crate) struct Scene {
     home: Isometry3<f64>,
 }
 
-/// Pose of the flange at home, by way of a plan that does nothing but wait.
+/// Pose of the flange at home, from a plan that only waits.
 fn home(robot: &Robot) -> Isometry3<f64> {
     let wait = [Command::InitCanon, Command::Dwell { seconds: 0.001 }];
     let program: Program = wait.into_iter().collect();

@@ -76,7 +76,7 @@ impl<const N: usize> Runner<N> {
     }
 }
 
-/// The numbers of the arm's joints out of a message.
+/// Reads the numbers of the arm's joints from a message.
 pub(super) fn first<const N: usize>(all: &[f64; MAX_JOINTS]) -> SVector<f64, N> {
     SVector::from_fn(|joint, _| all.get(joint).copied().unwrap_or(0.0))
 }

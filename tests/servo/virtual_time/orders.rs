@@ -6,8 +6,8 @@ use system_tests::servo_arm::{feed, home};
 
 use super::Bench;
 
-/// A recovery where there is no fault is refused and leaves nothing behind: the pause after it
-/// keeps what is planned. One for a fault is used up by that fault.
+/// A recovery without a fault is refused and has no later effect: the pause after it keeps the
+/// plan. A recovery acts on one fault only.
 #[test]
 fn a_recovery_without_a_fault_leaves_nothing_behind() {
     let mut bench = Bench::new();
@@ -27,7 +27,7 @@ fn a_recovery_without_a_fault_leaves_nothing_behind() {
     assert!(bench.events().iter().any(finished));
 }
 
-/// An order is seen in the first period after it, and what it has come to by then is told.
+/// An order acts in the first period after it, and its effect until then is reported.
 #[test]
 fn an_order_acts_in_the_next_period() {
     let mut bench = Bench::new();
@@ -55,8 +55,8 @@ fn an_order_acts_in_the_next_period() {
     }
 }
 
-/// A stop that comes while an abort brakes is not lost: the arm is held after the abort, and what
-/// is pushed then waits for the operator.
+/// A stop that comes while an abort brakes is not lost: the arm is held after the abort, and later
+/// commands wait for the operator.
 #[test]
 fn a_stop_during_an_abort_holds() {
     let mut bench = Bench::new();

@@ -80,7 +80,7 @@ fn engine(arm: &str) -> Outcome {
                 _ => {}
             }
         }
-        // A small stock, so that what is asked for comes soon.
+        // A short buffer, so that requests act soon.
         let queued = next.saturating_sub(finished);
         if STARVE.load(Ordering::Relaxed) {
             if !starved && executor.remote().measured().idle {
@@ -150,7 +150,7 @@ fn old(mut ack: ipc::HelloAck, kind: &str) -> ipc::HelloAck {
     match kind {
         "old-answer" => ack.protocol = 7,
         "old-refusal" => {
-            let reason = "protocol 1 where 7 is spoken";
+            let reason = "protocol 1, expected 7";
             let verdict = ipc::Verdict::WrongProtocol;
             return ipc::HelloAck::refusal(JOINTS, verdict, reason);
         }
@@ -172,7 +172,7 @@ fn spoil(state: &mut ipc::State, kind: &str, random: &mut u64) {
         "range" => state.driver_state = 77,
         "jump" => state.position[1] += 0.3,
         "random" => {
-            // Now and then all of it, else all that is behind the head.
+            // Sometimes all of it, otherwise everything after the head.
             if bits() % 4 == 0 {
                 (state.session, state.sequence) = (bits(), bits());
                 (state.protocol, state.joints) = (bits() as u32, bits() as u32);

@@ -89,7 +89,7 @@ fn engine(arm: &str) -> Outcome {
     }
 }
 
-/// Hands over a move from rest to rest; says whether there was room.
+/// Sends a move from rest to rest; returns whether there was room.
 fn shuttle(sender: &mut SegmentSender<JOINTS>, command: u32, [from, to]: [Joints; 2]) -> bool {
     let limits = limits();
     let (mut far, mut duration) = (0.0_f64, 0.1_f64);

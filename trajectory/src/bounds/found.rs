@@ -4,12 +4,12 @@ use std::ops::{Add, Mul};
 
 use crate::poly::halve;
 
-/// A bound that is so near to a value that is reached is good enough.
+/// Largest relative distance of a bound from a value that is reached.
 pub(super) const TOLERANCE: f64 = 1e-3;
 /// A stretch is halved at most this often.
 const DEPTH: u32 = 12;
 
-/// The largest value of all that were looked at.
+/// The largest value found so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     /// No value is higher.
@@ -18,25 +18,25 @@ pub(super) struct Found {
     pub time: f64,
     /// Some value is at least this high.
     pub reached: f64,
-    /// Bounds below this need not be near to any value.
+    /// Bounds below this need not be tight.
     pub floor: f64,
 }
 
 impl Found {
-    /// Whether a bound is near enough to what is reached.
+    /// Whether a bound is near enough to a value that is reached.
     pub(super) fn enough(&self, bound: f64) -> bool {
         bound <= (self.reached * (1.0 + TOLERANCE)).max(self.floor)
     }
 
-    /// Takes in a bound; what is not a number is higher than any.
+    /// Adds a bound; NaN counts as the highest.
     pub(super) fn raise(&mut self, bound: f64, time: f64) {
         if bound > self.bound || bound.is_nan() {
             (self.bound, self.time) = (bound, time);
         }
     }
 
-    /// Takes in a quantity that is within `error` of a polynomial in Bernstein form over
-    /// `[from, to]` (s); its size is `norm` of the vector, which must be convex.
+    /// Adds a quantity that is within `error` of a polynomial in Bernstein form over `[from, to]`
+    /// (s); its size is `norm` of the vector, which must be convex.
     pub(super) fn take<T, const M: usize>(
         &mut self,
         control: &[T; M],

@@ -9,7 +9,7 @@ use crate::limit::Limit;
 use crate::poly::bernstein;
 use crate::{JointLimits, Trajectory};
 
-/// What holds of the joints over a whole motion.
+/// Bounds of the joints over a whole motion.
 pub(super) struct Joints<const N: usize> {
     /// Every finite limit with its bound.
     pub found: Vec<(Limit, Found)>,
@@ -19,7 +19,7 @@ pub(super) struct Joints<const N: usize> {
     pub rows: Vec<f64>,
 }
 
-/// Hulls beyond the positions known by less than this (rad, m) are not looked at again.
+/// Hulls that exceed the known positions by less than this (rad, m) are not refined.
 const POSITION: f64 = 1e-6;
 
 /// Derivatives 1 to 3 of a piece in Bernstein form.
@@ -51,7 +51,7 @@ impl<const N: usize> Derivatives<N> {
         ]
     }
 
-    /// Takes one derivative of one joint, over its limit, into a search.
+    /// Adds one derivative of one joint, divided by its limit, to a search.
     fn search(
         &self,
         (order, joint): (usize, usize),
@@ -105,7 +105,7 @@ pub(super) fn bound<const N: usize>(
             rows.push(most[*j] / limit);
         }
     }
-    // Only pieces that may hold the largest value are looked at more closely.
+    // Only pieces that may contain the largest value are refined.
     let starts = trajectory.times();
     for (i, piece) in trajectory.pieces().iter().enumerate() {
         let mut derivatives = None;

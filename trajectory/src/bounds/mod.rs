@@ -20,16 +20,16 @@ use stretch::Stretch;
 
 pub use way::Leg;
 
-/// What moving joints make of a tool: given by the caller, so that this crate needs no kinematics.
+/// The kinematics of a tool, given by the caller, so that this crate needs no kinematics.
 pub trait JointsToTool<const N: usize> {
-    /// Pose and derivatives to time of the tool, from joints and their derivatives to time.
+    /// Pose and time derivatives of the tool, from joints and their time derivatives.
     fn motion(&self, joints: &JointPoint<N>) -> ToolPoint;
 
-    /// Bounds of the Taylor coefficients of the tool's motion over a stretch of time of length
-    /// `h`, from those of the joints: `joints[k]` bounds derivative `k` of each joint at every
-    /// moment of the stretch, times `h^k / k!` (rad, m). First of the position: the norm of
-    /// derivative `k` times `h^k / k!` (m), `k` from 0 to 8. Then of the angular velocity: the norm
-    /// of its derivative `k` times `h^(k+1) / k!` (rad), `k` from 0 to 7.
+    /// Bounds of the Taylor coefficients of the tool's motion over an interval of time of length
+    /// `h`, from those of the joints: `joints[k]` bounds derivative `k` of each joint at every time
+    /// of the interval, times `h^k / k!` (rad, m). First of the position: the norm of derivative
+    /// `k` times `h^k / k!` (m), `k` from 0 to 8. Then of the angular velocity: the norm of its
+    /// derivative `k` times `h^(k+1) / k!` (rad), `k` from 0 to 7.
     fn growth(&self, joints: &[SVector<f64, N>; 6]) -> ([f64; 9], [f64; 8]);
 }
 
@@ -40,8 +40,8 @@ pub struct Held<'a, const N: usize> {
     pub joints: &'a JointLimits<N>,
     /// Limits of the tool.
     pub tool: &'a ToolLimits,
-    /// Largest error of the place of the tool (m) in what is said of its way; infinity where
-    /// nothing is asked about the way.
+    /// Largest error of the tool's position (m) in bounds of its path; infinity if no bound of the
+    /// path is needed.
     pub place: f64,
 }
 
@@ -50,8 +50,8 @@ pub struct Held<'a, const N: usize> {
 pub struct MotionBounds<const N: usize> {
     /// Every finite limit with the bound of its ratio and when it is attained, joints first.
     pub peaks: Vec<LimitPeak>,
-    /// The highest ratio found at a moment for each of `peaks`, less the error of the evaluation:
-    /// no bound can be lower than this.
+    /// The highest ratio found at one time for each of `peaks`, less the error of the evaluation:
+    /// no bound can be lower.
     pub reached: Vec<f64>,
     /// Lowest and highest position of each joint (rad, m).
     pub positions: [SVector<f64, N>; 2],
@@ -100,9 +100,9 @@ impl<const N: usize> MotionBounds<N> {
         peak.map_or(0.0, |peak| peak.ratio)
     }
 
-    /// The limit that the motion comes nearest to, or exceeds most; `None` without limits.
+    /// The limit with the highest ratio; `None` without limits.
     pub fn worst(&self) -> Option<LimitPeak> {
-        // What is not a number is worst.
+        // NaN counts as the worst.
         let value = |peak: &LimitPeak| {
             if peak.ratio.is_nan() {
                 f64::INFINITY
@@ -114,8 +114,8 @@ impl<const N: usize> MotionBounds<N> {
         self.peaks.iter().max_by(worst).copied()
     }
 
-    /// How much slower the motion must be for every ratio to be at most 1; below 1 where there is
-    /// room. Speeds fall with the factor, accelerations with its square, jerks with its cube.
+    /// The factor on time with which every ratio is at most 1; below 1 if the motion could be
+    /// faster. Speeds fall with the factor, accelerations with its square, jerks with its cube.
     pub fn slower(&self) -> f64 {
         let factors = self.peaks.iter();
         let factors = factors.map(|peak| root(peak.ratio, order(peak.limit)));
@@ -156,7 +156,7 @@ impl<const N: usize> MotionBounds<N> {
         self.peaks.iter().map(|peak| peak.limit).take_while(joint)
     }
 
-    /// The stretches of time over which limits may be used to a share of at least `share`, in the
+    /// The intervals of time in which limits may be used to a fraction of at least `share`, in the
     /// order of time.
     pub fn active(&self, share: f64) -> Vec<ActiveSpan> {
         let limits: Vec<Limit> = self.joint_limits().collect();

@@ -8,7 +8,7 @@ use super::{Held, JointsToTool};
 use crate::limit::Limit;
 use crate::{JointPoint, Trajectory};
 
-/// The limits of the tool, in the order of everything here.
+/// The limits of the tool, in the order used in this file.
 pub(super) const LIMITS: [Limit; 6] = [
     Limit::ToolSpeed,
     Limit::ToolAcceleration,
@@ -18,19 +18,20 @@ pub(super) const LIMITS: [Limit; 6] = [
     Limit::AngularJerk,
 ];
 
-/// Sum of the turns of all joints (rad) over a stretch that is looked at first.
+/// Largest sum of the rotations of all joints (rad) over a first interval.
 const TURN: f64 = 0.8;
-/// Largest error of a ratio with which a stretch is taken as it is.
+/// Largest error of a ratio with which an interval is not divided.
 const ERROR: f64 = 1e-3;
 /// A stretch is divided at most this often.
 const DEPTH: u32 = 16;
 
 /// The largest value of `t (t - 1/4) (t - 1/2) (t - 3/4) (1 - t)` from 0 to 1: times the fifth
-/// Taylor coefficient it bounds the error of the quartic through five moments.
+/// Taylor coefficient, it bounds the error of the quartic through five samples.
 ///
 /// # Source
 /// Error of polynomial interpolation (P. J. Davis, Interpolation and Approximation, 1963, theorem
-/// 3.1.1). The components of a vector along every direction have it, so its norm has it too.
+/// 3.1.1). It holds for the component of a vector along any direction, so it holds for the norm
+/// too.
 const NODES: f64 = 0.003_55;
 
 /// The tool over a stretch of time.
@@ -47,7 +48,7 @@ pub(super) struct Stretch {
     /// The place (m), within `place_error`.
     pub place: [Vector3<f64>; 5],
     pub place_error: f64,
-    /// The piece that it belongs to, and where it begins in it (s).
+    /// The piece that it belongs to, and its start in that piece (s).
     piece: usize,
     since: f64,
 }
@@ -58,7 +59,7 @@ impl Stretch {
         self.start + self.duration
     }
 
-    /// Makes it `factor` times as long; `scales` are the powers of one over the factor.
+    /// Makes it `factor` times as long; `scales` are the powers of the inverse of the factor.
     pub(super) fn slow_down(&mut self, factor: f64, scales: &[f64; 3]) {
         self.start *= factor;
         self.duration *= factor;
@@ -83,7 +84,7 @@ struct Looker<'a, T, const N: usize> {
 }
 
 impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
-    /// The stretch of `width` (s) from `since` (s) on in a piece.
+    /// The interval of `width` (s) from `since` (s) on in a piece.
     fn stretch(&self, index: usize, since: f64, width: f64) -> Stretch {
         let piece = &self.trajectory.pieces()[index];
         let mut values = [[Vector3::zeros(); 5]; 6];
@@ -133,7 +134,7 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
         }
     }
 
-    /// Adds the stretches of a part of a piece, short enough for their errors.
+    /// Adds the intervals of a part of a piece, each short enough for its error.
     fn divide(&self, (index, since, width): (usize, f64, f64), depth: u32, out: &mut Vec<Stretch>) {
         let stretch = self.stretch(index, since, width);
         let good =
@@ -155,7 +156,7 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
                 continue;
             }
             let turn = taylor(piece, 0.0, piece.duration)[1].sum();
-            // What is not a number is one stretch, whose bound is none either.
+            // NaN gives one interval, whose bound is NaN too.
             let parts = (turn / TURN).ceil().clamp(1.0, 1e4) as usize;
             let width = piece.duration / parts as f64;
             for part in 0..parts {
@@ -165,8 +166,8 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
         out
     }
 
-    /// Takes one quantity over a stretch into a search; what the error hides is looked at again,
-    /// in halves.
+    /// Adds one quantity over an interval to a search; if the error is too large, the interval is
+    /// halved.
     fn search(&self, stretch: &Stretch, q: usize, depth: u32, found: &mut Found) {
         if stretch.upper[q] <= found.bound {
             return;
@@ -187,23 +188,23 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
     }
 }
 
-/// The largest norm of some points; not a number if one is none.
+/// The largest norm of some points; NaN if one of them is NaN.
 fn hull(control: &[Vector3<f64>; 5]) -> f64 {
     let larger = |most: f64, x: f64| if x > most || x.is_nan() { x } else { most };
     control.iter().map(Vector3::norm).fold(0.0, larger)
 }
 
-/// The larger value of a quantity at the ends of a stretch.
+/// The larger value of a quantity at the ends of an interval.
 fn ends(stretch: &Stretch, q: usize) -> f64 {
     stretch.control[q][0]
         .norm()
         .max(stretch.control[q][4].norm())
 }
 
-/// Ratios below this are not told from zero.
+/// Ratios below this count as zero.
 const FLOOR: f64 = 1e-6;
 
-/// The stretches of a motion, and the bound of each finite limit of the tool.
+/// The intervals of a motion, and the bound of each finite limit of the tool.
 pub(super) fn bound<T: JointsToTool<N>, const N: usize>(
     trajectory: &Trajectory<N>,
     tool: &T,
@@ -233,7 +234,7 @@ pub(super) fn bound<T: JointsToTool<N>, const N: usize>(
             floor: FLOOR,
             ..Found::default()
         };
-        // From the highest on, so that few have to be looked at closely.
+        // The highest first, so that few have to be refined.
         let highest = stretches
             .iter()
             .max_by(|a, b| a.upper[q].total_cmp(&b.upper[q]));

@@ -8,7 +8,7 @@ use super::stretch::Stretch;
 use crate::poly::halve;
 use crate::smooth::to_segment;
 
-/// A straight leg of the way, and when it is travelled.
+/// A straight leg of the path, and the time in which it is travelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
     /// Where it begins and ends (m).
@@ -17,12 +17,12 @@ pub struct Leg {
     pub when: [f64; 2],
 }
 
-/// Distances (m) below this are not told from zero.
+/// Distances (m) below this count as zero.
 const FLOOR: f64 = 1e-8;
 
 impl<const N: usize> MotionBounds<N> {
-    /// An upper bound (m) of the distance of the controlled point from the line through two places,
-    /// or from the first where they are the same, and when it is about attained (s).
+    /// An upper bound (m) of the distance of the controlled point from the line through two points
+    /// (from the first if they are equal), and the time at which it is about attained (s).
     pub fn off_line(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> (f64, f64) {
         let way = to - from;
         let along = way.try_normalize(0.0).unwrap_or_default();
@@ -42,8 +42,8 @@ impl<const N: usize> MotionBounds<N> {
     }
 
     /// An upper bound (m) of the distance of the controlled point from the leg that it travels, and
-    /// when it is about attained (s). Bounds below `room` (m) need not be near to what is reached.
-    /// The legs are in the order of time.
+    /// the time at which it is about attained (s). Bounds below `room` (m) need not be tight. The
+    /// legs are in the order of time.
     pub fn off_legs(&self, legs: &[Leg], room: f64) -> (f64, f64) {
         let mut found = Found {
             floor: room.max(FLOOR),
@@ -69,7 +69,7 @@ impl<const N: usize> MotionBounds<N> {
     }
 }
 
-/// The place over the part of a stretch within `[from, to]` (s), and that part.
+/// The position over the part of an interval within `[from, to]` (s), and that part.
 fn part(stretch: &Stretch, [from, to]: [f64; 2]) -> ([Vector3<f64>; 5], (f64, f64)) {
     let share = |time: f64| ((time - stretch.start) / stretch.duration).clamp(0.0, 1.0);
     let (low, high) = (share(from), share(to));

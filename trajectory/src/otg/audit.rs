@@ -6,14 +6,15 @@ use super::limits::Limits;
 use super::motion::Motion;
 use super::state::State;
 
-/// What a planned move really does, from its pieces alone: bounds for all times, not samples.
+/// Worst cases of a planned move, computed from its pieces alone: bounds for all times, not
+/// samples.
 ///
 /// All numbers are worst cases over the joints in each joint's own units: acceleration limit A for
 /// accelerations, A/J for times (J the jerk limit), hence A²/J for velocities and A³/J² for
-/// positions; V, V/A where jerk is not limited. Positions are further divided by
-/// `1 + |start| + |target| + fastest · duration` in those units, velocities by `1 + fastest`, since
-/// numbers of that size are all that floating point resolves. Steps and excess of velocity and
-/// acceleration are less what four roundings of a time as long as the move amount to.
+/// positions; V, V/A where jerk is not limited. Positions are further divided by `1 + |start| +
+/// |target| + fastest · duration` in those units, velocities by `1 + fastest`, because floating
+/// point resolves no smaller differences. Four roundings of a time as long as the move are
+/// subtracted from steps and excess of velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Audit {
     /// Largest difference between the first piece and the start.
@@ -155,12 +156,12 @@ impl Audit {
     }
 }
 
-/// What one joint's numbers are compared with.
+/// The scale of the numbers of one joint.
 struct Scale {
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// What rounding of a time of the size of the duration does to velocity and acceleration.
+    /// Effect of rounding a time of the size of the duration on velocity and acceleration.
     rounding: [f64; 2],
     braking: f64,
     positions: bool,
@@ -249,7 +250,7 @@ fn at<const N: usize>(piece: &Piece<N>, joint: usize, t: f64) -> [f64; 3] {
 }
 
 fn raise(worst: &mut f64, value: f64) {
-    // What is not a number is the worst of all, and stays.
+    // NaN counts as the worst value and is kept.
     if value.is_nan() || value > *worst {
         *worst = value;
     }

@@ -3,8 +3,8 @@
 use super::extremal::{Bounds, End, Extremal, ExtremalFamily};
 use super::profile::{BlendedProfile, Profile};
 
-/// Relative residual of positions and velocities that counts as rounding: a start that was sampled
-/// from a motion of our own must find that motion again.
+/// Relative residual of positions and velocities that counts as rounding: planning from a sample of
+/// a planned motion must find that motion again.
 const SLACK: f64 = 3e-13;
 
 /// The normalised problem of one joint: from `start` to `end`, which are `distance` apart.
@@ -26,7 +26,7 @@ pub(crate) struct Axis {
     resting: bool,
 }
 
-/// Durations that join the velocities: `early` (if any) and all from `late` on.
+/// Durations in which the velocities can be joined: `early` (if any) and all from `late` on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Windows {
     pub(crate) early: Option<(f64, f64)>,
@@ -53,8 +53,8 @@ impl Axis {
         (self.start, self.end, self.bounds, self.distance)
     }
 
-    /// Whether the joint can arrive after exactly `time`, seen at a glance: `None` if a closer
-    /// look is needed.
+    /// Whether the joint can arrive after exactly `time`, by a quick test: `None` if it does not
+    /// decide.
     fn glance(&self, time: f64) -> Option<bool> {
         if self.resting {
             let (family, distance) = self.leading();
@@ -84,7 +84,7 @@ impl Axis {
         ramps.max(2.0 * way.sqrt()).max(way / top)
     }
 
-    /// The side that leads towards the target of a move between states at rest.
+    /// The direction towards the target of a move between states at rest.
     fn leading(&self) -> (&ExtremalFamily, f64) {
         if self.distance < 0.0 {
             (&self.down, -self.distance)
@@ -204,7 +204,7 @@ impl Axis {
     }
 }
 
-/// The cube root to a few percent, for the price of a division: a third of the exponent.
+/// The cube root to a few percent, as fast as a division: a third of the exponent.
 fn rough_cube_root(value: f64) -> f64 {
     f64::from_bits(value.to_bits() / 3 + 0x2a9f_7893_0000_0000)
 }
@@ -221,7 +221,7 @@ pub(crate) fn velocity_windows(start: End, end: End, bounds: Bounds) -> Windows 
     let change = end.velocity - start.velocity;
     let half = 0.5 * (a0 * a0 + af * af);
     let rounding = 0.1 * SLACK * (1.0 + start.velocity.abs() + end.velocity.abs());
-    // A start on the last phase: nothing is to be added to the straight way.
+    // A start on the last phase: nothing is added to the direct motion.
     let snap = |square: f64, highest: f64| {
         let straight = highest * highest;
         if (square - straight).abs() <= rounding {

@@ -3,8 +3,8 @@
 use super::extremal::{Bounds, End};
 use super::profile::Point;
 
-/// What comes first when the start breaks a limit: the fastest way back inside, at most three
-/// phases. Normalised like [`super::extremal::ExtremalFamily`].
+/// The first part of a move whose start breaks a limit: the fastest motion back into the limits, in
+/// at most three phases. Normalised like [`super::extremal::ExtremalFamily`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Brake {
     /// Time and jerk of each phase (acceleration in order two).
@@ -17,7 +17,8 @@ pub(crate) struct Brake {
 const ROUNDING: f64 = 1e-12;
 
 impl Brake {
-    /// The way from `start` back inside acceleration and, if `velocity`, velocity bounds.
+    /// The motion from `start` back into the acceleration bounds and, if `velocity`, the velocity
+    /// bounds.
     pub(crate) fn new(start: End, bounds: Bounds, velocity: bool) -> Self {
         let mut brake = Self {
             smooth: bounds.smooth,
@@ -46,7 +47,7 @@ impl Brake {
         }
     }
 
-    /// Slows down where the velocity is above, or cannot be kept from rising above, the bound.
+    /// Slows down if the velocity is above the bound, or will unavoidably rise above it.
     fn velocities(&mut self, now: End, bounds: Bounds, sign: f64) {
         let End {
             velocity: v,

@@ -115,7 +115,7 @@ fn bounds<const N: usize>(joint: usize, limits: &Limits<N>) -> Result<(), OtgErr
     Ok(())
 }
 
-/// The target must be inside the limits, and so must what leads to it or follows from it.
+/// The target must be inside the limits, and so must the motion just before and after it.
 fn reachable<const N: usize>(
     joint: usize,
     target: &State<N>,
@@ -173,9 +173,9 @@ fn reachable<const N: usize>(
     }
 }
 
-/// The whole move must stay inside the position limits, which are widened to hold the start.
-/// A joint that would leave them gets the profile of the same duration that strays least, made
-/// from its problem in `joints` (none for a move along a straight line, which is left as it is).
+/// The whole move must stay inside the position limits, which are widened to contain the start. A
+/// joint that would leave them gets the direct profile of the same duration, made from its problem
+/// in `joints` (none for a move along a straight line, which is not changed).
 pub(crate) fn keep_positions<const N: usize>(
     motion: &mut Motion<N>,
     joints: &[Joint],

@@ -46,7 +46,8 @@ impl Ramp {
 /// and leaves it as late as possible; `None` if there is none of this shape.
 ///
 /// Among the profiles of the same duration it spends most time at the mean velocity, so it goes
-/// least beyond start and target. [`Axis::blended_profile`] is gentler and has no such gaps.
+/// least beyond start and target. [`Axis::blended_profile`] uses less jerk and exists for every
+/// possible duration.
 pub(crate) fn direct(axis: &Axis, time: f64) -> Option<BlendedProfile> {
     let (start, end, bounds, distance) = axis.parts();
     if !bounds.smooth {

@@ -6,8 +6,8 @@ use super::options::Options;
 
 /// The shortest duration (s) that is possible for all `joints` and fits `options`.
 ///
-/// Starts from a lower bound and lets every joint in turn raise it to its next possible duration,
-/// until all agree. So blocked intervals cost nothing where they do not matter.
+/// Starts from a lower bound; every joint in turn raises it to its next possible duration, until
+/// all agree. So blocked intervals are computed only where they matter.
 pub(crate) fn common_duration<const N: usize>(
     joints: &[Joint],
     options: &Options<N>,
@@ -54,7 +54,7 @@ fn slowest(joints: &[Joint]) -> usize {
     best.0
 }
 
-/// `duration` rounded up to whole periods; what is above by rounding only counts as whole.
+/// `duration` rounded up to whole periods; an excess that is only rounding is ignored.
 fn whole_periods(duration: f64, period: Option<f64>) -> f64 {
     match period {
         Some(period) => (duration / period * (1.0 - 4.0 * f64::EPSILON)).ceil() * period,

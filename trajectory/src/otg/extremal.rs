@@ -3,13 +3,13 @@
 /// One direction of the normalised problem of one joint: how far can it get in a given time?
 ///
 /// Unit of jerk 1 (order three) or unit of acceleration 1 (order two). The other direction is the
-/// same problem with every sign turned, see [`ExtremalFamily::new`].
+/// same problem with every sign changed, see [`ExtremalFamily::new`].
 ///
 /// The profile that gets farthest rises to an acceleration `high`, falls through zero to `low` and
 /// rises to the target's. Follow the line of jerk +1 through the start back to where its
 /// acceleration is zero, and the one through the target as well: between these two virtual states
-/// the profile is two symmetric pulses, and the displacement of a symmetric pulse is its time
-/// times the mean of its end velocities. Everything below follows from this one sentence.
+/// the profile is two symmetric pulses. The displacement of a symmetric pulse is its time times the
+/// mean of its end velocities. Everything below follows from these two facts.
 ///
 /// # Source
 /// Pontryagin's principle for the triple integrator with bounds on acceleration and velocity; the
@@ -50,7 +50,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// The same bounds for the motion run backward: what rises falls.
+    /// The same bounds for the motion run backward: rising and falling are exchanged.
     pub(crate) fn reversed(self) -> Self {
         Self {
             rise: self.fall,
@@ -147,8 +147,8 @@ impl ExtremalFamily {
         }
     }
 
-    /// The farthest profile of duration `time`. Outside of the times in which the velocities can
-    /// be joined the numbers have no meaning (and `settled` is false).
+    /// The farthest profile of duration `time`. For times in which the velocities cannot be joined,
+    /// the numbers have no meaning (and `settled` is false).
     #[inline]
     pub(crate) fn at(&self, time: f64) -> Extremal {
         let span = time + self.a0 - self.af;
@@ -324,7 +324,7 @@ impl ExtremalFamily {
         self.top
     }
 
-    /// How exact the distance of `extremal` can be in floating point.
+    /// The rounding error of the distance of `extremal`.
     pub(crate) fn noise(&self, extremal: &Extremal) -> f64 {
         let total = extremal.rising.abs() + extremal.falling.abs() + extremal.cruise;
         let fastest = extremal.peak.abs() + self.start.abs() + self.end.abs();

@@ -64,7 +64,7 @@ pub(crate) struct Given {
     pub(crate) velocity: [f64; 2],
     pub(crate) acceleration: [f64; 2],
     pub(crate) jerk: f64,
-    /// What rounding of the positions may amount to.
+    /// Largest effect of rounding the positions.
     pub(crate) grain: f64,
 }
 
@@ -109,7 +109,7 @@ pub(crate) enum Task {
     VelocityProblem(VelocityProblem),
 }
 
-/// Where one joint's profile lives: its units, and what comes before the profile.
+/// The frame of one joint's profile: its units, and the braking before the profile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
     units: Units,
@@ -233,7 +233,7 @@ impl Joint {
         }
     }
 
-    /// The profile of `duration` (s) that strays least, if there is one of that shape.
+    /// The profile of `duration` (s) with one constant velocity, if there is one of that shape.
     pub(crate) fn direct_profile(&self, duration: f64) -> Option<BlendedProfile> {
         match &self.task {
             Task::Reach(axis) => direct(axis, duration / self.frame.units.time - self.frame.pause),
@@ -241,7 +241,7 @@ impl Joint {
         }
     }
 
-    /// A cheap guess at the duration (s), to look at the slowest joint first.
+    /// A quick estimate of the duration (s), to begin with the slowest joint.
     pub(crate) fn guess(&self) -> f64 {
         match &self.task {
             Task::Reach(axis) => (axis.guess() + self.frame.pause) * self.frame.units.time,

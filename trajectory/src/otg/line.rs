@@ -15,8 +15,8 @@ use super::state::State;
 /// Relative deviation from a straight line that is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Plans along the straight line through start and target: one scalar problem, whose limits are
-/// the tightest of all joints, each divided by the joint's share of the direction. The result is
+/// Plans along the straight line through start and target: one scalar problem, whose limits are the
+/// tightest of all joints, each divided by the joint's component of the direction. The result is
 /// the fastest move on that line.
 ///
 /// # Errors

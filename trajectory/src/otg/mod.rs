@@ -76,11 +76,11 @@ impl Otg {
     ///
     /// Where jerk is not limited, accelerations of start and target are not used. A start beyond
     /// limits is braked first, as fast as possible. Positions are kept between their limits, which
-    /// are widened to hold the start.
+    /// are widened to contain the start.
     ///
-    /// To plan anew in every cycle from where the joints are, use [`Running`]: it keeps the rest
-    /// of the running move as a candidate. Without that, rounding of the own state makes three of
-    /// 100 000 such plans later than the move they replace.
+    /// To plan again in every cycle from the present state, use [`Running`]: it keeps the rest of
+    /// the running move as a candidate. Without it, rounding of the state makes three of 100 000
+    /// such plans arrive later than the move they replace.
     ///
     /// # Errors
     /// [`OtgError::NotFinite`], [`OtgError::BadLimit`] or [`OtgError::BadOption`] for unusable

@@ -90,14 +90,14 @@ impl<const N: usize> Motion<N> {
         self.straight
     }
 
-    /// The motion at `time` (s) after its start, without a heap allocation. Before the start it
-    /// is the start; after the end the joints go on with velocity and acceleration of the target,
-    /// which is standing still for a target at rest.
+    /// The motion at `time` (s) after its start, without a heap allocation. Before the start it is
+    /// the start state. After the end the joints continue with velocity and acceleration of the
+    /// target; for a target at rest they stay there.
     pub fn sample(&self, time: f64) -> Sample<N> {
         self.collect(|track| track.at(time))
     }
 
-    /// The state on arrival: the target, but for positions that were not asked for.
+    /// The state on arrival: the target, except positions that were not asked for.
     pub fn end(&self) -> State<N> {
         self.sample(self.duration).into()
     }

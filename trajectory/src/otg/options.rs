@@ -6,7 +6,7 @@ pub enum Interface {
     /// Position, velocity and acceleration.
     #[default]
     Position,
-    /// Velocity and acceleration; the position is wherever that leads, and position limits do not
+    /// Velocity and acceleration; the final position is not given, and position limits do not
     /// apply.
     Velocity,
 }
@@ -23,7 +23,7 @@ pub enum Synchronisation {
     /// A straight line where start and target allow one, otherwise as [`Self::Time`];
     /// `Motion::is_straight` tells which it was.
     PhaseIfPossible,
-    /// Every joint arrives as early as it can. A joint that has arrived goes on with the target's
+    /// Every joint arrives as early as it can. A joint that has arrived continues with the target's
     /// velocity and acceleration.
     None,
 }

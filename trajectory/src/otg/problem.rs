@@ -13,7 +13,7 @@ pub struct Problem<const N: usize> {
     pub start: State<N>,
     /// What it must reach.
     pub target: State<N>,
-    /// Limits on the way.
+    /// Limits during the move.
     pub limits: Limits<N>,
     /// Kind of move.
     pub options: Options<N>,

@@ -117,8 +117,8 @@ impl Profile {
     }
 }
 
-/// A joint's profile: the weighted sum of up to two profiles of the same duration. Weights add up
-/// to one, or to less where the rest is standing still.
+/// A joint's profile: the weighted sum of up to two profiles of the same duration. The weights add
+/// up to one, or to less if the rest is zero motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BlendedProfile {
     profiles: [Profile; 2],

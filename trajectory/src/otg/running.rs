@@ -7,11 +7,11 @@ use super::motion::Motion;
 use super::plan::plan;
 use super::problem::Problem;
 
-/// A move under way: advanced in time and planned anew from its own state, as often as wanted.
+/// A running move: advanced in time, and planned again from its state as often as wanted.
 ///
-/// Planning anew never makes a move slower while target, limits and options stay the same: the
-/// rest of the running profile remains a candidate, and wins unless the new plan is faster. When
-/// planning fails, the running move goes on.
+/// Planning again never makes the arrival later while target, limits and options stay the same: the
+/// rest of the running profile is a candidate, and is kept unless the new plan is faster. If
+/// planning fails, the running move continues.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -58,7 +58,7 @@ impl<const N: usize> Running<N> {
         })
     }
 
-    /// Lets `period` (s) pass and returns where the joints are then.
+    /// Advances by `period` (s) and returns the state of the joints then.
     pub fn advance(&mut self, period: f64) -> Sample<N> {
         self.elapsed += period;
         self.motion.sample(self.elapsed)
@@ -74,11 +74,11 @@ impl<const N: usize> Running<N> {
         (&self.motion, self.elapsed)
     }
 
-    /// Plans anew from the present state to the target of `problem` under its limits and options;
+    /// Plans again from the present state to the target of `problem` under its limits and options;
     /// its start is not used. Returns whether the move was changed.
     ///
     /// # Errors
-    /// See [`OtgError`]; the running move goes on unchanged then.
+    /// See [`OtgError`]; the running move then continues unchanged.
     pub fn replan(&mut self, problem: &Problem<N>) -> Result<bool, OtgError> {
         let start = self.motion.sample(self.elapsed).into();
         let Problem {

@@ -3,8 +3,8 @@
 use nalgebra::SVector;
 use realtime::Sample;
 
-/// Position, velocity and acceleration of `N` joints at one instant: where a move starts or what
-/// it has to reach (rad, rad/s, rad/s²; metres for prismatic joints).
+/// Position, velocity and acceleration of `N` joints at one time: the start or the target of a move
+/// (rad, rad/s, rad/s²; metres for prismatic joints).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<const N: usize> {
     /// Joint positions (rad).

@@ -5,7 +5,7 @@ use super::extremal::{Bounds, End};
 use super::profile::{BlendedProfile, Profile};
 
 /// The normalised velocity problem of one joint: from the velocity and acceleration of `start` to
-/// those of `end`, at whatever position.
+/// those of `end`, at any position.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct VelocityProblem {
     start: End,

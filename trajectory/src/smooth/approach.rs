@@ -9,11 +9,11 @@ use nalgebra::{Isometry3, Vector3};
 use super::poly::{self, halve};
 use super::span::Span;
 
-/// Lengths (m) and angles (rad) below this are not told apart from zero.
+/// Lengths (m) and angles (rad) below this count as zero.
 pub const RESOLUTION: f64 = 1e-12;
 
-/// First local closest approach to `pose` from (span, time) on, as (span, time); the end
-/// where there is none. Within `tolerance` (m) of the pose the start may be one.
+/// First local closest approach to `pose` from (span, time) on, as (span, time); the end if there
+/// is none. If the start is within `tolerance` (m) of the pose, it may be the approach.
 pub(crate) fn closest(
     spans: &[Span],
     since: (usize, f64),
@@ -54,28 +54,28 @@ pub(crate) fn approach(
     None
 }
 
-/// Rises of the distance (m) up to this are rounding and not the end of an approach.
+/// Rises of the distance (m) up to this count as rounding, not as the end of an approach.
 const RISE: f64 = 1e-10;
 
 /// Distances (m) that differ by less are the same.
 const SAME: f64 = 1e-13;
 
-/// State of the walk along the distance to one pose.
+/// State of the search along the distance to one pose.
 struct Search {
-    /// Within this distance the start of the walk may be a pass.
+    /// Within this distance the start of the search may be a crossing.
     near: f64,
     /// Rises up to this are rounding, m.
     rise: f64,
-    /// Greatest distance since the walk began, until an approach begins.
+    /// Greatest distance since the start of the search, until an approach begins.
     high: Option<f64>,
-    /// Least distance of the approach, and its moment.
+    /// Least distance of the approach, and its time.
     lowest: (f64, (usize, f64)),
-    /// The span at hand and its start.
+    /// The current span and its start.
     place: (usize, f64),
 }
 
 impl Search {
-    /// A walk to a pose that is `far` from the origin.
+    /// A search for a pose that is `far` from the origin.
     fn new(near: f64, far: f64) -> Self {
         Self {
             near,
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(seen(&spans, 1.5, 1e-3), None);
     }
 
-    /// Behind the start only what is within the tolerance there is approached.
+    /// After the start, only a pose within the tolerance there counts as approached.
     #[test]
     fn behind_the_start_the_tolerance_decides() {
         let spans = along_x(&[([0.0, 1.0, 0.0, 0.0], 1.0)]);
@@ -167,8 +167,8 @@ mod tests {
         assert_eq!(seen(&spans, -0.01, 0.005), None);
     }
 
-    /// A rest on the way to a pose is no approach, even where the speed there has the
-    /// wrong sign in its last digits; a step back is one.
+    /// A rest before a pose is reached is not an approach, even if rounding gives the speed there
+    /// the wrong sign; a step back is one.
     #[test]
     fn a_rest_on_the_way_is_no_approach() {
         for (back, expected) in [(-1e-15, false), (-1e-6, true)] {

@@ -14,21 +14,21 @@ use crate::timing::{ActiveSpan, Limit};
 pub struct Peak {
     /// Upper bound of quantity / limit over the whole motion.
     pub ratio: f64,
-    /// Middle of the stretch where the bound is reached, s.
+    /// Middle of the interval in which the bound is reached, s.
     pub time: f64,
 }
 
 impl Peak {
     fn raise(&mut self, ratio: f64, time: f64) {
-        // What is not a number must fail the certificate.
+        // NaN must fail the certificate.
         if ratio > self.ratio || ratio.is_nan() {
             *self = Self { ratio, time };
         }
     }
 }
 
-/// What holds for every moment of a smooth motion, not only at samples: bounds
-/// come from the convex hull of Bernstein coefficients.
+/// What holds for all times of a smooth motion, not only at samples: bounds come from the convex
+/// hull of Bernstein coefficients.
 ///
 /// # Source
 /// Convex hull property and subdivision: G. Farin, "Curves and Surfaces for
@@ -53,9 +53,9 @@ pub struct Certificate {
     pub angular_acceleration: Peak,
     /// Angular jerk / limit.
     pub angular_jerk: Peak,
-    /// Which limit is used to 98 % or more when, in the order of time; spans of
-    /// different limits may overlap. Where none is, the tolerance or the
-    /// corridor decides, or the change from one limit to the next.
+    /// The intervals in which a limit is used to 98 % or more, in the order of time; those of
+    /// different limits may overlap. Where no limit is active, the tolerance or the corridor limits
+    /// the motion, or the change from one limit to the next.
     pub active: Vec<ActiveSpan>,
     /// Time of the motion, s.
     pub duration: f64,
@@ -107,8 +107,8 @@ impl Certificate {
         }
     }
 
-    /// The factor by which time must be stretched so that all limits hold; 1
-    /// when they do. Stretching never changes the way.
+    /// The factor by which time must be stretched so that all limits hold; 1 when they do.
+    /// Stretching does not change the path.
     pub(crate) fn stretch(&self) -> f64 {
         let second = self
             .acceleration
@@ -182,8 +182,8 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
     [bounds[0], bounds[1], bounds[2], a, b, c]
 }
 
-/// Upper bound of the norm of a Bernstein form over `limit`, refined by halving
-/// while it is above the limit and above what the ends show.
+/// Upper bound of the norm of a Bernstein form over `limit`, refined by halving while it is above
+/// the limit and above the values at the ends.
 fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> f64 {
     let norms = control.map(|c| c.norm() / limit);
     let bound = norms
@@ -199,9 +199,8 @@ fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> 
 
 /// Upper bounds of angular speed, acceleration and jerk over their limits.
 ///
-/// On each of a few stretches the world axes of the turns are frozen at the
-/// middle, which leaves a polynomial to bound by its hull; what the axes move
-/// is bounded by norms and added.
+/// On each of a few intervals the world axes of the rotations are fixed at the middle, which leaves
+/// a polynomial, bounded by its hull. The effect of the moving axes is bounded by norms and added.
 fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
     let parts: u32 = if span.turns.len() == 1 { 1 } else { 4 };
     let width = span.duration / f64::from(parts);
@@ -245,8 +244,8 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
         let third = bernstein(&[6.0 * c3, 24.0 * c4], from, to);
         let _ = c0;
         let (m1, m2, m3) = (largest(&first), largest(&second), largest(&third));
-        // The axis turns with the factors before it; where they share its
-        // direction it does not turn at all.
+        // The axis turns with the factors before it; if they have the same direction, it does not
+        // turn.
         let skew = axes
             .iter()
             .fold(0.0_f64, |worst, other| worst.max(sine(other, &axis)));

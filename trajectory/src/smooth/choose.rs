@@ -26,8 +26,8 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 /// Spread of a start in motion that was too fast.
 const SPREAD: f64 = 1.2;
 
-/// Share of the speed limit used by splines that others follow: the hull of a start
-/// in motion on a bend is a little faster than the motion.
+/// Fraction of the speed limit used by splines that others follow: the hull of a start in motion on
+/// a bend is a little larger than the speed.
 const JOIN_SPEED: f64 = 0.998;
 
 /// A certified motion through a window.
@@ -69,7 +69,7 @@ impl Motion {
 pub(crate) enum Then {
     /// Nothing: the last pose is the goal.
     Stop,
-    /// More motion, which must not change how the poses before were passed.
+    /// More motion, which must not change how the earlier poses were passed.
     More,
 }
 
@@ -95,8 +95,8 @@ pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions, then:
     }
 }
 
-/// Straight legs with a stop at each corner. Poses in line have none, unless the
-/// tolerance asks for a stop at every pose.
+/// Straight legs with a stop at each corner. There is no stop at poses on a straight line, unless
+/// the tolerance requires a stop at every pose.
 pub(crate) fn corners(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
     let spans = if options.tolerance > RESOLUTION {
         exact_stop::plan(&exact_stop::corners(poses), &options.limits)
@@ -213,7 +213,7 @@ fn narrow(
     if turned > 1.0 && coupled {
         options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));
     } else {
-        // An orientation that follows the way cuts corners as the way does.
+        // An orientation that follows the path cuts corners as the path does.
         far = far.max(turned);
     }
     if far > 1.0 {
@@ -239,7 +239,7 @@ fn narrow(
     }
 }
 
-/// Slows a motion down by a factor; its way stays.
+/// Slows a motion down by a factor; its path does not change.
 fn stretch(spans: &mut [Span], factor: f64) {
     for span in spans {
         span.start *= factor;

@@ -9,10 +9,10 @@ use super::span::Span;
 
 /// How one intermediate pose is passed.
 ///
-/// The rule of the language: poses are passed in order, each on its first
-/// local closest approach after the pass of the pose before; a later approach
-/// never repairs a miss. A pose already within tolerance at the moment of the
-/// pass before, and from there on farther away, is passed at that moment.
+/// The rule of the language: poses are passed in order, each on its first local closest approach
+/// after the pass of the pose before; a later approach does not replace it. A pose that is already
+/// within tolerance at the time of the pass before, and farther away after it, is passed at that
+/// time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Crossing {
@@ -54,7 +54,7 @@ pub(crate) fn crossings(
         let since = (at, time);
         let approach = closest(spans, since, pose, options.tolerance);
         let (deviation, angle) = apart(spans, &poses[0], approach, pose);
-        // Where the tool turns out of its tolerance meanwhile, more counts as a rest.
+        // If the tool turns out of its tolerance meanwhile, a larger distance counts as a rest.
         let rest = if angle > options.angular_tolerance() {
             (0.02 * options.tolerance).max(1e3 * RESOLUTION)
         } else {
@@ -63,7 +63,7 @@ pub(crate) fn crossings(
         let near = (deviation + rest).min(deviation.max(options.tolerance));
         let wanted = [near, options.angular_tolerance()];
         (at, time) = turned(spans, since, approach, pose, wanted);
-        // Not before the pass before by the last digit.
+        // Not earlier than the previous pass by rounding.
         time = time.max(since.1);
         let (deviation, angle) = apart(spans, &poses[0], (at, time), pose);
         result.push(Crossing {
@@ -99,11 +99,10 @@ fn apart(
 /// Samples of one span in the search of [`turned`].
 const STEPS: u32 = 32;
 
-/// Where the controlled point (nearly) rests at its closest approach while the
-/// tool turns, the moment of the pass is the first one in that rest at which the
-/// angle is smallest: the first (span, time) whose angle is a local minimum below
-/// `near[1]`, in the stretch around `approach` that begins not before `since` and
-/// keeps the distance below `near[0]`.
+/// If the controlled point (nearly) rests at its closest approach while the tool turns, the time of
+/// the pass is the first time of that rest at which the angle is smallest: the first (span, time)
+/// whose angle is a local minimum below `near[1]`, in the interval around `approach` that begins
+/// not before `since` and keeps the distance below `near[0]`.
 fn turned(
     spans: &[Span],
     since: (usize, f64),
@@ -118,7 +117,7 @@ fn turned(
         let (distance, angle) = apart(spans, pose, moment, pose);
         (distance <= near[0]).then_some((moment, angle))
     };
-    // Moments of a span, from the first to the last one wanted.
+    // Times of a span, from the first to the last one wanted.
     let moments = |at: usize| {
         let (span, share) = (&spans[at], 1.0 / f64::from(STEPS));
         let from = if at == since.0 { since.1 } else { span.start };
@@ -147,8 +146,8 @@ fn turned(
     best.0
 }
 
-/// True when the passes stay what they are if the motion goes on behind its end, where it
-/// passes the last pose: none of them is at the end only because nothing follows.
+/// True if the passes do not change when the motion continues after its end, where it passes the
+/// last pose: none of them is at the end only because the motion ends there.
 pub(crate) fn settled(
     spans: &[Span],
     poses: &[Isometry3<f64>],

@@ -113,11 +113,11 @@ pub(crate) fn plan(poses: &[Isometry3<f64>], limits: &ToolLimits) -> Vec<Span> {
     spans
 }
 
-/// The poses without those that the straight leg between their neighbours passes anyway,
-/// in place and in orientation.
+/// The poses without those that the straight leg between their neighbours passes anyway, in
+/// position and in orientation.
 pub(crate) fn corners(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
     let mut kept: Vec<Isometry3<f64>> = Vec::with_capacity(poses.len());
-    // Where the leg that is growing begins among the poses.
+    // Index of the pose at which the current leg begins.
     let mut begin = 0;
     for (i, pose) in poses.iter().enumerate() {
         let inner = &poses[(begin + 1).min(i)..i];

@@ -19,11 +19,11 @@ use super::ramp::{self, Caps};
 use crate::line::body_turn;
 use crate::timing::least_time as rest_to_rest;
 
-/// Legs whose directions are looked along, at most.
+/// Largest number of legs whose directions are used.
 const DIRECTIONS: usize = 16;
 
-/// A time (s) that no motion from rest to rest through these poses, within
-/// these limits and tolerances, can beat. Poses in m, the first is the start.
+/// A lower bound (s) of the time of all motions from rest to rest through these poses, within these
+/// limits and tolerances. Poses in m; the first is the start.
 ///
 /// # Errors
 /// [`SmoothError`] when a number of the input is unusable.
@@ -62,7 +62,7 @@ pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> 
         .max(turning_back(poses, options.tolerance, &linear))
 }
 
-/// Least length of a way that passes the poses, by one measure of distance.
+/// Least length of a path that passes the poses, by one measure of distance.
 fn length(
     poses: &[Isometry3<f64>],
     tolerance: f64,
@@ -81,13 +81,13 @@ fn length(
     }
 }
 
-/// Least time for a way of a length: the speed follows the limits from either
-/// end, up to the middle.
+/// Least time for a path of a given length: the speed follows the limits from either end, up to the
+/// middle.
 fn shortest(length: f64, caps: &Caps) -> f64 {
     if length <= 0.0 {
         return 0.0;
     }
-    // Way from rest after a time, with acceleration as soon as possible.
+    // Distance from rest after a time, with acceleration as soon as possible.
     let covered = |time: f64| {
         let rise = (caps.acceleration / caps.jerk).min((2.0 * caps.speed / caps.jerk).sqrt());
         let mut state = ramp::advance([0.0; 3], time.min(rise), caps.jerk);
@@ -152,13 +152,13 @@ fn turns(places: &[f64], tolerance: f64) -> Vec<f64> {
             (extreme, sign) = (place, -sign);
         }
     }
-    // The way from the last turn to the goal may be shorter than to the last
-    // extreme; what is certain is the distance to the goal.
+    // The path from the last turn to the goal may be shorter than to the last extreme; the distance
+    // to the goal is certain.
     turns.push(goal);
     turns
 }
 
-/// Sum of the least times between places of standing still.
+/// Sum of the least times between places at rest.
 fn standing_times(turns: &[f64], tolerance: f64, caps: &Caps) -> f64 {
     if let [first, goal] = turns {
         return rest_to_rest((goal - first).abs(), caps.values());
@@ -211,7 +211,7 @@ mod tests {
         assert!((stops - 0.7).abs() < 1e-9);
     }
 
-    /// There and back: two ways of 99 mm between moments of standing still.
+    /// Back and forth: two distances of 99 mm between times at rest.
     #[test]
     fn turning_back_takes_time() {
         let there_and_back = bound(&[[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]], 1e-3);

@@ -11,9 +11,9 @@ const LEVER: f64 = 0.05;
 /// Greatest default angular tolerance, rad.
 const WIDEST_ANGLE: f64 = 0.2;
 
-/// The orientation rule: how far (rad) the tool may be turned away from an intermediate pose
-/// while it passes that pose within `tolerance` (m). The angle whose arc at a lever of 50 mm is
-/// the tolerance, at most 0.2 rad; 0 where the tolerance is 0.
+/// The orientation rule: how far (rad) the tool may be turned away from an intermediate pose while
+/// it passes that pose within `tolerance` (m). It is the tolerance divided by 50 mm, at most 0.2
+/// rad; 0 if the tolerance is 0.
 ///
 /// ```
 /// use trajectory::smooth::angular_tolerance;
@@ -84,8 +84,8 @@ impl SmoothOptions {
             .unwrap_or_else(|| angular_tolerance(self.tolerance))
     }
 
-    /// The options with each infinite limit replaced by a huge one, so that
-    /// ratios to it stay numbers.
+    /// The options with each infinite limit replaced by a very large one, so that ratios to it are
+    /// finite.
     pub(crate) fn finite(&self) -> Self {
         let mut options = self.clone();
         let limits = &mut options.limits;
@@ -142,8 +142,8 @@ impl SmoothOptions {
     }
 }
 
-/// Why no smooth motion was planned. Each is a fault of the input; a list of
-/// sane poses always has a motion.
+/// Why no smooth motion was planned. Each is an error of the input; a list of valid poses always
+/// has a motion.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SmoothError {

@@ -76,7 +76,7 @@ impl SmoothPlan {
         &self.certificate
     }
 
-    /// How the motion was made: the time-optimal spline, when every part was.
+    /// How the motion was planned: as the time-optimal spline if every part was.
     #[must_use]
     pub fn method(&self) -> Method {
         let stops = self.parts.iter().find(|part| part.0 != Method::Spline);
@@ -165,8 +165,8 @@ impl ToolCurve for SmoothPlan {
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     let plan = Windows::new(poses, options)?.finish();
-    // What keeps half of the tolerance keeps all of it. A second motion costs
-    // little where poses are close to each other and fit in one window.
+    // A motion within half of the tolerance is within all of it. A second motion is cheap if poses
+    // are close to each other and fit in one window.
     let costly = plan.spans.len() > SPANS_PER_POSE * poses.len() || plan.parts.len() > 1;
     if costly || poses.len() <= SHORT || plan.method() != Method::Spline {
         return Ok(plan);
@@ -181,7 +181,7 @@ pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothP
 /// Lists up to this length are planned once.
 const SHORT: usize = 5;
 
-/// Longer lists are planned twice when they take no more than so many spans.
+/// Longer lists are planned twice if they need no more than this many spans per pose.
 const SPANS_PER_POSE: usize = 24;
 
 #[cfg(test)]
@@ -270,8 +270,8 @@ mod tests {
         ));
     }
 
-    /// Three legs and more, then a turn on the spot at the last point: each part of a leg that
-    /// stays where it is must not rule how fast the leg begins.
+    /// Three legs and more, then a turn on the spot at the last point: a part of a leg without
+    /// motion must not limit the speed at which the leg begins.
     #[test]
     fn a_turn_on_the_spot_at_the_end() {
         let at = |y: f64, z: f64, angle: f64| {

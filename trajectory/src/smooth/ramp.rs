@@ -74,8 +74,8 @@ pub(crate) fn advance([x, v, a]: [f64; 3], t: f64, jerk: f64) -> [f64; 3] {
 /// Fastest motion over `length` between two gates under `caps`, as pieces
 /// (duration, jerk); `None` when the leg is too short for its gates.
 ///
-/// The distance grows with the top speed, so the top speed is bracketed and
-/// bisected; both halves are the same rise, the second one seen backwards.
+/// The distance grows with the top speed, so the top speed is bracketed and bisected; both halves
+/// are the same rise, the second one backwards in time.
 ///
 /// # Source
 /// Profile families: R. Haschke, E. Weitnauer, H. Ritter, "On-line planning of

@@ -14,9 +14,8 @@ pub(crate) struct Turn {
     pub(crate) angle: [f64; 5],
 }
 
-/// One stretch: for `0 <= t <= duration` (s) the controlled point is
-/// `sum_k point[k] t^k` (m) and the orientation
-/// `base * exp(axis_0 angle_0(t)) * exp(axis_1 angle_1(t)) * ..`.
+/// One span: for `0 <= t <= duration` (s) the controlled point is `sum_k point[k] t^k` (m) and the
+/// orientation `base * exp(axis_0 angle_0(t)) * exp(axis_1 angle_1(t)) * ..`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Span {
     /// Time at which the span starts, s.
@@ -46,7 +45,7 @@ impl Span {
         })
     }
 
-    /// Pose and derivatives to time at local time `t`.
+    /// Pose and time derivatives at local time `t`.
     ///
     /// With the world axis `a_j` of factor `j` and the angular velocity
     /// `W_j` of the factors before it, `a_j' = W_j x a_j`; the angular velocity

@@ -14,11 +14,11 @@ use super::spline::Moving;
 use crate::ToolPoint;
 use crate::line::body_turn;
 
-/// Longest part of a leg in one go, in time at full speed, s.
+/// Longest part of a leg in one window, in time at full speed, s.
 const LONGEST: f64 = 1.0;
 
-/// Least and most of a window, in braking times. The first one of a list that
-/// takes long is shorter, so that motion can start sooner.
+/// Shortest and longest window, in braking times. The first window of a long list is shorter, so
+/// that motion can start sooner.
 const LEAST_BRAKES: f64 = 8.0;
 const MOST_BRAKES: f64 = 16.0;
 const FIRST_BRAKES: f64 = 4.0;
@@ -32,9 +32,9 @@ const MOST_POSES: usize = 400;
 
 /// Plans a list of poses window by window, with look-ahead.
 ///
-/// Each window ends at rest, so what is planned is always safe to start. Most
-/// of a window is then committed; the next one continues from that state of
-/// motion, so that joins keep speed. The cost grows linearly with the list.
+/// Each window ends at rest, so the planned part can always be started safely. Most of a window is
+/// then committed; the next window continues from that state of motion, so there is no stop between
+/// them. The cost grows linearly with the list.
 ///
 /// ```
 /// use nalgebra::Isometry3;
@@ -135,8 +135,8 @@ impl Windows {
     }
 
     /// Pose and derivatives of the controlled point (m, rad, s) at a time up to
-    /// [`Windows::committed`]; `None` beyond. What it gives for a time never
-    /// changes, so it may be executed while later windows are planned.
+    /// [`Windows::committed`]; `None` beyond. The result for a time never changes, so it may be
+    /// executed while later windows are planned.
     #[must_use]
     pub fn at(&self, time: f64) -> Option<ToolPoint> {
         if !(0.0..=self.committed()).contains(&time) {
@@ -198,7 +198,7 @@ impl Windows {
             time += full_speed(&self.poses[end], &self.poses[end + 1], &self.options);
             end += 1;
         }
-        // A window that has to end at rest had better do so at a corner.
+        // A window that has to end at rest should end at a corner.
         let mut near = (end..self.poses.len()).take(self.options.window / 2);
         let end = near.find(|i| self.turns(*i)).unwrap_or(end);
         // A short rest of the list joins this window.
@@ -209,7 +209,7 @@ impl Windows {
         }
     }
 
-    /// Whether the straight way has a corner at a pose.
+    /// Whether the straight path has a corner at a pose.
     fn turns(&self, pose: usize) -> bool {
         let around = pose.saturating_sub(1)..(pose + 2).min(self.poses.len());
         exact_stop::corners(&self.poses[around.clone()]).len() == around.len()
@@ -247,7 +247,7 @@ impl Windows {
         })
     }
 
-    /// Moves the safe part of the tail to what is done.
+    /// Moves the committed part of the tail to `done`.
     fn commit(&mut self) {
         let poses = &self.poses[self.passed..=self.end];
         let latest = self.tail.duration() - AGAIN_BRAKES * self.brake();
@@ -308,7 +308,7 @@ fn full_speed(from: &Isometry3<f64>, to: &Isometry3<f64>, options: &SmoothOption
 fn divided(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f64>> {
     let mut result = vec![poses[0]];
     let limits = &options.limits;
-    // Where every pose asks for a stop, only the poses given may be poses.
+    // If every pose requires a stop, no poses may be added.
     let longest = if options.tolerance > RESOLUTION {
         LONGEST.max(20.0 * limits.acceleration / limits.jerk)
     } else {
@@ -378,8 +378,8 @@ mod tests {
         tally
     }
 
-    /// Four times the poses are four times the windows, none of them larger, and
-    /// no more is planned ahead.
+    /// Four times the poses take four times the windows; no window is larger, and no more is
+    /// planned ahead.
     #[test]
     fn cost_is_linear() {
         let (short, long) = (tally(150), tally(600));

@@ -25,8 +25,8 @@ pub(super) struct Audit {
     pub limits: Vec<Limit>,
     /// One row for each piece, one column for each of `limits`.
     pub ratios: Vec<f64>,
-    /// The factor by which time has to be stretched for every limit to hold; below 1 if there is
-    /// room.
+    /// The factor by which time has to be stretched for every limit to hold; below 1 if the motion
+    /// could be faster.
     pub stretch: f64,
     /// What sampled tool ratios were raised by, at most.
     pub tool_margin: f64,
@@ -116,7 +116,7 @@ impl Audit {
         factors.fold(0.0, f64::max)
     }
 
-    /// The limit that the first piece comes nearest to, and its ratio there.
+    /// The limit with the highest ratio in the first piece, and that ratio.
     pub(super) fn first(&self) -> (Option<Limit>, f64) {
         let pairs = self.limits.iter().zip(&self.ratios);
         let most = pairs.max_by(|a, b| a.1.total_cmp(b.1));

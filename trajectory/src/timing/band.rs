@@ -4,7 +4,7 @@
 pub(super) type Band = Vec<[f64; 3]>;
 
 /// Solves `matrix x = rhs` in place: `rhs` becomes `x`, `matrix` its factor `L D Lᵀ`. Pivots that
-/// are not positive are raised to a small part of the largest, so the answer is always finite.
+/// are not positive are raised to a small part of the largest, so the result is always finite.
 ///
 /// # Source
 /// Golub and Van Loan, Matrix Computations, 4th edition, section 4.3 (banded systems).

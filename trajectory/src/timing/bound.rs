@@ -21,8 +21,8 @@ pub(super) fn bound<const M: usize>(
     refine(points, M.min(5), (floor, tolerance), 12)
 }
 
-/// Splits at the turning point until the hull is tight: the parts on both sides of it rise or fall
-/// all along, so that their ends bound them.
+/// Splits at the extremum until the hull is tight: the parts on both sides of it are monotonic, so
+/// that their ends bound them.
 fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth: usize) -> f64 {
     let (mut hull, mut peak) = (0.0_f64, 0);
     for (i, x) in points.iter().take(count).enumerate() {
@@ -52,8 +52,8 @@ fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth:
     ))
 }
 
-/// About where the polynomial turns near point `peak`, by Newton steps; the middle where they lead
-/// nowhere. Wherever it is split, the hulls of the parts bound it.
+/// The approximate extremum of the polynomial near point `peak`, by Newton steps; the middle if
+/// they do not converge. The hulls of the parts bound the polynomial wherever it is split.
 fn turn(points: &[f64; 5], count: usize, peak: usize) -> f64 {
     let degree = count - 1;
     let mut x = peak as f64 / degree as f64;

@@ -10,7 +10,8 @@ use crate::limit::{ActiveSpan, Limit, LimitPeak};
 pub struct TimeCertificate {
     /// Every finite limit with its peak, in the order of [`Limit`].
     pub peaks: Vec<LimitPeak>,
-    /// Which limit is active when, in the order of time; spans of different limits may overlap.
+    /// The intervals in which limits are active, in the order of time; those of different limits
+    /// may overlap.
     pub active: Vec<ActiveSpan>,
     /// How long the motion lasts (s).
     pub duration: f64,
@@ -20,11 +21,12 @@ pub struct TimeCertificate {
     pub lower_bound: f64,
     /// Largest distance of a joint from the path (rad), at the middle and the quarters of pieces.
     pub fit_error: f64,
-    /// What was added to sampled tool ratios to cover the times between the samples.
+    /// Margin added to sampled tool ratios for the times between the samples.
     pub tool_margin: f64,
-    /// Factor by which the whole law was slowed at the end to meet every bound; 1 = not at all.
+    /// Factor by which the whole law was slowed down at the end to meet every bound; 1 = not at
+    /// all.
     pub stretch: f64,
-    /// Until when (s) the motion is ruled by a given start state; 0 from rest.
+    /// Time (s) until which the given start state determines the motion; 0 from rest.
     pub given: f64,
     /// Cells of the law.
     pub cells: usize,

@@ -65,8 +65,8 @@ pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [F4<S>; 3] {
     ]
 }
 
-/// Computes the value of every row for the law `x`. The time is no number when the law is not
-/// positive somewhere.
+/// Computes the value of every row for the law `x`. The time is NaN if the law is not positive
+/// everywhere.
 pub(super) struct Evaluate<'a> {
     pub problem: &'a Problem,
     pub x: &'a [f64],
@@ -164,7 +164,7 @@ fn store<S: Four>(vector: [F4<S>; 3], to: &mut [Lane; 3]) {
 /// What happens to the multipliers.
 #[derive(Clone, Copy)]
 pub(super) enum Turn {
-    /// Put them in balance with the slacks, for this product of both.
+    /// Sets the multipliers so that their product with the slacks has this value.
     Balance(f64),
     /// Go this factor of their steps.
     Advance(f64),

@@ -8,7 +8,7 @@ use crate::{JointLimits, Path, ToolLimits};
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
 
-/// Finer cells gain nothing, and the search for the law slows down.
+/// Finer cells give no better law and a slower search.
 const MOST_CELLS_PER_RAMP: f64 = 40.0;
 /// The grid of a law: where its nodes lie.
 #[derive(Clone, Debug)]
@@ -34,8 +34,8 @@ pub(super) struct Bounded<'a, const N: usize> {
     pub options: &'a TimingOptions,
 }
 
-/// What has to be added to a smooth speed so that it begins like a given moving start; it fades
-/// within the time in which accelerations build up.
+/// Added to a smooth speed so that it begins like a given moving start; it fades out within the
+/// time in which accelerations build up.
 #[derive(Clone, Copy, Debug)]
 struct LeadIn {
     value: f64,
@@ -73,7 +73,7 @@ impl LeadIn {
 }
 
 impl Grid {
-    /// The grid for a path with these knots, from the survey's law made smooth.
+    /// The grid for a path with these knots, from the smoothed law of the reachability pass.
     pub(super) fn new(
         reachability: &ReachabilityPass,
         knots: &[f64],
@@ -111,7 +111,8 @@ impl Grid {
         let reparametrization = if reparametrization.ascends() {
             reparametrization
         } else {
-            // A start too far from the law of the survey: an even speed is always sound.
+            // A start too far from the law of the reachability pass: constant speed is always
+            // valid.
             let even = vec![end / total; spans + 1];
             Reparametrization::new(&even, span, end, [options.start, options.end])
         };
@@ -157,8 +158,8 @@ impl Grid {
     }
 }
 
-/// How many cells each part between marks gets: in proportion, at least one, `cells` in all where
-/// that is possible.
+/// The number of cells of each part between marks: in proportion, at least one, `cells` in all if
+/// possible.
 fn shares(marks: &[f64], step: f64, cells: usize) -> Vec<usize> {
     let exact: Vec<f64> = marks
         .windows(2)

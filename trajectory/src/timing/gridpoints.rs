@@ -13,11 +13,11 @@ pub(super) struct Gridpoint<const N: usize> {
     pub position: SVector<f64, N>,
     /// Derivatives 1 to 3 to the parameter of the law.
     pub joint: [SVector<f64, N>; 3],
-    /// The path parameter and its derivatives to that of the law.
+    /// The path parameter and its derivatives with respect to the parameter of the law.
     pub reparametrization: [f64; 4],
 }
 
-/// Derivatives 1 to 3 of the controlled point to the parameter of the law, there.
+/// Derivatives 1 to 3 of the controlled point with respect to the parameter of the law, there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ToolGridpoint {
     /// Its position.
@@ -44,7 +44,8 @@ pub(super) struct Gridpoints<'a, const N: usize> {
     ends: Vec<Option<usize>>,
 }
 
-/// Derivatives to a new parameter from those to the old one and those of the old to the new.
+/// Derivatives with respect to a new parameter, from those with respect to the old one (chain
+/// rule).
 fn chain<const D: usize>(
     [d1, d2, d3]: [SVector<f64, D>; 3],
     [_, u1, u2, u3]: [f64; 4],
@@ -57,7 +58,8 @@ fn chain<const D: usize>(
 }
 
 impl ToolGridpoint {
-    /// The derivatives of `point` to a parameter to which `u` has the derivatives `reparametrization`.
+    /// The derivatives of `point` with respect to a parameter; `reparametrization` has the
+    /// derivatives of `u` with respect to it.
     pub(super) fn new(point: &ToolPoint, reparametrization: [f64; 4]) -> Self {
         Self {
             linear: chain(point.linear, reparametrization),
@@ -89,7 +91,7 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
             ends: Vec::with_capacity(count),
         };
         for k in 0..count {
-            // The same place seen from both sides gives the same values; only jerks differ.
+            // The same place from both sides has the same values; only jerks differ.
             let side = if grid.knot[k] { 1.0 } else { 0.0 };
             let left = grid.place(path, nodes[k], side);
             let middle = nodes[k] + 0.5 * (nodes[k + 1] - nodes[k]);
@@ -117,7 +119,7 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
         &self.joints[k][1]
     }
 
-    /// The joints at the right end of cell `k`, seen from within.
+    /// The joints at the right end of cell `k`, as the limit from inside the cell.
     pub(super) fn right(&self, k: usize) -> &Gridpoint<N> {
         match self.ends[k] {
             Some(i) => &self.before[i].0,
@@ -131,7 +133,7 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
         tools.unwrap_or_else(|| [ToolGridpoint::free(); 2])
     }
 
-    /// The tool at the right end of cell `k`, seen from within.
+    /// The tool at the right end of cell `k`, as the limit from inside the cell.
     pub(super) fn tool_right(&self, k: usize) -> ToolGridpoint {
         match self.ends[k] {
             Some(i) => self.before[i].1,
@@ -141,7 +143,7 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
 }
 
 impl Grid {
-    /// The path at `w`; its third derivatives seen from the side: -1 before, 0 at, 1 after.
+    /// The path at `w`; its third derivatives from the given side: -1 before, 0 at, 1 after.
     pub(super) fn place<const N: usize>(&self, path: &dyn Path<N>, w: f64, side: f64) -> Place<N> {
         let reparametrization = self.reparametrization.at(w);
         let end = path.end();

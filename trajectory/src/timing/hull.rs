@@ -4,17 +4,17 @@ use nalgebra::SVector;
 use realtime::Piece;
 use simd::{F4, Four, Op, groups};
 
-/// Ratios below this need no better bound than the hull: no such piece decides anything.
+/// Ratios below this need no better bound than the hull: they are far from the limit.
 pub(super) const FLOOR: f64 = 0.9;
-/// A hull that is so near to a ratio that is reached is exact enough.
+/// Largest distance of a hull from a ratio that is reached.
 pub(super) const TOLERANCE: f64 = 1e-7;
 
 /// Of one derivative of each joint over a piece, over its limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hull<const N: usize> {
-    /// The largest magnitude of its Bernstein points, which bounds it all along.
+    /// The largest magnitude of its Bernstein points, which bounds it over the piece.
     pub most: [f64; N],
-    /// By how much that is more than what is reached at the ends.
+    /// The excess of that over the values at the ends.
     pub over: [f64; N],
     /// Whether for some joint the bound may be too high by more than the tolerance, above the
     /// floor.
@@ -73,7 +73,7 @@ impl<const N: usize> Op for Hulls<'_, N> {
 }
 
 impl<const N: usize> Hull<N> {
-    /// Takes in the Bernstein points of the joints from `at` on.
+    /// Adds the Bernstein points of the joints from `at` on.
     #[inline(always)]
     fn take<S: Four, const M: usize>(
         &mut self,

@@ -16,8 +16,8 @@ use super::state::State;
 use super::step_length::{Measure, StepLength};
 use simd::Build;
 
-/// A law under way, with the multipliers of its rows. All problems over one grid can be solved
-/// with it, one after the other.
+/// An iterate of the law with the multipliers of its rows. It can solve all problems over one grid,
+/// one after the other.
 #[derive(Clone, Debug)]
 pub(super) struct Interior {
     /// The unknowns: see [`Problem`].
@@ -28,8 +28,8 @@ pub(super) struct Interior {
     step: Vec<f64>,
     matrix: Band,
     state: State,
-    /// Rows that count beyond those of `state`, and the multiplier that all rows have that bound
-    /// nothing.
+    /// Number of rows that count in addition to those of `state`, and the multiplier of all rows
+    /// that bound nothing.
     idle: f64,
     idle_multiplier: f64,
     worth: Worth,
@@ -37,7 +37,7 @@ pub(super) struct Interior {
 }
 
 impl Interior {
-    /// Room for laws of `problem`; the law is 1 everywhere.
+    /// Memory for laws of `problem`; the law is 1 everywhere.
     pub(super) fn new(problem: &Problem) -> Self {
         Self::with(problem, Build::detect())
     }
@@ -78,8 +78,8 @@ impl Interior {
         });
     }
 
-    /// Starts from the law as it is, slowed down so that the nearest row keeps a slack. A law with
-    /// a moving start cannot be slowed and has to be feasible already.
+    /// Starts from the law as it is, slowed down so that every row has a slack. A law with a moving
+    /// start cannot be slowed down and has to be feasible already.
     pub(super) fn slow_down(&mut self, problem: &Problem) {
         self.evaluate(problem);
         let Worth { flat, steep, time } = self.worth;
@@ -98,7 +98,7 @@ impl Interior {
     }
 
     /// Improves the law until the relative gap of its duration is below `gap`, at most `most`
-    /// Newton steps. `first` is the relative gap that the start is taken to have.
+    /// Newton steps. `first` is the assumed relative gap of the start.
     pub(super) fn solve(&mut self, problem: &Problem, gap: f64, first: f64, most: usize) {
         let mut time = self.worth.time;
         let count = problem.counted_rows() as f64;
@@ -125,7 +125,7 @@ impl Interior {
         }
     }
 
-    /// Goes towards the middle of what is feasible, `steps` Newton steps, without regard to time.
+    /// Moves towards the centre of the feasible set, `steps` Newton steps, without regard to time.
     pub(super) fn center(&mut self, problem: &Problem, steps: usize) {
         let mu = 100.0 * self.worth.time / problem.counted_rows() as f64;
         self.turn(Turn::Balance(mu), mu);
@@ -191,8 +191,8 @@ impl Interior {
         })
     }
 
-    /// Goes `factor` of the step, less where a jerk row bends into the way. `None` when no part of
-    /// it is possible; the law then stays as it was.
+    /// Takes `factor` of the step, or less if a jerk row would be broken. `None` if no part of it
+    /// is possible; the law is then unchanged.
     fn advance(&mut self, problem: &Problem, factor: f64) -> Option<f64> {
         self.before.copy_from_slice(&self.x);
         let mut factor = factor;

@@ -9,8 +9,8 @@ use super::reachability::ReachabilityPass;
 use super::tighten::MOST_STEPS;
 use crate::{JointLimits, Path, TimingError, ToolLimits};
 
-/// The optimisation inside [`time_path`](super::time_path), ready to be solved: for benches beside
-/// other solvers, which end here too.
+/// The optimisation inside [`time_path`](super::time_path), ready to be solved: for benchmarks,
+/// because other solvers do only this part.
 #[derive(Clone, Debug)]
 pub struct LawProblem {
     problem: Problem,
@@ -20,7 +20,7 @@ pub struct LawProblem {
 /// A law over a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// How long it takes (s). Limits hold on the grid, not yet between its points.
+    /// Its duration (s). Limits hold on the grid, not yet between its points.
     pub duration: f64,
     /// Newton steps taken.
     pub iterations: usize,
@@ -69,7 +69,7 @@ impl LawProblem {
     }
 }
 
-/// The problem of a path whose tool goes and turns with its joints, under limits of both.
+/// The problem of a path whose tool moves and turns with its joints, under limits of both.
 #[cfg(test)]
 pub(super) fn swaying(cells: usize) -> Problem {
     use super::Boundary;

@@ -4,7 +4,7 @@ use super::grid::Bounded;
 use super::{Boundary, TimingOptions};
 
 /// The least time (s) from rest to rest over a distance under a velocity, acceleration and jerk
-/// limit, in consistent units; infinite limits do not bind.
+/// limit, in consistent units; infinite limits have no effect.
 ///
 /// ```
 /// let time = trajectory::timing::least_time(1.0, [2.0, 10.0, 100.0]);
@@ -36,8 +36,8 @@ pub fn least_time(distance: f64, [v, a, j]: [f64; 3]) -> f64 {
     }
 }
 
-/// The least time of any motion from rest to rest between the ends of the path: that of each joint
-/// by itself, and of the tool along its chord. 0 for a moving start.
+/// The least time of any motion from rest to rest between the ends of the path: the largest of
+/// those of each joint and of the tool along its chord. 0 for a moving start.
 pub(super) fn chord_bound<const N: usize>(bounded: Bounded<'_, N>) -> f64 {
     let TimingOptions { start, .. } = bounded.options;
     if matches!(start, Boundary::Moving { .. }) {

@@ -4,7 +4,7 @@ use super::block::Lane;
 use super::problem::{Basis, Problem};
 use super::state::{ConstraintRow, Norm, State};
 
-/// What is left of the rows of a problem, with their states.
+/// The remaining rows of a problem, with their states.
 pub(super) struct Lines<'a> {
     problem: &'a Problem,
     acceleration: (&'a [[Lane; 2]], &'a mut [ConstraintRow]),

@@ -82,7 +82,7 @@ pub fn time_path<const N: usize>(
     };
     let draft = draft(bounded, &reachability)?;
     let tighten::Draft { pieces, audit, .. } = draft;
-    // A moving start fixes the law there, so it cannot be stretched: it holds as it is.
+    // A moving start fixes the law there, so it cannot be stretched and must hold as it is.
     let moving = matches!(options.start, Boundary::Moving { .. });
     let stretch = if moving {
         1.0
@@ -114,8 +114,8 @@ pub fn time_path<const N: usize>(
     })
 }
 
-/// The best law for the survey. A moving start near what is possible may need finer cells than the
-/// law of the whole does.
+/// The best law after the reachability pass. A moving start near the limits may need finer cells
+/// than the whole law.
 fn draft<const N: usize>(
     bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,

@@ -46,7 +46,7 @@ pub(super) fn best<const N: usize>(
     })
 }
 
-/// The draft, if its first piece, which the given state rules, keeps the limits.
+/// The draft, if its first piece, which the start state determines, keeps the limits.
 fn start_holds<const N: usize>(draft: Draft<N>) -> Result<Draft<N>, TimingError> {
     let (limit, ratio) = draft.audit.first();
     if ratio <= 1.0 + ROUNDING {

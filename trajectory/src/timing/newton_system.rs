@@ -51,7 +51,7 @@ impl<S: Four> NewtonBlock<S> {
         }
     }
 
-    /// The share as a function of the law `x` further to the left.
+    /// The block as a function of the law `x` further to the left.
     #[inline(always)]
     fn moved(&self, x: F4<S>) -> Self {
         let (y, twice) = (x * x, x + x);
@@ -118,7 +118,7 @@ impl<S: Four> NewtonBlock<S> {
         }
     }
 
-    /// The share of rows `sqrt(a) |x a + y b + z c| <= 1` from that of `|x a + y b + z c| <= 1`:
+    /// The block of rows `sqrt(a) |x a + y b + z c| <= 1` from that of `|x a + y b + z c| <= 1`:
     /// the derivative of the former to `a` is `sqrt(a)` times `3/2 x + b/(2a) y + c/(2a) z`.
     #[inline(always)]
     fn rooted(&self, spot: Spots<S>) -> Self {
@@ -197,8 +197,8 @@ impl<S: Four> NewtonBlock<S> {
         share.rooted(spot)
     }
 
-    /// What the cells of a block add to the Newton system: six entries of the matrix over the
-    /// unknowns of the cell, three of the right side.
+    /// Entries that the cells of a block add to the Newton system: six of the matrix over the
+    /// unknowns of the cell, three of the right-hand side.
     #[inline(always)]
     fn entries(&self, basis: &Basis) -> [Lane; 9] {
         let lane = |x: &Lane| F4::load(self.simd, x);
@@ -318,7 +318,7 @@ mod tests {
     use super::*;
     use simd::Build;
 
-    /// Time and barrier of the law `x`: what the right side is the descent of.
+    /// Time and barrier of the law `x`; the right-hand side is their descent direction.
     fn barrier(problem: &Problem, x: &[f64], state: &mut State, mu: f64) -> f64 {
         let worth = Build::Plain.run(Evaluate { problem, x, state });
         let mut logs = 0.0;

@@ -10,8 +10,8 @@ pub enum Boundary {
     Rest,
     /// The joints rest because `q'(u) = 0` there; `du/dt` is free, up to the rate cap.
     Free,
-    /// The path parameter moves in a given way, as when a plan is renewed in motion. Only at the
-    /// start.
+    /// The path parameter moves as given, for example when a motion is planned again while it runs.
+    /// Only at the start.
     Moving {
         /// `du/dt` (u/s), positive.
         rate: f64,
@@ -20,7 +20,7 @@ pub enum Boundary {
     },
 }
 
-/// What is asked of a time law; the default is from rest to rest without a cap.
+/// Options of a time law; the default is from rest to rest without a cap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimingOptions {
     /// How the motion starts.
@@ -30,7 +30,7 @@ pub struct TimingOptions {
     /// Upper bound of `du/dt` (u/s).
     pub rate_cap: Option<f64>,
     /// Number of cells of the law; `None` chooses it from the duration and the path. At most forty
-    /// are taken for the time in which accelerations build up.
+    /// are used for the time in which accelerations build up.
     pub cells: Option<usize>,
     /// Largest distance (rad) of a joint from the path between the knots of the motion.
     pub fit: f64,

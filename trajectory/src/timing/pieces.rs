@@ -9,7 +9,7 @@ use super::joint::{Join, Motion};
 use super::problem::{Problem, Spot};
 use simd::Build;
 
-/// Jerk of a piece may differ from that of the law by this share of the limit.
+/// The jerk of a piece may differ from that of the law by this fraction of the limit.
 const JERK_FIT: f64 = 2e-3;
 /// A cell is halved at most this often.
 const DEPTH: usize = 5;
@@ -97,8 +97,8 @@ impl<'a, const N: usize> Maker<'a, N> {
         self.out
     }
 
-    /// Adds the pieces between two places in cell `k`: one if it is true to the path, else those
-    /// of both halves.
+    /// Adds the pieces between two places in cell `k`: one if it is close enough to the path,
+    /// otherwise those of both halves.
     fn halve(
         &mut self,
         k: usize,
@@ -160,7 +160,7 @@ fn position<const N: usize>(piece: &Piece<N>, t: f64) -> SVector<f64, N> {
     c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t
 }
 
-/// Time (s) in which the law that is `spot` here goes `width` further within the cell.
+/// Time (s) in which the law, which is `spot` here, moves `width` further within the cell.
 ///
 /// # Source
 /// Gauss-Legendre quadrature with five points (Abramowitz and Stegun, table 25.4).

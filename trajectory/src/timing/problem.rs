@@ -4,20 +4,20 @@ use super::block::{LANE, Lane};
 
 /// Jerk places in a cell: both ends and the middle.
 const JERK_SLOTS: usize = 3;
-/// The same in a block with cells whose jerk rows stand closer: the quarters too.
+/// The same in a block with cells whose jerk rows are closer: the quarters too.
 const DENSE_SLOTS: usize = 5;
-/// Cells from either end whose jerk rows stand closer: the path starts there like the cube of the
-/// parameter, which two places cannot hold.
+/// Cells from either end whose jerk rows are closer: the path starts there like the cube of the
+/// parameter, for which two rows per cell are too few.
 const DENSE: usize = 2;
 
 /// A law `a(w) = (dw/dt)^2`, C1 and quadratic in each cell, is given by its first value, the middle
 /// Bézier point of each cell, and its last value. In a cell with `a`, `b = a'/2`, `c = a''/2` at
 /// its left end: `d²w/dt² = b` and `d³w/dt³ = c sqrt(a)`.
 ///
-/// Every row is divided by its limit. Four neighbouring cells are a block, whose rows stand side by
-/// side. A cell has two slots for values, its left end and its middle, and three for jerks, both
-/// ends and the middle; five in blocks at either end of the path. The last node is the left end of
-/// a cell of no width. Rows that no cell needs are zero and bound nothing.
+/// Every row is divided by its limit. Four neighbouring cells are a block, whose rows are
+/// interleaved. A cell has two slots for values, its left end and its middle, and three for jerks,
+/// both ends and the middle; five in blocks at either end of the path. The last node is the left
+/// end of a cell of no width. Rows that no cell needs are zero and bound nothing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
     /// Widths of the cells.
@@ -28,7 +28,7 @@ pub(super) struct Problem {
     pub tool_accelerations: usize,
     /// Tool rows of jerk at a slot.
     pub tool_jerks: usize,
-    /// How the law follows from the unknowns, in each block.
+    /// The law as a function of the unknowns, in each block.
     pub basis: Vec<Basis>,
     /// Index of the first jerk slot of each block, then their number.
     pub jerk_slots: Vec<usize>,
@@ -36,7 +36,7 @@ pub(super) struct Problem {
     pub acceleration: Vec<[Lane; 2]>,
     /// Jerk rows `sqrt(a) |x a + y b + z c| <= 1` of each jerk slot, as `[x, y, z]`.
     pub jerk: Vec<[Lane; 3]>,
-    /// Of both slots of values in each block: the share in the time, over `1 / sqrt(a)` (Simpson's
+    /// Of both slots of values in each block: the weight in the time, over `1 / sqrt(a)` (Simpson's
     /// rule in each cell), and the reciprocal of the cap of `a`.
     pub value: Vec<[[Lane; 2]; 2]>,
     /// Acceleration rows of the tool, bounded in norm.
@@ -115,8 +115,8 @@ impl Problem {
         problem
     }
 
-    /// Fills in what cell `k` says of the law. Past the end the law is the unknown itself, which
-    /// stays 1 there.
+    /// Fills in the law in cell `k`. Past the end the law is the unknown itself, which stays 1
+    /// there.
     fn fill_basis(&mut self, k: usize) {
         let cells = self.cells();
         let width = |k: usize| self.widths.get(k).copied().unwrap_or(0.0);
@@ -143,9 +143,9 @@ impl Problem {
         self.widths.len()
     }
 
-    /// Rows that count in the mean of multiplier times slack: those of the joints as if they were
-    /// a multiple of four. What is more than there are bounds nothing; it keeps the mean from
-    /// falling ahead of the centring.
+    /// Rows that count in the mean of multiplier times slack: those of the joints, rounded up to a
+    /// multiple of four. The additional rows bound nothing; they keep the mean from falling before
+    /// the centring.
     pub(super) fn counted_rows(&self) -> usize {
         let cells = self.cells();
         let values = 2 * cells + 1;
@@ -175,7 +175,7 @@ impl Problem {
         self.jerk_slots[k / LANE]..self.jerk_slots[k / LANE + 1]
     }
 
-    /// The jerk slots of block `i`, each by its share of the way from left to right.
+    /// The jerk slots of block `i`, each by its fraction of the cell from left to right.
     #[inline(always)]
     pub(super) fn jerk_shares(&self, i: usize) -> &'static [f64] {
         const SHARES: [f64; JERK_SLOTS] = [0.0, 0.5, 1.0];
@@ -202,7 +202,7 @@ impl Problem {
         wide
     }
 
-    /// Takes away the rows of the first node that a given start state decides by itself.
+    /// Removes the rows of the first node that a given start state determines.
     pub(super) fn release_start(&mut self) {
         for row in self.acceleration[..self.joints].iter_mut().flatten() {
             row[0] = 0.0;

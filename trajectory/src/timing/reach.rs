@@ -32,7 +32,7 @@ fn fill(line: &mut [Lane; 2], [p, q]: &[Lane; 2]) -> f64 {
     let mut flat = 0.0_f64;
     for l in 0..LANE {
         let inverse = 1.0 / p[l];
-        // A joint that hardly moves here bounds the speed by its curvature alone.
+        // A joint that hardly moves here limits the speed only by its curvature.
         let steep = inverse.abs() < 1e12;
         line[0][l] = if steep { inverse.abs() } else { f64::MAX };
         line[1][l] = if steep { q[l] * inverse } else { 0.0 };

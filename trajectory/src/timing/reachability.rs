@@ -7,16 +7,16 @@ use super::reach::{self, ReachGrid};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
-/// Cells that a survey spreads over the path, besides those at the knots.
+/// Cells that the reachability pass distributes over the path, in addition to those at the knots.
 const CELLS: usize = 256;
 /// A squared rate that nothing bounds.
 const FREE: f64 = 1e100;
 /// Least number of cells from one knot to the next.
 const PER_KNOT: f64 = 4.0;
-/// Share of the path parameter by which one-sided values stand aside from a knot.
+/// Distance of one-sided values from a knot, as a fraction of the path parameter.
 pub(super) const ASIDE: f64 = 1e-9;
 
-/// The fastest law without jerk limits, and what it tells of the time scale.
+/// The fastest law without jerk limits, and its time scale.
 #[derive(Clone, Debug)]
 pub(super) struct ReachabilityPass {
     /// Path parameters.
@@ -25,9 +25,9 @@ pub(super) struct ReachabilityPass {
     pub rate: Vec<f64>,
     /// Times there (s).
     pub times: Vec<f64>,
-    /// Time over which accelerations of this law could be built up within the jerk limits (s).
+    /// Time in which the accelerations of this law could build up within the jerk limits (s).
     pub ramp: f64,
-    /// No motion is shorter than this (s), as far as velocity and acceleration limits say.
+    /// Lower bound of the duration (s) by velocity and acceleration limits.
     pub bound: f64,
 }
 
@@ -88,7 +88,7 @@ impl ReachabilityPass {
         if !(total.is_finite() && total > 0.0 && a.iter().all(|a| *a < FREE)) {
             return Err(TimingError::Unbounded);
         }
-        // The change that a grid of half the points makes tells how far off this one may be.
+        // The difference from a grid of half the points estimates the error of this one.
         let coarse = rows.grid(&at, &bends, 2);
         let coarse = reach::duration(coarse.at(), &coarse.solve(first, last));
         let bound = (total - 2.0 * (coarse - total).abs()).max(0.0);
@@ -105,7 +105,7 @@ impl ReachabilityPass {
     }
 }
 
-/// `(du/dt)^2` at the start: what the boundary says, or anything.
+/// `(du/dt)^2` at the start: from the boundary, or free.
 fn first_value(options: &TimingOptions) -> f64 {
     match options.start {
         Boundary::Rest => 0.0,
@@ -162,7 +162,7 @@ struct Bends<const N: usize> {
     joints: Vec<[SVector<f64, N>; 2]>,
     /// Of the tool, of its position and then of its orientation; empty if nothing limits it.
     tools: Vec<[[Vector3<f64>; 2]; 2]>,
-    /// The largest number of each derivative of the joints.
+    /// The largest value of each derivative of the joints.
     sizes: [f64; 4],
 }
 
@@ -212,7 +212,7 @@ fn finite<const N: usize>(point: PathPoint<N>, u: f64) -> Result<PathPoint<N>, T
     }
 }
 
-/// Looks for jumps of the first two derivatives at knots, beside the `sizes` that they have.
+/// Searches for jumps of the first two derivatives at knots, relative to their `sizes`.
 fn corners<const N: usize>(path: &dyn Path<N>, sizes: [f64; 4]) -> Result<(), TimingError> {
     let end = path.end();
     let [_, first, second, third] = sizes;
@@ -259,7 +259,7 @@ impl<const N: usize> Rows<'_, N> {
             .copied()
             .filter(|cap| *cap < FREE)
             .fold(0.0, f64::max);
-        // Where the path stands still over its parameter nothing bounds the rate by itself.
+        // Where the path does not move with its parameter, no limit bounds the rate.
         let most = if most > 0.0 { most } else { FREE };
         let narrow = self.joint.acceleration.map(|x| 1.0 / x);
         for (i, cap) in caps.iter().enumerate() {
@@ -270,7 +270,7 @@ impl<const N: usize> Rows<'_, N> {
         grid
     }
 
-    /// What speeds allow at place `i`. Jerk limits count as if the rate were constant there.
+    /// The cap from speeds at place `i`. Jerk limits are used as if the rate were constant there.
     fn cap(&self, bends: &Bends<N>, i: usize) -> f64 {
         let [linear, angular] = bends.tool(i);
         let speeds = [
@@ -283,7 +283,7 @@ impl<const N: usize> Rows<'_, N> {
     }
 
     /// Acceleration rows `(p, q)` at place `i`, those of joints times `narrow`; those of the tool
-    /// for each axis, which is a little weaker than for the norm.
+    /// for each axis, which bounds a little less than the norm does.
     fn rows(
         &self,
         bends: &Bends<N>,
@@ -333,8 +333,8 @@ impl ReachabilityPass {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// The path parameter at the time `t`; before the start and after the end it goes on with the
-    /// rate it has there.
+    /// The path parameter at the time `t`; before the start and after the end it continues with the
+    /// rate there.
     pub(super) fn parameter(&self, t: f64) -> f64 {
         let last = self.at.len() - 1;
         if t <= 0.0 {

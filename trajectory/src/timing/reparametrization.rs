@@ -2,9 +2,9 @@
 
 use super::Boundary;
 
-/// The path parameter `u` as a smooth function of `w` (s): its speed `du/dw` is a cubic spline, and
-/// goes like `w²` from an end at rest, as a motion with bounded jerk does. In `w` the law of a
-/// good motion is nearly constant, everywhere and also at the ends.
+/// The path parameter `u` as a smooth function of `w` (s): its speed `du/dw` is a cubic spline,
+/// proportional to `w²` near an end at rest, as in a motion with bounded jerk. In `w` the law of a
+/// good motion is nearly constant, also at the ends.
 #[derive(Clone, Debug)]
 pub(super) struct Reparametrization {
     /// Width of a span.

@@ -75,7 +75,7 @@ impl<const N: usize> Bounded<'_, N> {
 }
 
 impl<const N: usize> Rows<'_, N> {
-    /// Sets the rows at an end or the middle of cell `k` that do not know the jerk.
+    /// Sets the rows at an end or the middle of cell `k` that do not contain the jerk.
     fn values(
         &self,
         problem: &mut Problem,
@@ -107,7 +107,8 @@ impl<const N: usize> Rows<'_, N> {
         let rate = self
             .rate_cap
             .map_or(0.0, |cap| gridpoint.reparametrization[1] / cap);
-        // The law of a good motion is near 1, so a far cap changes nothing but keeps it bounded.
+        // The law of a good motion is near 1, so a high cap does not change it and keeps it
+        // bounded.
         problem.value[slot / 2][slot % 2][1][l] =
             (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
     }

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::state::{ConstraintRow, Norm, State};
 use simd::{F4, Four, Op};
 
-/// Reciprocals of the largest factors that a step may go: of the law and of the multipliers.
+/// Reciprocals of the largest factors of a step: of the law and of the multipliers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepLength {
     pub primal: f64,
@@ -24,7 +24,7 @@ struct Strides<S: Four> {
 }
 
 impl<S: Four> Strides<S> {
-    /// Takes in a row that changes by `d`, and writes the step of its multiplier.
+    /// Adds a row that changes by `d`, and writes the step of its multiplier.
     #[inline(always)]
     fn row(&mut self, row: &mut ConstraintRow, d: F4<S>) {
         let one = F4::splat(self.simd, 1.0);
@@ -87,7 +87,7 @@ impl<S: Four> Strides<S> {
         }
     }
 
-    /// Takes in the rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
+    /// Adds the rows of a jerk slot: of `sqrt(a) (x a + y b + z c)`.
     #[inline(always)]
     fn jerks(&mut self, slot: Jerks<'_>, at: Spots<S>, d: Spots<S>) {
         let simd = self.simd;
@@ -107,8 +107,8 @@ impl<S: Four> Strides<S> {
     }
 }
 
-/// How far the law `x` may go along `step`; also computes the steps of the multipliers, for the
-/// centring `mu`. Jerk rows are taken by their tangents.
+/// How far the law `x` may move along `step`; also computes the steps of the multipliers, for the
+/// centring `mu`. Jerk rows are replaced by their tangents.
 pub(super) struct Measure<'a> {
     pub problem: &'a Problem,
     pub x: &'a [f64],

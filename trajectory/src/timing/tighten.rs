@@ -10,7 +10,7 @@ use super::pieces::{Maker, Pieces};
 use super::problem::Problem;
 use crate::limit::{Limit, order};
 
-/// Newton steps after which the best law so far is taken.
+/// Newton steps after which the best law so far is used.
 pub(super) const MOST_STEPS: usize = 60;
 
 /// A law with its pieces and their bounds.

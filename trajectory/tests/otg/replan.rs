@@ -27,7 +27,7 @@ impl Tally {
     }
 }
 
-/// Plans each motion anew from its own state every `period` seconds, until it should arrive.
+/// Plans each motion again from its state every `period` seconds, until it should arrive.
 fn stateless<const N: usize>(seed: u64, ends: Ends, kind: Kind, motions: usize, tally: &mut Tally) {
     let period = 0.001;
     let mut problems = Problems::new(seed, ends);
@@ -71,7 +71,7 @@ fn guarded<const N: usize>(seed: u64, ends: Ends, kind: Kind, motions: usize, ta
     }
 }
 
-/// Motions of each kind, planned anew each millisecond: without and with the guard.
+/// Motions of each kind, planned again each millisecond: without and with the guard.
 fn all(motions: usize) -> (Tally, Tally) {
     let (mut plain, mut kept) = (Tally::default(), Tally::default());
     for (seed, ends) in [(1, Ends::Moving), (2, Ends::Stopping), (3, Ends::Resting)] {
@@ -92,7 +92,7 @@ fn own_states_never_fail_nor_slow_down() {
     assert!(plain.slower * 10_000 <= plain.plans, "{plain:?}");
 }
 
-/// The nightly size: 1e7 plans of either way.
+/// The long run: 1e7 plans of each kind.
 #[test]
 #[ignore = "takes minutes"]
 fn own_states_never_fail_nor_slow_down_at_length() {

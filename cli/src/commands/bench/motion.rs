@@ -15,11 +15,12 @@ use crate::failure::Failure;
 use crate::plot::{self, Bar};
 use crate::{input, output, robot};
 
-/// Smooth motions through pose lists: motion time beside exact stop, planning time, certificate
+/// Smooth motions through pose lists: motion time compared with exact stop, planning time,
+/// certificate
 ///
-/// Without a robot the controlled point moves freely. With one, each list is laid before it with
-/// its middle where the flange is at home, and planned by the planner that runs programs. The
-/// planning time is the shortest of three, so that the machine's stalls do not count.
+/// Without a robot the controlled point moves freely. With one, each list is placed with its middle
+/// at the flange's home position, and planned by the planner that runs programs. The planning time
+/// is the shortest of three, so that stalls of the machine do not count.
 #[derive(Args, Debug)]
 pub(crate) struct Motion {
     /// JSON file with cases: P positions in mm, Q unit quaternions w,x,y,z or null, tol in mm,
@@ -106,7 +107,7 @@ impl Motion {
 /// How often a case is planned; the result is the same each time.
 const PASSES: usize = 3;
 
-/// One case, planned and measured; a fault of the case is a reason.
+/// Plans and measures one case; an error of the case becomes its reason.
 fn measure(case: &serde_json::Value, robot: Option<&Robot>) -> Result<Measure, Failure> {
     let trial = match suite::trial(case) {
         Ok(trial) => trial,

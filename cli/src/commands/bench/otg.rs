@@ -9,10 +9,10 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
 
-/// State-to-state trajectories of random problems: planning times and soundness
+/// State-to-state trajectories of random problems: planning times and validity
 ///
-/// Start and target are drawn as in Ruckig's own benchmark. A problem counts with the shortest
-/// time of several passes, so that the machine's stalls do not.
+/// Start and target are drawn as in Ruckig's own benchmark. The time of a problem is the shortest
+/// of several passes, so that stalls of the machine do not count.
 #[derive(Args, Debug)]
 pub(crate) struct Otg {
     #[command(flatten)]
@@ -41,7 +41,7 @@ struct OtgLine {
 }
 
 impl Otg {
-    /// Measures and prints; a problem that cannot be planned, or a move that is not sound, fails.
+    /// Measures and prints; a problem that cannot be planned, or a move that is not valid, fails.
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         let Problems { seed, count, json } = self.problems;
         let rows = otg::bench(seed, count as usize);

@@ -13,7 +13,7 @@ pub(super) struct Suite {
     pub(super) cases: Cases,
 }
 
-/// Cases with their names; each can be at fault without the others.
+/// Cases with their names; each can have an error without the others.
 #[derive(Debug)]
 pub(super) struct Cases(pub(super) Vec<(String, Value)>);
 
@@ -61,7 +61,7 @@ struct Case {
 
 const MM: f64 = 1e-3;
 
-/// A case as a motion to be tried, or why it is none.
+/// A case as a motion to be planned, or why it is invalid.
 pub(super) fn trial(case: &Value) -> Result<Trial, String> {
     let case: Case = serde_json::from_value(case.clone())
         .map_err(|error| format!("the case cannot be read: {error}"))?;

@@ -11,8 +11,8 @@ use crate::output;
 
 /// Jerk-limited time laws along random joint paths: planning times and certificates
 ///
-/// The paths are splines through random waypoints. A path counts with the shortest time of
-/// several passes, so that the machine's stalls do not.
+/// The paths are splines through random waypoints. The time of a path is the shortest of several
+/// passes, so that stalls of the machine do not count.
 #[derive(Args, Debug)]
 pub(crate) struct Timing {
     #[command(flatten)]

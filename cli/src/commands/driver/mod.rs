@@ -15,14 +15,14 @@ use clap::{Args, Subcommand};
 use crate::exit::Exit;
 use crate::failure::Failure;
 
-/// How long a driver goes on when the process that started it is gone: enough for its watchdog to
-/// stop the arm.
+/// How long a driver continues when the process that started it has ended: enough for its watchdog
+/// to stop the arm.
 const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Drivers: run one, or test one
 ///
-/// A driver is the process that moves an arm: it takes setpoints from shared memory and gives
-/// measured states back.
+/// A driver is the process that moves an arm: it reads setpoints from shared memory and publishes
+/// measured states.
 #[derive(Args, Debug)]
 pub(crate) struct Driver {
     #[command(subcommand)]
@@ -56,8 +56,8 @@ fn asked_to_end(until_end_of_input: bool) -> Result<Arc<AtomicBool>, Failure> {
     Ok(stop)
 }
 
-/// Sets `stop` when standard input brings a byte, or a while after it ended because the starter
-/// is gone.
+/// Sets `stop` when standard input brings a byte, or some time after it ended because the starter
+/// has ended.
 fn end_with_input(stop: Arc<AtomicBool>) {
     thread::spawn(move || {
         if io::stdin().read_exact(&mut [0]).is_err() {

@@ -17,7 +17,7 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::robot::RobotOption;
 
-/// The Python side, as it is in `drivers/python`.
+/// The Python files of `drivers/python`.
 const SOURCES: [(&str, &str); 7] = [
     (
         "mujoco_driver.py",
@@ -110,7 +110,7 @@ impl Mujoco {
         if self.viewer {
             command.arg("--viewer");
         }
-        // A group of its own: Ctrl-C reaches us, and we ask it to end.
+        // A separate process group: Ctrl-C reaches this process, which asks the other to end.
         let child = command.stdin(Stdio::piped()).process_group(0).spawn();
         child
             .with_context(|| format!("cannot start {}", self.python))
@@ -118,7 +118,7 @@ impl Mujoco {
     }
 }
 
-/// Waits for the end of Python, which it is asked for when `stop` becomes true.
+/// Waits for Python to end; asks it to end when `stop` becomes true.
 fn wait(mut child: Child, stop: &AtomicBool) -> io::Result<ExitStatus> {
     let mut input = child.stdin.take();
     loop {
@@ -128,14 +128,14 @@ fn wait(mut child: Child, stop: &AtomicBool) -> io::Result<ExitStatus> {
         if stop.load(Ordering::Relaxed)
             && let Some(mut input) = input.take()
         {
-            // One that has gone already need not be asked.
+            // It may have ended already.
             let _ = input.write_all(b"q");
         }
         sleep(Duration::from_millis(20));
     }
 }
 
-/// A folder of this process with the Python side and the robot, removed with the value.
+/// A folder of this process with the Python files and the robot, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -144,7 +144,7 @@ impl Folder {
         fs::File::open("/dev/urandom")?.read_exact(&mut noise)?;
         let name = format!("canter-mujoco-{:016x}", u64::from_ne_bytes(noise));
         let path = std::env::temp_dir().join(name);
-        // Fails where the name exists, whoever made it.
+        // Fails if the name exists.
         let made = DirBuilder::new().mode(0o700).create(&path);
         made.with_context(|| format!("cannot make {}", path.display()))?;
         let folder = Self(path);
@@ -163,7 +163,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What cannot be removed is left to the system's own cleaning of its temporary files.
+        // What cannot be removed is left to the system's clean-up of temporary files.
         let _ = fs::remove_dir_all(&self.0);
     }
 }

@@ -13,14 +13,14 @@ use crate::failure::Failure;
 use crate::output;
 use crate::robot::RobotOption;
 
-/// How long another driver may go on having the arm, and how often to look.
+/// How long another driver may still hold the arm, and the time between two tries.
 const TAKEN: Duration = Duration::from_secs(3);
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Run the simulated driver of an arm until Ctrl-C
 ///
-/// It takes setpoints from shared memory, moves a second-order servo a joint, and gives measured
-/// states back, as the driver of a real arm does.
+/// It reads setpoints from shared memory, moves one second-order servo per joint, and publishes
+/// measured states, as the driver of a real arm does.
 #[derive(Args, Debug)]
 pub(super) struct Sim {
     #[command(flatten)]
@@ -94,7 +94,8 @@ impl Sim {
     }
 }
 
-/// Waits until no other driver has the arm: one whose starter was killed takes a moment to end.
+/// Waits until no other driver has the arm: a driver whose starter was killed needs a moment to
+/// end.
 fn wait_for_arm(arm: &Arm) -> Result<(), Failure> {
     let end = Instant::now() + TAKEN;
     loop {

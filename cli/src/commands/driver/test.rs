@@ -12,17 +12,17 @@ use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
 
-/// How long the driver may take to tell how many joints it has.
+/// How long the driver may take to send its number of joints.
 const LOOK: Duration = Duration::from_secs(3);
 
-/// After this time the test is caught in damaged segments; a slow driver takes half of it.
+/// After this time the test counts as blocked by damaged segments; a slow driver takes half of it.
 const LONGEST: Duration = Duration::from_secs(60);
 
 /// Test a running driver against the driver protocol
 ///
-/// Plays the engine and prints a verdict for each clause of docs/driver-protocol.md. The joints
-/// move by a few hundredths of a rad, and the gripper closes and opens: keep clear of a real arm.
-/// Takes about ten seconds; the exit code is 1 when a clause fails.
+/// Plays the engine and prints one result per clause of docs/driver-protocol.md. The joints move by
+/// a few hundredths of a rad, and the gripper closes and opens: keep away from a real arm. Takes
+/// about ten seconds; the exit code is 1 when a clause fails.
 #[derive(Args, Debug)]
 pub(super) struct Test {
     #[command(flatten)]
@@ -36,7 +36,7 @@ impl Test {
     /// Tests all clauses.
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let arm = self.arm.open()?;
-        // A first look, so that damaged shared memory is told soon.
+        // A first check, so that damaged shared memory is reported soon.
         damage::bounded(HANG, || {
             EngineLink::open(&arm).and_then(|link| link.joints(LOOK))
         })

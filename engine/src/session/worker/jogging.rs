@@ -10,31 +10,31 @@ use super::super::jog::{Jog, JogError, direction};
 use super::super::note::Note;
 use super::{Work, Worker};
 
-/// Number of the command that a jog is to the executor.
+/// Command number of a jog in the executor.
 const COMMAND: u32 = u32::MAX;
 /// The dead man's switch: least and most time without a request.
 const TIMEOUT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
 
-/// A jog under way.
+/// The current jog.
 #[derive(Clone, Debug)]
 pub(super) struct Jogging {
     request: Jog,
     until: Instant,
     phase: Phase,
-    /// What comes after the stop, with its own time limit.
+    /// The jog that begins after the stop, with its time limit.
     next: Option<(Jog, Instant)>,
 }
 
 /// Where a jog is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// The way is to be planned as soon as the arm rests.
+    /// The path will be planned as soon as the arm rests.
     Waiting,
     /// On its way.
     Moving,
-    /// On its way to a stop.
+    /// It is stopping.
     Ending,
-    /// There is no way on; it rests until the switch is let go.
+    /// The arm cannot move further; it rests until the switch is released.
     Stuck,
 }
 
@@ -88,7 +88,7 @@ impl<const N: usize> Worker<'_, N> {
         Ok(())
     }
 
-    /// Plans the way from where the arm rests and hands it over.
+    /// Plans the path from where the arm rests and sends it.
     fn plan_jog(&mut self, direction: &Direction<N>) -> Result<(), JogError> {
         let start = self.remote.measured().setpoint;
         self.controller.set_joints(start);
@@ -107,7 +107,7 @@ impl<const N: usize> Worker<'_, N> {
         Ok(())
     }
 
-    /// Stops the arm on its way; what comes next begins when it rests.
+    /// Stops the arm on its path; the next jog begins when it rests.
     fn end_jog(&mut self) {
         let Some(jogging) = &mut self.jogging else {
             return;
@@ -125,7 +125,7 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Looks at the dead man's switch, and goes on where the arm came to rest.
+    /// Checks the dead man's switch, and starts the next jog when the arm rests.
     pub(super) fn watch_jog(&mut self) {
         let Some(jogging) = &self.jogging else { return };
         if Instant::now() >= jogging.until {
@@ -152,7 +152,7 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Whether it was a jog that came to the end of its way; it goes on from there if it can.
+    /// Whether it was a jog that came to the end of its path; it continues from there if it can.
     pub(super) fn jog_finished(&mut self, command: u32) -> bool {
         let ours = command == COMMAND;
         if let Some(jogging) = self.jogging.as_mut().filter(|_| ours)
@@ -163,7 +163,7 @@ impl<const N: usize> Worker<'_, N> {
         ours
     }
 
-    /// The arm rests after a jog; whether there was one. What comes next begins.
+    /// The arm rests after a jog; returns whether there was one. The next jog begins.
     pub(super) fn rest_from_jog(&mut self) -> bool {
         let Some(jogging) = self.jogging.take() else {
             return false;

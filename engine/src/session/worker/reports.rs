@@ -10,7 +10,7 @@ use super::super::RunSample;
 use super::super::note::{Blame, Note};
 use super::Worker;
 
-/// How many reported commands the tool is known of, for samples that come late.
+/// Number of reported commands whose tool is kept, for late samples.
 const CHAINS: usize = 64;
 
 impl<const N: usize> Worker<'_, N> {
@@ -33,7 +33,7 @@ impl<const N: usize> Worker<'_, N> {
                 flight.started = Some(tick);
                 let (id, line, name) = (flight.id, flight.line, flight.name);
                 let planned_s = flight.planned_s;
-                // What came before has ended, and is reported before.
+                // Earlier commands have ended and are reported first.
                 self.report_done();
                 self.say(Note::Started {
                     id,
@@ -81,8 +81,8 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. What
-    /// was given before drops with the latter only.
+    /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. Only
+    /// the latter drops the commands given before it.
     fn on_abort(&mut self, ends_jog: bool) {
         if ends_jog {
             self.ends.shared.inbox().renew(self.epoch);
@@ -96,8 +96,8 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Forgets all that is planned or queued, but what was given at `epoch`, and begins again from
-    /// where the arm is.
+    /// Drops everything that is planned or queued, except commands of `epoch`, and starts again
+    /// from where the arm is.
     fn drop_all(&mut self, epoch: Option<u32>) -> usize {
         let dropped = self.flight.len();
         self.work.clear();
@@ -152,7 +152,8 @@ impl<const N: usize> Worker<'_, N> {
     fn record(&self, sample: &Recorded<N>) {
         let flying = self.flight.iter().map(|flight| (flight.id, &flight.chain));
         let reported = self.chains.iter().rev().map(|(id, chain)| (*id, chain));
-        // Command 0 is the time before the first; one that is forgotten was long ago.
+        // Command 0 is the time before the first command; the chain of an old command is no longer
+        // known.
         let chain = flying
             .chain(reported)
             .find_map(|(id, chain)| (id == sample.command).then_some(chain))

@@ -108,7 +108,7 @@ fn eliminate<S: Four, const B: usize>(
     true
 }
 
-/// Subtracts a panel's part from the column that comes `d` after its last.
+/// Subtracts a panel's part from the column `d` after its last column.
 #[inline(always)]
 fn subtract<S: Four, const B: usize>(
     simd: S,
@@ -154,7 +154,7 @@ impl<const B: usize, const M: usize> Op for Solve<'_, B, M> {
     }
 }
 
-/// Solves for the unknowns of one panel and takes them out of the rows below.
+/// Solves for the unknowns of one panel and eliminates them from the rows below.
 #[inline(always)]
 fn forward<S: Four, const B: usize, const M: usize>(
     simd: S,

@@ -7,8 +7,8 @@
 //! C. de Boor, "A Practical Guide to Splines", 1978, chapter 10, for uniform
 //! knots; blossoms: L. Ramshaw, 1987.
 
-/// Power coefficients, in the share of the span, of the five basis functions,
-/// times 24: `POWER[i][k]` belongs to control point `i`, power `k`.
+/// Power coefficients of the five basis functions in the local parameter of the span, times 24:
+/// `POWER[i][k]` belongs to control point `i`, power `k`.
 const POWER: [[f64; 5]; 5] = [
     [1.0, -4.0, 6.0, -4.0, 1.0],
     [11.0, -12.0, -6.0, 12.0, -4.0],
@@ -42,8 +42,8 @@ pub(crate) const START: [[f64; 3]; 4] = [
     [1.5, 11.0 / 12.0, 0.25],
 ];
 
-/// Weights of the five control points for value, first and second derivative
-/// (to the share) at the share `s` of a span.
+/// Weights of the five control points for value, first and second derivative at the local parameter
+/// `s` of a span.
 pub(crate) fn weights(s: f64) -> [[f64; 5]; 3] {
     let mut result = [[0.0; 5]; 3];
     for (i, p) in POWER.iter().enumerate() {
@@ -54,8 +54,7 @@ pub(crate) fn weights(s: f64) -> [[f64; 5]; 3] {
     result
 }
 
-/// Power coefficients in time of the span ruled by five control values, at
-/// knot spacing `h` (s).
+/// Power coefficients in time of the span of five control values, at knot spacing `h` (s).
 pub(crate) fn power(control: &[f64; 5], h: f64) -> [f64; 5] {
     let (mut result, mut scale) = ([0.0; 5], 1.0 / 24.0);
     for (k, value) in result.iter_mut().enumerate() {

@@ -11,14 +11,15 @@ use crate::line::body_turn;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::{Span, Turn};
 
-/// The inner tolerance: sampling at rounding must not read it as exceeded.
+/// The inner tolerance: a little smaller, so that rounding in sampling does not exceed the
+/// tolerance.
 const INSIDE: f64 = 0.9999;
 
-/// Share of the corridor that the samples use, since the curve between two
-/// samples may lie a little outside of them.
+/// Fraction of the corridor that the samples use, since the curve between two samples may lie a
+/// little outside of them.
 const CORRIDOR: f64 = 0.98;
 
-/// Share of the angular caps; the rest is for turns about changing axes.
+/// Fraction of the angular limits that is used; the rest is for rotations about changing axes.
 const ANGULAR: f64 = 0.985;
 
 /// A start in motion: state and knot spacing of the motion it continues.
@@ -31,7 +32,7 @@ pub(crate) struct Moving {
 /// What is asked of the spline.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request<'a> {
-    /// The way; with `moving` the first is the pose passed last.
+    /// The poses; with `moving` the first is the pose passed last.
     pub(crate) poses: &'a [Isometry3<f64>],
     pub(crate) options: &'a SmoothOptions,
     /// State at the start; `None` at rest in the first pose.
@@ -43,7 +44,7 @@ pub(crate) struct Request<'a> {
 }
 
 impl Request<'_> {
-    /// Whether the way moves the controlled point, and whether it turns.
+    /// Whether the poses move the controlled point, and whether they turn it.
     pub(crate) fn moves(&self) -> [bool; 2] {
         let begin = self.moving.map_or(self.poses[0], |m| m.state.pose);
         let far =
@@ -154,9 +155,8 @@ impl Task<'_> {
         }
     }
 
-    /// Turn per way (rad/m) that no part of the motion needs to exceed by much:
-    /// keeps the orientation calm where angular limits are far away. Infinite
-    /// where a leg turns without moving.
+    /// Rotation per distance (rad/m) that no part of the motion needs to exceed by much: keeps the
+    /// rotation smooth if angular limits are far away. Infinite if a leg turns without moving.
     fn turn_bound(&self) -> f64 {
         let mut most = 0.0_f64;
         for (pair, turn) in self.poses.windows(2).zip(self.vectors.windows(2)) {
@@ -250,11 +250,11 @@ impl Task<'_> {
             .collect()
     }
 
-    /// Control orientations: the control points rolled out from the start, with
-    /// the small drift against the poses spread over the way.
+    /// Control orientations: the control points rolled out from the start; the small drift from the
+    /// poses is distributed over the path.
     ///
-    /// Rolling a polygon of rotation vectors keeps every angular rate; cutting
-    /// corners of it changes where it leads, by the square of the tolerance.
+    /// Rolling a polygon of rotation vectors keeps every angular rate; cutting its corners changes
+    /// its end by the square of the tolerance.
     fn rotations<const D: usize>(
         &self,
         problem: &Problem<D>,
@@ -294,8 +294,7 @@ impl Task<'_> {
         result
     }
 
-    /// Control orientations that follow the progress of the control points
-    /// along the way.
+    /// Control orientations that follow the progress of the control points along the path.
     fn following<const D: usize>(
         &self,
         problem: &Problem<D>,
@@ -316,7 +315,7 @@ impl Task<'_> {
         let Some(moving) = self.moving else {
             return result;
         };
-        // The start's own orientations differ by next to nothing: fade it out.
+        // The orientations of the start differ only slightly: the difference fades out.
         let begin = start_rotations(moving, h);
         let drift = body_turn(&result[3], &begin[3]);
         for (k, rotation) in result.iter_mut().enumerate() {
@@ -391,8 +390,7 @@ fn correct(
     }
 }
 
-/// The four factors of a span ruled by five control orientations: the
-/// cumulative form of the basis.
+/// The four factors of a span of five control orientations: the cumulative form of the basis.
 ///
 /// # Source
 /// M.-J. Kim, M.-S. Kim, S. Y. Shin, "A general construction scheme for unit

@@ -23,8 +23,8 @@ pub(crate) struct Step {
     pub(crate) decrement: f64,
 }
 
-/// Share of each slack that a step must leave: an iterate that is thrown
-/// against a wall can only creep along it afterwards, since norms are curved.
+/// Fraction of each slack that a step must leave: an iterate too close to a constraint then moves
+/// only slowly along it, since norms are curved.
 const KEEP: f64 = 0.02;
 
 /// Product of slacks, as shares of their bounds, with rare logarithms.
@@ -37,7 +37,7 @@ struct Slacks<'a> {
 }
 
 impl Slacks<'_> {
-    /// Takes the slack of `square <= bound`; false when too little is left.
+    /// Adds the slack of `square <= bound`; false if too little is left.
     fn take(&mut self, square: f64, bound: f64) -> bool {
         let slack = 1.0 - square / bound;
         let least = self.before.get(self.seen.len()).map_or(0.0, |s| KEEP * s);
@@ -63,8 +63,8 @@ pub(crate) struct Barrier<'a, const D: usize> {
 }
 
 impl<const D: usize> Barrier<'_, D> {
-    /// Value at an iterate, and its slacks in `seen`; `None` outside of the
-    /// domain, and where a slack is a small share of what it was `before`.
+    /// Value at an iterate, and its slacks in `seen`; `None` outside of the domain, and if a slack
+    /// is only a small fraction of its value `before`.
     pub(crate) fn value(
         &self,
         point: &Point<D>,
@@ -101,8 +101,8 @@ impl<const D: usize> Barrier<'_, D> {
         Some(self.weight * point.z - bounds - slacks.sum - slacks.product.ln())
     }
 
-    /// Takes the slacks of speed, acceleration and jerk; the sum of the
-    /// logarithms of their bounds, which move with `z`.
+    /// Adds the slacks of speed, acceleration and jerk; returns the sum of the logarithms of their
+    /// bounds, which depend on `z`.
     fn limits(&self, point: &Point<D>, g: usize, slacks: &mut Slacks<'_>) -> Option<f64> {
         let caps = [1, 2, 3].map(|k| self.problem.cap(g, k, point.z, self.room)[0].powi(2));
         let last = point.control.len() - 1;
@@ -311,8 +311,8 @@ impl<const D: usize, const B: usize> System<D, B> {
         }
     }
 
-    /// Balls, each at its closest approach: the passing time is eliminated, so
-    /// the direction of motion carries no curvature.
+    /// Balls, each at its closest approach: the passing time is eliminated, so there is no
+    /// curvature in the direction of motion.
     fn balls(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room) {
         for (i, goal) in problem.inner().iter().enumerate() {
             let (span, share) = point.locate(point.crossings[i]);

@@ -8,7 +8,7 @@
 
 use super::basis::{self, START, weights};
 
-/// What rules one group of three coordinates (position, or rotation vector).
+/// Limits of one group of three coordinates (position, or rotation vector).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
     /// Speed, acceleration, jerk.
@@ -24,7 +24,7 @@ pub(crate) struct Group {
 pub(crate) struct Problem<const D: usize> {
     /// One for each three coordinates; the second is unused when `D = 3`.
     pub(crate) groups: [Group; 2],
-    /// Corners of the way: start of the first leg, inner poses, goal.
+    /// Corners of the path: start of the first leg, inner poses, goal.
     pub(crate) vertices: Vec<[f64; D]>,
     /// The legs between them, by group; see [`ways`].
     pub(crate) ways: [Vec<Way>; 2],
@@ -32,8 +32,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) start: [[f64; D]; 4],
     /// Knot spacing at `z = 1`, s.
     pub(crate) scale: f64,
-    /// While a first iterate from a start in motion breaks limits, its first
-    /// control points stay as for this `z`; a greater `z` only widens limits.
+    /// While a first iterate from a start in motion breaks limits, its first control points stay
+    /// those of this `z`; a greater `z` only widens limits.
     pub(crate) anchor: Option<f64>,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Point<const D: usize> {
     pub(crate) crossings: Vec<f64>,
 }
 
-/// Widened bounds: what the present iterate needs until it is feasible.
+/// Widened bounds that the present iterate needs until it is feasible.
 #[derive(Clone, Debug)]
 pub(crate) struct Room {
     /// Factor on speed, acceleration and jerk of each group.
@@ -121,12 +121,12 @@ impl<const D: usize> Problem<D> {
         ]
     }
 
-    /// Offset of a point of group `g` from the nearest point of the way near a
-    /// leg, and where that is.
+    /// Offset of a point of group `g` from the nearest point of the path near a leg, and that
+    /// point.
     ///
-    /// Starts at the leg and moves on to the next or back to the one before
-    /// while the nearest point is at the end of a leg and that helps: motion
-    /// along a finely divided way is not held up by its division.
+    /// Starts at the leg and changes to the next or previous leg while the nearest point is at the
+    /// end of a leg and the distance falls. So a fine division of the path does not hinder motion
+    /// along it.
     #[inline]
     pub(crate) fn nearest(&self, point: &[f64; 3], leg: usize, g: usize) -> Foot {
         let ways = &self.ways[g];
@@ -151,8 +151,7 @@ impl<const D: usize> Problem<D> {
         best
     }
 
-    /// Direction along which the nearest point of the way slides; zero at a
-    /// corner.
+    /// Direction along which the nearest point of the path moves; zero at a corner.
     pub(crate) fn slide(&self, foot: &Foot, g: usize) -> [f64; 3] {
         let way = &self.ways[g][foot.leg - 1];
         let free = if foot.share > 0.0 && foot.share < 1.0 {
@@ -181,7 +180,7 @@ impl<const D: usize> Point<D> {
         self.control.len().saturating_sub(4)
     }
 
-    /// The span of a time in knots, and the share within it.
+    /// The span of a time in knots, and the local parameter within it.
     pub(crate) fn locate(&self, time: f64) -> (usize, f64) {
         let last = self.spans().saturating_sub(1);
         let span = (time.max(0.0) as usize).min(last);
@@ -257,12 +256,12 @@ pub(crate) struct Way {
     inverse: f64,
 }
 
-/// The point of the way nearest to a given one.
+/// The point of the path nearest to a given one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Foot {
     /// Offset of the given point from it.
     pub(crate) offset: [f64; 3],
-    /// Its leg (index of the far vertex), and the share of that leg.
+    /// Its leg (index of the far vertex), and the fraction of that leg.
     pub(crate) leg: usize,
     pub(crate) share: f64,
 }
@@ -284,7 +283,7 @@ pub(crate) fn ways<const D: usize>(vertices: &[[f64; D]]) -> [Vec<Way>; 2] {
 }
 
 impl Way {
-    /// The nearest point of this leg, which is `leg` in the list.
+    /// The nearest point of this leg, which has index `leg`.
     #[inline]
     fn foot(&self, point: &[f64; 3], leg: usize) -> Foot {
         let (from, way) = (&self.from, &self.way);

@@ -7,17 +7,16 @@ use super::problem::{Point, Problem, Room, part, square};
 /// Iterates are held this far inside the widened bounds.
 const WIDEN: f64 = 1.03;
 
-/// Share of a bound below which it need not be widened.
+/// Fraction of a bound up to which it need not be widened.
 const CLEAR: f64 = 0.99;
 
-/// First corridor samples of a start in motion, and what they may use: they
-/// cannot be moved, and lie in the corridor but not always as far inside as
-/// others are kept.
+/// First corridor samples of a start in motion, and their width: they cannot be moved, and are in
+/// the corridor, but not always as far inside as the others.
 const EASED: usize = 8;
 const EASE: f64 = 1.02;
 
-/// Bound for a present value: the true one when the value is clear of it, else
-/// one widened to hold the value, but never wider than before.
+/// Bound for a present value: the true one if the value is well inside it, otherwise one widened to
+/// contain the value, but never wider than before.
 fn narrowed(before: f64, value: f64, bound: f64, clear: f64) -> f64 {
     if value <= clear * bound {
         bound
@@ -28,8 +27,8 @@ fn narrowed(before: f64, value: f64, bound: f64, clear: f64) -> f64 {
 
 /// Moves every passing time to the closest approach near by, in order.
 ///
-/// With one group that is the least distance; with rotation it is the least
-/// barrier of both balls, so that the time carries no slope of the barrier.
+/// With one group that is the least distance; with rotation it is the least barrier of both balls,
+/// so that the barrier does not depend on the time to first order.
 pub(crate) fn project<const D: usize>(
     problem: &Problem<D>,
     point: &mut Point<D>,
@@ -117,7 +116,7 @@ pub(crate) fn ratios<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> 
 }
 
 impl Room {
-    /// Room for an iterate about which nothing is known yet.
+    /// Widened bounds for an iterate about which nothing is known yet.
     pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
         let mut room = Self {
             caps: [[f64::INFINITY; 3]; 2],
@@ -129,8 +128,8 @@ impl Room {
         room
     }
 
-    /// Shrinks every widened bound to what the iterate needs, and assigns the
-    /// corridor samples to their legs. True when nothing is widened any more.
+    /// Narrows every widened bound to what the iterate needs, and assigns the corridor samples to
+    /// their legs. True if nothing is widened any more.
     pub(crate) fn tighten<const D: usize>(
         &mut self,
         problem: &Problem<D>,
@@ -159,7 +158,7 @@ impl Room {
     fn tighten_caps(&mut self, ratios: &[f64; 3], g: usize) -> bool {
         let mut tight = true;
         for k in 0..3 {
-            // A start in motion may sit close to a limit, and stays there.
+            // A start in motion may be close to a limit, and stays there.
             self.caps[g][k] = narrowed(self.caps[g][k], ratios[k], 1.0, 0.9999);
             tight &= self.caps[g][k] <= 1.0;
         }
@@ -204,7 +203,7 @@ impl Room {
     }
 }
 
-/// Distance of corridor sample `k` from the way near a leg, in group `g`.
+/// Distance of corridor sample `k` from the path near a leg, in group `g`.
 fn away<const D: usize>(
     problem: &Problem<D>,
     point: &Point<D>,

@@ -10,7 +10,7 @@ use super::project::project;
 pub(crate) struct Effort {
     /// Most Newton steps.
     pub(crate) steps: usize,
-    /// Steps after which an iterate that still needs room is given up.
+    /// Steps after which an iterate that still needs widened bounds is given up.
     pub(crate) search: usize,
     /// A start in motion that breaks limits is made feasible by widening them
     /// with `z`, over this many times the spans that the look-ahead needs;
@@ -18,25 +18,24 @@ pub(crate) struct Effort {
     pub(crate) spread: Option<f64>,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
-    /// Time (s) that is of no use any more: an iterate is given up when its
-    /// optimum is above that.
+    /// Longest useful time (s): an iterate is given up if its optimum is above it.
     pub(crate) most: f64,
 }
 
 /// Growth of the weight on `z` at each centre.
 const GROWTH: f64 = 8.0;
 
-/// Steps cut this short, so many times on end, mean that the iterate is stuck
-/// between walls far from its centre: the weight is then lowered, once.
+/// Steps shortened to this fraction, this many times in a row, mean that the iterate is stuck
+/// between constraints far from its centre: the weight is then lowered, once.
 const SHORT: f64 = 0.1;
 const STUCK: usize = 4;
 
-/// Square of a Newton decrement from which steps are cut short for good reason:
-/// the weight has just been raised.
+/// Square of the Newton decrement from which short steps are normal, because the weight has just
+/// been raised.
 const LOW: f64 = 100.0;
 
-/// Steps between two narrowings of widened bounds: the steps between take the
-/// iterate well inside, so that each narrowing is a large one.
+/// Steps between two narrowings of widened bounds: they move the iterate well inside, so that each
+/// narrowing is large.
 const PATIENCE: usize = 4;
 
 /// Back-tracking factor of the line search.
@@ -46,9 +45,8 @@ const BACK: f64 = 0.6;
 /// `None` when no feasible iterate was found.
 ///
 /// # Source
-/// S. Boyd, L. Vandenberghe, "Convex Optimization", 2004, 11.3 (barrier
-/// method); the bounds of a still infeasible iterate are widened to contain it
-/// and follow it inwards.
+/// S. Boyd, L. Vandenberghe, "Convex Optimization", 2004, 11.3 (barrier method); the bounds of an
+/// infeasible iterate are widened to contain it, and narrowed as it moves inwards.
 pub(crate) fn solve<const D: usize, const B: usize>(
     problem: &mut Problem<D>,
     point: &mut Point<D>,
@@ -112,7 +110,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     (tight && problem.anchor.is_none()).then_some(effort.steps)
 }
 
-/// Brings a first iterate to where the descent can begin.
+/// Moves a first iterate to a point from which the descent can begin.
 fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort: Effort) {
     if effort.spread.is_some() && problem.moving() {
         problem.anchor = Some(point.z);
@@ -124,7 +122,7 @@ fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort:
     }
 }
 
-/// Raises `z` until speed, acceleration and jerk hold with room to spare.
+/// Raises `z` until speed, acceleration and jerk hold with a margin.
 fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     let mut need = 0.0_f64;
     for ratios in super::project::ratios(problem, point) {
@@ -137,8 +135,8 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     point.z *= need.max(1e-9);
 }
 
-/// Moves the iterate along the step as far as the barrier falls; the share of
-/// the step, 0 when it does not fall at all.
+/// Moves the iterate along the step as far as the barrier falls; returns the fraction of the step,
+/// 0 if it does not fall at all.
 fn search<const D: usize>(
     problem: &Problem<D>,
     point: &mut Point<D>,

@@ -3,7 +3,7 @@
 
 use super::problem::{Point, Problem, square};
 
-/// Share of the acceleration that the look-ahead uses along the legs.
+/// Fraction of the acceleration that the look-ahead uses along the legs.
 const SHARE: f64 = 0.6;
 
 /// Knot intervals in one time `A / J`.
@@ -12,8 +12,7 @@ const KNOTS_PER_RAMP: f64 = 6.0;
 /// Control points over which the offset of a start in motion fades out.
 const FADE: f64 = 16.0;
 
-/// Rounds of averaging of the control points, and the share of the tolerance
-/// they may use up.
+/// Rounds of averaging of the control points, and the fraction of the tolerance that they may use.
 const ROUNDS: usize = 12;
 const HELD: f64 = 0.3;
 
@@ -21,12 +20,12 @@ const HELD: f64 = 0.3;
 const FEWEST: f64 = 12.0;
 const MOST: f64 = 700.0;
 
-/// Ways that take less than this at full speed (s) are none.
+/// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;
 /// Change of rate (1/s2) on a leg on which nothing moves.
 const FASTEST: f64 = 1e12;
 
-/// A leg measured in time at full speed: progress runs at rate 1 there.
+/// A leg measured in time at full speed: progress has rate 1 there.
 struct Leg<const D: usize> {
     length: f64,
     /// Velocity at rate 1.
@@ -37,7 +36,7 @@ struct Leg<const D: usize> {
 
 /// Progress over time: constant change of rate between the records.
 struct Schedule {
-    /// Time, progress, rate and change of rate at the start of each stretch.
+    /// Time, progress, rate and change of rate at the start of each interval.
     records: Vec<[f64; 4]>,
     /// Junctions at which the rate dips.
     dips: usize,
@@ -68,8 +67,8 @@ impl Schedule {
     }
 }
 
-/// First iterate of a problem whose `scale` it also sets; for a start in motion
-/// `spread` is by how much more time it takes than the look-ahead.
+/// First iterate of a problem; also sets the `scale` of the problem. For a start in motion,
+/// `spread` is the factor on the time of the look-ahead.
 pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64>) -> Point<D> {
     let moving = spread.is_some();
     let legs = legs(problem);
@@ -146,7 +145,7 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
         let length = (0..D / 3)
             .map(|g| norms[g] / groups[g].caps[0])
             .fold(1e-12, f64::max);
-        // A part that stays where it is, as the place does in a turn on the spot, limits nothing.
+        // A part without motion, such as the position in a turn on the spot, limits nothing.
         let acceleration = (0..D / 3)
             .filter(|g| norms[*g] > STILL * groups[*g].caps[0])
             .map(|g| {
@@ -158,7 +157,7 @@ fn legs<const D: usize>(problem: &Problem<D>) -> Vec<Leg<D>> {
         legs.push(Leg {
             length,
             direction: way.map(|x| x / length),
-            // Nor is there anything to speed up where nothing moves.
+            // Nothing can be faster where nothing moves.
             acceleration: acceleration.min(FASTEST),
         });
     }
@@ -189,11 +188,11 @@ fn begin<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>]) -> [f64; 2] {
     ]
 }
 
-/// Rate at each vertex that its ball lets pass; 0 at the end.
+/// Largest rate at each vertex that its ball allows; 0 at the end.
 ///
-/// A corner of velocity jump `m v` inside a ball of radius `tol` costs what an
-/// acceleration ramp of the same jump costs; where the way bends so gently that
-/// the sagitta is below the tolerance, the curvature counts instead.
+/// A corner of velocity jump `m v` inside a ball of radius `tol` takes the time of an acceleration
+/// ramp with the same jump; if the path bends so little that the sagitta is below the tolerance,
+/// the curvature counts instead.
 fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64) -> Vec<f64> {
     let mut rates = vec![0.0; legs.len() + 1];
     for i in 1..legs.len() {
@@ -332,8 +331,8 @@ fn place<const D: usize>(
     point
 }
 
-/// Rounds the corners of the control polygon within the balls: repeated
-/// averaging, held near the way.
+/// Rounds the corners of the control polygon within the balls: repeated averaging, kept near the
+/// path.
 fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     let knots = point.control.len();
     let mut legs = vec![1; knots];
@@ -377,8 +376,8 @@ fn round_off<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     }
 }
 
-/// Lets the offset between the start's own control points and the polyline
-/// fade out over some control points, as a quintic that goes on evenly.
+/// Lets the offset between the control points of the start and the polyline fade out over some
+/// control points, as a quintic that continues smoothly.
 fn blend_in<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     let planned = [1, 2, 3].map(|k| point.control[k]);
     problem.pin(point);
