@@ -71,7 +71,7 @@ pub enum MotionError {
         /// The joint, as people call it.
         joint: String,
         /// How far beyond, with its unit.
-        beyond: String,
+        beyond: JointAmount,
     },
     /// The arm cannot move in the direction of a jog.
     #[error("{0}")]
