@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use ipc::{Arm, Clock, Domain, DriverLink, EngineLink, Probe, Setpoint, State};
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Limits, Piece, Sample, Segment, StopCategory};
+use realtime::{Cycle, Demand, JointLimits, Piece, Sample, Segment, StopCategory};
 use servo::{Control, Event, Executor, ExecutorConfig, Histogram, Remote, SegmentSender};
 
 const N: usize = 6;
@@ -106,8 +106,8 @@ impl Drop for Peer {
     }
 }
 
-fn limits() -> Limits<N> {
-    Limits {
+fn limits() -> JointLimits<N> {
+    JointLimits {
         lower: Joints::from_element(-6.3),
         upper: Joints::from_element(6.3),
         velocity: Joints::from_element(3.1),
@@ -142,7 +142,7 @@ fn driver(arm: &str) {
 /// Cost of the cycle when nothing changes and when everything changes.
 fn governor() {
     let seven = |value: f64| SVector::<f64, 7>::from_element(value);
-    let limits = Limits {
+    let limits = JointLimits {
         lower: seven(-9.0),
         upper: seven(9.0),
         velocity: seven(3.1),

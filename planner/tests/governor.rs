@@ -14,7 +14,7 @@ use planner::robot::{load, vector};
 use planner::task::{Move, Shape, Task};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use realtime::{Cycle, Demand, Limits, Segment, StopCategory};
+use realtime::{Cycle, Demand, JointLimits, Segment, StopCategory};
 
 const PERIOD: f64 = 0.001;
 /// Distance of the tool from the path (m) that rounding may cause.
@@ -35,7 +35,7 @@ struct Leg<const N: usize> {
 /// A robot with its planned program.
 struct Bench<const N: usize> {
     start: SVector<f64, N>,
-    limits: Limits<N>,
+    limits: JointLimits<N>,
     legs: Vec<Leg<N>>,
 }
 
@@ -64,16 +64,9 @@ impl<const N: usize> Bench<N> {
             }
         }
         assert!(legs.len() >= 4, "{}", legs.len());
-        let limits = controller.limits();
         Self {
             start: vector(&robot.home),
-            limits: Limits {
-                lower: limits.lower,
-                upper: limits.upper,
-                velocity: limits.velocity,
-                acceleration: limits.acceleration,
-                jerk: limits.jerk,
-            },
+            limits: *controller.limits(),
             legs,
         }
     }

@@ -3,16 +3,16 @@
 use nalgebra::SVector;
 
 use crate::approach::{Bounds, next_rate};
-use crate::{Limits, Sample};
+use crate::{JointLimits, Sample};
 
 /// Where the joints are one `period` (s) after `now` when each brakes by itself within its
 /// acceleration and jerk limits. Repeated, it ends at rest. It leaves the path.
 ///
 /// ```
 /// use nalgebra::vector;
-/// use realtime::{Limits, Sample, brake};
+/// use realtime::{JointLimits, Sample, brake};
 ///
-/// let limits = Limits {
+/// let limits = JointLimits {
 ///     lower: vector![-3.0],
 ///     upper: vector![3.0],
 ///     velocity: vector![2.0],
@@ -25,7 +25,7 @@ use crate::{Limits, Sample};
 /// }
 /// assert!(now.velocity[0].abs() < 1e-9 && now.acceleration[0] == 0.0);
 /// ```
-pub fn brake<const N: usize>(now: &Sample<N>, limits: &Limits<N>, period: f64) -> Sample<N> {
+pub fn brake<const N: usize>(now: &Sample<N>, limits: &JointLimits<N>, period: f64) -> Sample<N> {
     let moving = now
         .velocity
         .zip_map(&now.acceleration, |velocity, acceleration| {

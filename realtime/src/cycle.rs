@@ -6,7 +6,7 @@ use crate::brake::{at_rest, brake};
 use crate::buffer::{Buffer, Cursor, Pushed};
 use crate::governor::{Aim, Governor, Outlook, StopCategory, scale};
 use crate::guard::{Trip, check};
-use crate::{Limits, Sample, Segment};
+use crate::{JointLimits, Sample, Segment};
 
 /// What the operator or a fault demands of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,9 +61,9 @@ const LOW_HORIZON: f64 = 0.5;
 ///
 /// ```
 /// use nalgebra::vector;
-/// use realtime::{Cycle, Demand, Limits, Piece, Pushed, Sample, Segment};
+/// use realtime::{Cycle, Demand, JointLimits, Piece, Pushed, Sample, Segment};
 ///
-/// let limits = Limits {
+/// let limits = JointLimits {
 ///     lower: vector![-3.0],
 ///     upper: vector![3.0],
 ///     velocity: vector![2.0],
@@ -84,7 +84,7 @@ const LOW_HORIZON: f64 = 0.5;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Cycle<const N: usize, const B: usize> {
-    limits: Limits<N>,
+    limits: JointLimits<N>,
     period: f64,
     buffer: Buffer<N, B>,
     at: Cursor,
@@ -97,7 +97,7 @@ pub struct Cycle<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Cycle<N, B> {
     /// A cycle that rests in `position` (rad) and makes a setpoint each `period` (s).
-    pub fn new(position: SVector<f64, N>, limits: Limits<N>, period: f64) -> Self {
+    pub fn new(position: SVector<f64, N>, limits: JointLimits<N>, period: f64) -> Self {
         Self {
             limits,
             period,

@@ -18,7 +18,7 @@
 use crate::approach::{Bounds, next_rate, ramp_periods};
 use crate::buffer::{Buffer, Cursor};
 use crate::piece::of;
-use crate::{Limits, Sample};
+use crate::{JointLimits, Sample};
 
 /// How hard the path factor is changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,7 @@ pub(crate) struct Aim {
 pub(crate) struct Outlook<'a, const N: usize, const B: usize> {
     pub(crate) buffer: &'a Buffer<N, B>,
     pub(crate) at: Cursor,
-    pub(crate) limits: &'a Limits<N>,
+    pub(crate) limits: &'a JointLimits<N>,
 }
 
 /// A candidate: the rate after this period, and how many periods the ramp to zero takes from there.

@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 
 use crate::piece::of;
-use crate::{Limits, Sample};
+use crate::{JointLimits, Sample};
 
 /// The quantity whose limit was broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +74,7 @@ const POSITION_ROUNDING: f64 = 1e-6;
 pub fn check<const N: usize>(
     previous: &Sample<N>,
     next: &Sample<N>,
-    limits: &Limits<N>,
+    limits: &JointLimits<N>,
     period: f64,
 ) -> Option<Trip> {
     (0..N).find_map(|joint| {
@@ -107,7 +107,11 @@ pub fn check<const N: usize>(
 
 /// What is wrong with one joint of a setpoint by itself: a number that is not finite, or a
 /// position out of range.
-fn check_range<const N: usize>(joint: usize, next: &Sample<N>, limits: &Limits<N>) -> Option<Trip> {
+fn check_range<const N: usize>(
+    joint: usize,
+    next: &Sample<N>,
+    limits: &JointLimits<N>,
+) -> Option<Trip> {
     let position = of(&next.position, joint);
     let trip = |quantity, limit| {
         Some(Trip {
@@ -163,8 +167,8 @@ mod tests {
     use super::*;
     use nalgebra::vector;
 
-    fn limits() -> Limits<2> {
-        Limits {
+    fn limits() -> JointLimits<2> {
+        JointLimits {
             lower: vector![-3.0, -3.0],
             upper: vector![3.0, 3.0],
             velocity: vector![2.0, 2.0],

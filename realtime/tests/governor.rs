@@ -11,13 +11,13 @@
 use nalgebra::SVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use realtime::{Cycle, Demand, Limits, Piece, Pushed, Sample, Segment, StopCategory};
+use realtime::{Cycle, Demand, JointLimits, Piece, Pushed, Sample, Segment, StopCategory};
 
 const N: usize = 3;
 type Joints = SVector<f64, N>;
 
-fn limits() -> Limits<N> {
-    Limits {
+fn limits() -> JointLimits<N> {
+    JointLimits {
         lower: Joints::from_element(-100.0),
         upper: Joints::from_element(100.0),
         velocity: Joints::new(3.0, 2.0, 4.0),

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use ipc::{Arm, Clock, IpcError};
-use realtime::{Following, Limits};
+use realtime::{Following, JointLimits};
 use scheduling::RealTimeRequest;
 use thiserror::Error;
 
@@ -17,7 +17,7 @@ pub struct ExecutorConfig<const N: usize> {
     /// By the wall clock, or in lock-step with the driver.
     pub clock: Clock,
     /// Limits of the joints, for the last check of each setpoint.
-    pub limits: Limits<N>,
+    pub limits: JointLimits<N>,
     /// How far the measured position may be from the setpoint.
     pub following: Following,
     /// The driver stops by itself after this time without setpoints.
@@ -40,7 +40,7 @@ pub struct ExecutorConfig<const N: usize> {
 
 impl<const N: usize> ExecutorConfig<N> {
     /// The usual choice for an arm: 1000 Hz by the clock, watchdog and patience 100 ms.
-    pub fn new(arm: Arm, limits: Limits<N>) -> Self {
+    pub fn new(arm: Arm, limits: JointLimits<N>) -> Self {
         Self {
             arm,
             rate_hz: 1000.0,

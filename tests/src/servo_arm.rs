@@ -1,7 +1,7 @@
 //! Planned motions of a six-joint arm for the tests of the servo loop.
 
 use nalgebra::SVector;
-use realtime::{Limits, Piece, Sample, Segment};
+use realtime::{JointLimits, Piece, Sample, Segment};
 use servo::{ExecutorConfig, SegmentSender};
 
 /// Joints of the test arm.
@@ -11,8 +11,8 @@ pub const JOINTS: usize = 6;
 pub type Joints = SVector<f64, JOINTS>;
 
 /// Limits of the test arm.
-pub fn limits() -> Limits<JOINTS> {
-    Limits {
+pub fn limits() -> JointLimits<JOINTS> {
+    JointLimits {
         lower: Joints::from_element(-6.3),
         upper: Joints::from_element(6.3),
         velocity: Joints::from_element(3.1),

@@ -120,15 +120,7 @@ fn start<'a, const N: usize>(
     ends: Ends,
 ) -> Result<(Executor<N>, Worker<'a, N>), SessionError> {
     let mut controller = Controller::<N>::new(robot, config.rate_hz, config.default_length)?;
-    let limits = controller.limits();
-    let limits = realtime::Limits {
-        lower: limits.lower,
-        upper: limits.upper,
-        velocity: limits.velocity,
-        acceleration: limits.acceleration,
-        jerk: limits.jerk,
-    };
-    let mut wanted = ExecutorConfig::new(config.arm.clone(), limits);
+    let mut wanted = ExecutorConfig::new(config.arm.clone(), *controller.limits());
     wanted.rate_hz = config.rate_hz;
     wanted.clock = config.clock;
     wanted.wait_for_planner = config.clock == Clock::LockStep;

@@ -5,7 +5,7 @@
 //! null-space motion. The candidates are polynomials fitted to that path.
 
 use super::null_space::{NullSpace, NullSpacePolynomial};
-use super::trace::{Task, smallest};
+use super::trace::{Guess, Task, smallest};
 use nalgebra::{SMatrix, SVector};
 
 /// Steps along the path.
@@ -67,7 +67,11 @@ fn fill<const N: usize>(
         at
     };
     let cell = |q0: &SVector<f64, N>, u: f64, column: usize| {
-        let q = task.newton((q0, SURPRISE), u, still, &value(column))?;
+        let guess = Guess {
+            q: q0,
+            within: SURPRISE,
+        };
+        let q = task.newton(&guess, u, still, &value(column))?;
         Some(Cell {
             q,
             cost: cost(task, &q),

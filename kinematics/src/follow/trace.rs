@@ -38,6 +38,13 @@ struct Overrun {
     amount: f64,
 }
 
+/// Joint positions near which others are searched for.
+pub(super) struct Guess<'a, const N: usize> {
+    pub(super) q: &'a SVector<f64, N>,
+    /// How far from it a joint of the solution may be (rad, m).
+    pub(super) within: f64,
+}
+
 impl<const N: usize> Task<'_, N> {
     /// Checks that the arm is at the start of the path.
     pub(super) fn check_start(&self, start: &SVector<f64, N>) -> Result<(), FollowError> {
@@ -151,25 +158,23 @@ impl<const N: usize> Task<'_, N> {
         u: f64,
         null_space: &NullSpace<N>,
     ) -> Option<SVector<f64, N>> {
-        self.newton(
-            (&predict(last, u), SURPRISE),
-            u,
-            null_space,
-            &null_space.at(u),
-        )
+        let guess = Guess {
+            q: &predict(last, u),
+            within: SURPRISE,
+        };
+        self.newton(&guess, u, null_space, &null_space.at(u))
     }
 
-    /// Joint positions at `u` with given values of the spare functions, within
-    /// `surprise` of `predicted`.
+    /// Joint positions at `u` near a guess, with given values of the spare functions.
     pub(super) fn newton(
         &self,
-        (predicted, surprise): (&SVector<f64, N>, f64),
+        guess: &Guess<'_, N>,
         u: f64,
         null_space: &NullSpace<N>,
         at: &[f64; 2],
     ) -> Option<SVector<f64, N>> {
         let target = Goal::Pose((self.tool)(u).pose);
-        let mut q = *predicted;
+        let mut q = *guess.q;
         let mut reached = f64::INFINITY;
         for _ in 0..12 {
             let (pose_error, jacobian) = self.solver.pose_error_at(&target, &q);
@@ -189,7 +194,7 @@ impl<const N: usize> Task<'_, N> {
             reached = error;
             let x = linear::solve::<N>(&rows, &b, &[0.0; 8]);
             q += SVector::from_fn(|i, _| x[i]);
-            if (q - *predicted).amax() > surprise {
+            if (q - *guess.q).amax() > guess.within {
                 return None;
             }
         }

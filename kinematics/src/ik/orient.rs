@@ -26,7 +26,7 @@ pub(crate) fn orient<A: Four>(
     let tilts = if square([first, middle, last]) {
         let across = Vec4::splat(a, first).cross(axis);
         let one = F4::splat(a, 1.0);
-        wave.with_rest(across.dot(across), (one, one), 1e-12)
+        wave.with_rest(across.dot(across), one, one, 1e-12)
     } else {
         wave.solve(1e-12)
     };

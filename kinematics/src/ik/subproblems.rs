@@ -236,12 +236,12 @@ impl<A: Four> TrigEquation<A> {
     pub(crate) fn solve(self, slack: f64) -> Pair<A> {
         let r2 = self.x.fma(self.x, self.y * self.y);
         let rest = self.d.taken_from(self.d, r2);
-        self.with_rest(rest, (r2, self.scale), slack)
+        self.with_rest(rest, r2, self.scale, slack)
     }
 
     /// The same with the discriminant `x^2 + y^2 - d^2` known to better accuracy.
     #[inline(always)]
-    pub(crate) fn with_rest(self, rest: F4<A>, (r2, scale): (F4<A>, F4<A>), slack: f64) -> Pair<A> {
+    pub(crate) fn with_rest(self, rest: F4<A>, r2: F4<A>, scale: F4<A>, slack: f64) -> Pair<A> {
         let Self { x, y, d, .. } = self;
         let zero = F4::splat(x.build(), 0.0);
         let free = r2.le(scale * 1e-20);

@@ -39,7 +39,7 @@ impl<const N: usize> Planner<N> {
         }
         let line = Line::new(from, goal);
         let points = self
-            .followed((&line, false), start, &|_| 1)
+            .followed(&line, false, start, &|_| 1)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let options = TimingOptions {
             start: Boundary::Rest,
@@ -98,7 +98,7 @@ impl<const N: usize> Planner<N> {
                 .count()
         };
         let points = self
-            .followed((&plan, true), start, &towards)
+            .followed(&plan, true, start, &towards)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
         let free = direct.duration();
@@ -130,7 +130,8 @@ impl<const N: usize> Planner<N> {
     /// enough that a quintic between its points stays on the curve.
     fn followed(
         &self,
-        (curve, still_ends): (&dyn ToolCurve, bool),
+        curve: &dyn ToolCurve,
+        still_ends: bool,
         start: &SVector<f64, N>,
         towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {

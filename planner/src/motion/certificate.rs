@@ -168,10 +168,11 @@ pub(super) fn way<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
     start: &Isometry3<f64>,
-    (draft, bounds): (&Draft<N>, &MotionBounds<N>),
+    draft: &Draft<N>,
+    bounds: &MotionBounds<N>,
 ) -> Way {
     let (poses, in_order) = match motion.shape {
-        Shape::Smooth => crossings(motion, chain, (&draft.trajectory, &draft.crossings)),
+        Shape::Smooth => crossings(motion, chain, &draft.trajectory, &draft.crossings),
         Shape::Joint | Shape::Straight => (Vec::new(), true),
     };
     let last = draft.trajectory.sample(draft.trajectory.duration());
@@ -223,7 +224,8 @@ fn legs(motion: &Move, start: &Isometry3<f64>, crossings: &[CrossingReport]) -> 
 fn crossings<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
-    (trajectory, times): (&Trajectory<N>, &[f64]),
+    trajectory: &Trajectory<N>,
+    times: &[f64],
 ) -> (Vec<CrossingReport>, bool) {
     let intermediate = &motion.poses[..motion.poses.len() - 1];
     let angular_tolerance_rad = angular_tolerance(motion.tolerance);

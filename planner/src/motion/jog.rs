@@ -39,7 +39,7 @@ impl<const N: usize> Planner<N> {
     ) -> Result<PlannedMove<N>, MotionError> {
         match direction {
             Direction::Joints(shares) => self.jog_joints(shares, start, most),
-            Direction::Tool { linear, angular } => self.jog_tool((linear, angular), start, most),
+            Direction::Tool { linear, angular } => self.jog_tool(linear, angular, start, most),
         }
     }
 
@@ -86,7 +86,8 @@ impl<const N: usize> Planner<N> {
 
     fn jog_tool(
         &self,
-        (linear, angular): (&Vector3<f64>, &Vector3<f64>),
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
         start: &SVector<f64, N>,
         most: &ToolLimits,
     ) -> Result<PlannedMove<N>, MotionError> {

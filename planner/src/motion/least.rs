@@ -14,7 +14,8 @@ impl<const N: usize> Planner<N> {
     pub(super) fn least_time(
         &self,
         motion: &Move,
-        (start, end): (&SVector<f64, N>, &SVector<f64, N>),
+        start: &SVector<f64, N>,
+        end: &SVector<f64, N>,
         draft: &Draft<N>,
     ) -> f64 {
         let mut poses = vec![self.chain().forward(start)];
@@ -30,7 +31,7 @@ impl<const N: usize> Planner<N> {
         // The joints of a seven-joint arm may stop elsewhere at the same poses.
         let stops = motion.shape == Shape::Smooth && motion.tolerance == 0.0 && N <= 6;
         let joints = if stops {
-            self.least_with_stops(motion, (start, end), draft)
+            self.least_with_stops(motion, start, end, draft)
         } else {
             self.least_of_joints(start, end)
         };
@@ -53,7 +54,8 @@ impl<const N: usize> Planner<N> {
     fn least_with_stops(
         &self,
         motion: &Move,
-        (start, end): (&SVector<f64, N>, &SVector<f64, N>),
+        start: &SVector<f64, N>,
+        end: &SVector<f64, N>,
         draft: &Draft<N>,
     ) -> f64 {
         let options = SmoothOptions::new(0.0, motion.limits);

@@ -246,9 +246,7 @@ impl<const N: usize> Planner<N> {
         check_smooth(&draft.trajectory, start)?;
         let (draft, bounds) = self.within_limits(draft, motion);
         let end = draft.trajectory.sample(draft.trajectory.duration());
-        let ends = (start, &end.position);
-        let lower_bound_s = self.least_time(motion, ends, &draft);
-        let certificate = self.certificate(motion, ends, (&draft, &bounds), lower_bound_s);
+        let certificate = self.certificate(motion, start, &draft, &bounds);
         check(&certificate, motion)?;
         Ok(PlannedMove {
             trajectory: draft.trajectory,
@@ -262,12 +260,14 @@ impl<const N: usize> Planner<N> {
     fn certificate(
         &self,
         motion: &Move,
-        (start, _): (&SVector<f64, N>, &SVector<f64, N>),
-        (draft, bounds): (&Draft<N>, &MotionBounds<N>),
-        lower_bound_s: f64,
+        start: &SVector<f64, N>,
+        draft: &Draft<N>,
+        bounds: &MotionBounds<N>,
     ) -> MoveCertificate {
+        let end = draft.trajectory.sample(draft.trajectory.duration());
+        let lower_bound_s = self.least_time(motion, start, &end.position, draft);
         let from = self.chain().forward(start);
-        let way = certificate::way(motion, self.chain(), &from, (draft, bounds));
+        let way = certificate::way(motion, self.chain(), &from, draft, bounds);
         let name = |limit| active::name(limit, &self.joint_names);
         let spans = bounds.active(active::ACTIVE).into_iter();
         let active = spans.map(|span| ActiveLimit {

@@ -119,7 +119,7 @@ fn command(recording: &Recording<'_>, span: &Span<'_>, mut report: RuleReport) -
     run::path_time(recording, span, &mut report);
     run::measured(recording, span, &mut report);
     match &span.task {
-        Some(Task::Move(motion)) => moved(recording, (span, motion), &mut verdict, &mut report),
+        Some(Task::Move(motion)) => moved(recording, span, motion, &mut verdict, &mut report),
         Some(task) => {
             stillness::standstill(recording, span, &mut report);
             if let Some(seconds) = least_time(recording, span, task) {
@@ -137,7 +137,8 @@ fn command(recording: &Recording<'_>, span: &Span<'_>, mut report: RuleReport) -
 /// The rules of moves.
 fn moved(
     recording: &Recording<'_>,
-    (span, motion): (&Span<'_>, &Move),
+    span: &Span<'_>,
+    motion: &Move,
     verdict: &mut CommandVerdict,
     report: &mut RuleReport,
 ) {
@@ -146,10 +147,10 @@ fn moved(
         return;
     }
     let states = tool::states(recording, span);
-    tool::caps(recording, span, (&states, &motion.limits), report);
+    tool::caps(recording, span, &states, &motion.limits, report);
     match (motion.shape, motion.poses.last()) {
         (Shape::Straight, Some(goal)) => {
-            let off = straight::straight(recording, span, (&states, goal), report);
+            let off = straight::straight(recording, span, &states, goal, report);
             verdict.straightness_m = Some(off);
         }
         (Shape::Smooth, Some(_)) => {

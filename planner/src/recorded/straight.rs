@@ -20,7 +20,8 @@ const HALF_TURN: f64 = 1e-6;
 pub(super) fn straight(
     recording: &Recording<'_>,
     span: &Span<'_>,
-    (states, goal): (&[ToolState], &Isometry3<f64>),
+    states: &[ToolState],
+    goal: &Isometry3<f64>,
     report: &mut RuleReport,
 ) -> f64 {
     // The row before its own is up to a period before the start.

@@ -59,7 +59,8 @@ const TOOL: Subject = Subject::The("the tool");
 pub(super) fn caps(
     recording: &Recording<'_>,
     span: &Span<'_>,
-    (states, limits): (&[ToolState], &ToolLimits),
+    states: &[ToolState],
+    limits: &ToolLimits,
     report: &mut RuleReport,
 ) {
     let shown = span.shown();

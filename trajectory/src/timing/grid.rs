@@ -107,14 +107,14 @@ impl Grid {
         };
         let samples: Vec<f64> = (0..=spans).map(sample).collect();
         let reparametrization =
-            Reparametrization::new(&samples, span, end, (options.start, options.end));
+            Reparametrization::new(&samples, span, end, [options.start, options.end]);
         let reparametrization = if reparametrization.ascends() {
             reparametrization
         } else {
             // A start too far from the law of the reachability pass: constant speed is always
             // valid.
             let even = vec![end / total; spans + 1];
-            Reparametrization::new(&even, span, end, (options.start, options.end))
+            Reparametrization::new(&even, span, end, [options.start, options.end])
         };
         Self::with_reparametrization(reparametrization, knots, end, cells)
     }

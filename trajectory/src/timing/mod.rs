@@ -45,6 +45,7 @@ use grid::{Bounded, Grid};
 use gridpoints::Gridpoints;
 use reachability::ReachabilityPass;
 
+use crate::limits::check_joints;
 use crate::{JointLimits, Path, TimingError, ToolLimits, Trajectory};
 
 /// A path with its time law.
@@ -69,7 +70,7 @@ pub fn time_path<const N: usize>(
     tool: &ToolLimits,
     options: &TimingOptions,
 ) -> Result<Timed<N>, TimingError> {
-    joint.check()?;
+    check_joints(joint)?;
     tool.check()?;
     options.check()?;
     let reachability = ReachabilityPass::new(path, joint, tool, options)?;

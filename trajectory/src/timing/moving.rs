@@ -33,7 +33,7 @@ pub(super) fn best<const N: usize>(
         enter(&mut interior, &problem)?;
         interior.slow_down(&problem);
         interior.solve(&problem, bounded.options.gap, 0.3, MOST_STEPS);
-        let draft = Draft::new(bounded, (gridpoints, &problem), &interior);
+        let draft = Draft::new(bounded, gridpoints, &problem, &interior);
         if draft.audit.stretch_after_first() <= 1.0 {
             return start_holds(draft);
         }

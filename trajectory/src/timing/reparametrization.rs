@@ -30,12 +30,7 @@ fn closing(boundary: Boundary, end: f64, first: f64, span: f64) -> (f64, f64) {
 impl Reparametrization {
     /// A reparametrization whose speed follows `samples`, `span` apart, and whose range is `0..=end`; the span
     /// is adapted so that it fits. Three samples at least.
-    pub(super) fn new(
-        samples: &[f64],
-        span: f64,
-        end: f64,
-        boundaries: (Boundary, Boundary),
-    ) -> Self {
+    pub(super) fn new(samples: &[f64], span: f64, end: f64, boundaries: [Boundary; 2]) -> Self {
         let mut reparametrization = Self::of(samples, span, boundaries);
         for _ in 0..8 {
             let total = reparametrization.end();
@@ -48,13 +43,13 @@ impl Reparametrization {
     }
 
     /// The reparametrization with exactly this span.
-    fn of(samples: &[f64], span: f64, boundaries: (Boundary, Boundary)) -> Self {
+    fn of(samples: &[f64], span: f64, boundaries: [Boundary; 2]) -> Self {
         let count = samples.len();
         let mut d = Vec::with_capacity(count + 2);
-        let (outside, edge) = closing(boundaries.0, samples[0], samples[1], span);
+        let (outside, edge) = closing(boundaries[0], samples[0], samples[1], span);
         d.extend([outside, edge]);
         d.extend_from_slice(&samples[1..count - 1]);
-        let (outside, edge) = closing(boundaries.1, samples[count - 1], samples[count - 2], span);
+        let (outside, edge) = closing(boundaries[1], samples[count - 1], samples[count - 2], span);
         d.extend([edge, outside]);
         let mut start = 0.0;
         let (mut speeds, mut starts) = (Vec::with_capacity(count), vec![0.0]);
@@ -152,7 +147,7 @@ mod tests {
     fn meets_its_ends_and_inverts() {
         let samples: Vec<f64> = (0..=20).map(|i| 1.0 + (f64::from(i) * 0.3).sin()).collect();
         let reparametrization =
-            Reparametrization::new(&samples, 0.1, 3.0, (Boundary::Rest, Boundary::Rest));
+            Reparametrization::new(&samples, 0.1, 3.0, [Boundary::Rest, Boundary::Rest]);
         assert!(reparametrization.ascends());
         let [u, du, ddu, _] = reparametrization.at(0.0);
         assert_eq!([u, du], [0.0, 0.0]);
@@ -171,7 +166,7 @@ mod tests {
             acceleration: -0.4,
         };
         let reparametrization =
-            Reparametrization::new(&[1.0; 12], 0.1, 2.0, (moving, Boundary::Rest));
+            Reparametrization::new(&[1.0; 12], 0.1, 2.0, [moving, Boundary::Rest]);
         let [u, du, ddu, _] = reparametrization.at(0.0);
         assert!(u == 0.0 && (du - 0.7).abs() < 1e-12 && (ddu + 0.4).abs() < 1e-12);
         assert!((reparametrization.at(reparametrization.duration())[0] - 2.0).abs() < 1e-12);

@@ -28,7 +28,7 @@ pub(super) fn best<const N: usize>(
     let mut interior = Interior::new(&problem);
     interior.slow_down(&problem);
     interior.solve(&problem, gap, 0.3, MOST_STEPS);
-    let mut last = Draft::new(bounded, (gridpoints, &problem), &interior);
+    let mut last = Draft::new(bounded, gridpoints, &problem, &interior);
     let mut best = None;
     for _ in 0..ROUNDS {
         if last.audit.stretch < ENOUGH {
@@ -38,7 +38,7 @@ pub(super) fn best<const N: usize>(
         best = Some(faster(best, last));
         interior.slow_down(&problem);
         interior.solve(&problem, gap, 0.02, FEW_STEPS);
-        last = Draft::new(bounded, (gridpoints, &problem), &interior);
+        last = Draft::new(bounded, gridpoints, &problem, &interior);
     }
     let mut best = faster(best, last);
     best.iterations = interior.iterations;

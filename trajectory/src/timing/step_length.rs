@@ -62,7 +62,7 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a cap of `a`, which changes by `da`.
     #[inline(always)]
-    fn value(&mut self, cap: &Lane, row: &mut ConstraintRow, (a, da): (F4<S>, F4<S>)) {
+    fn value(&mut self, cap: &Lane, row: &mut ConstraintRow, a: F4<S>, da: F4<S>) {
         let one = F4::splat(self.simd, 1.0);
         let d = F4::load(self.simd, cap) * da;
         let m = F4::load(self.simd, &row.multiplier);
@@ -136,8 +136,8 @@ impl Op for Measure<'_> {
             let width = F4::load(simd, &basis.width);
             let half = width * 0.5;
             let (middle, further) = (left.moved(half), change.moved(half));
-            step_lengths.value(&value[0][1], &mut cap[0], (left.a, change.a));
-            step_lengths.value(&value[1][1], &mut cap[1], (middle.a, further.a));
+            step_lengths.value(&value[0][1], &mut cap[0], left.a, change.a);
+            step_lengths.value(&value[1][1], &mut cap[1], middle.a, further.a);
             step_lengths.values(lines.values(), change);
             step_lengths.values(lines.values(), further);
             for share in self.problem.jerk_shares(i) {

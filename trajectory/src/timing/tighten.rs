@@ -28,7 +28,8 @@ impl<const N: usize> Draft<N> {
     /// The pieces of the law `x` and their bounds.
     pub(super) fn new(
         bounded: Bounded<'_, N>,
-        (gridpoints, problem): (&Gridpoints<'_, N>, &Problem),
+        gridpoints: &Gridpoints<'_, N>,
+        problem: &Problem,
         interior: &Interior,
     ) -> Self {
         let pieces = Maker::new(bounded, gridpoints).make(problem, &interior.x);
@@ -64,7 +65,7 @@ pub(super) fn tighten<const N: usize>(problem: &mut Problem, draft: &Draft<N>, m
             .zip(row)
             .filter(|(_, x)| **x > 1.0)
         {
-            scale(problem, (k, &tools), *limit, *excess * more);
+            scale(problem, k, &tools, *limit, *excess * more);
         }
     }
 }
@@ -85,7 +86,7 @@ impl Tools {
 }
 
 /// Scales the rows of one limit in cell `k`.
-fn scale(problem: &mut Problem, (k, tools): (usize, &Tools), limit: Limit, factor: f64) {
+fn scale(problem: &mut Problem, k: usize, tools: &Tools, limit: Limit, factor: f64) {
     let ends = [(k, false), (k, true), (k + 1, false)];
     let values = ends.map(|(k, middle)| (Problem::value_slot(k, middle), k % LANE));
     let (jerks, l) = (problem.jerk_slots(k), k % LANE);
