@@ -32,7 +32,7 @@ const KNOWN: [(&str, &str); 17] = [
     ("plan", "run::assignment, run::machine"),
     ("trajectory", "active, smooth, timing"),
     ("trajectory", "otg::line, otg::plan"),
-    ("trajectory", "smooth::approach, smooth::pass"),
+    ("trajectory", "smooth::approach, smooth::crossing"),
     ("trajectory", "smooth::plan, smooth::windows"),
     ("trajectory", "timing::lines, timing::state"),
     ("trajectory", "timing::moving, timing::tighten"),
