@@ -160,8 +160,9 @@ impl ToolCurve for SmoothPlan {
 /// ```
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
-    match fitted(poses, &options.finite()) {
-        Some(fitted) if poses.len() > BOTH => Ok(fitted),
+    let finite = options.finite();
+    match fitted(poses, &finite) {
+        Some(fitted) if dense::suffices(poses, &finite) => Ok(fitted),
         Some(fitted) => {
             let plan = by_spline(poses, options)?;
             let better = fitted.duration() < plan.duration();
@@ -170,9 +171,6 @@ pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothP
         None => by_spline(poses, options),
     }
 }
-
-/// Dense lists up to this length are planned in both ways.
-const BOTH: usize = 64;
 
 /// The certified motion along a fitted curve, where the list is dense in poses.
 fn fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<SmoothPlan> {

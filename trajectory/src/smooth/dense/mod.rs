@@ -34,6 +34,10 @@ const TURN: f64 = 0.1;
 const FEWEST: usize = 16;
 /// A list is dense when most of its legs take less than this share of the braking time.
 const LEG: f64 = 1.0 / 16.0;
+/// A leg longer than so many short ones makes a list one of mixed density.
+const LONGEST: f64 = 4.0;
+/// Dense lists up to this length are planned in both ways.
+const BOTH: usize = 64;
 /// Relative difference of leg lengths below which they tell no direction.
 const EVEN: f64 = 1e-6;
 
@@ -78,14 +82,23 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
 
 /// Whether most legs are short beside the way of braking.
 fn is_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let short = |pair: &&[Isometry3<f64>]| leg(pair, options) <= LEG;
+    poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
+}
+
+/// Whether a list needs no other way of planning: it is long, and dense all along.
+pub(super) fn suffices(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let even = |pair: &[Isometry3<f64>]| leg(pair, options) <= LONGEST * LEG;
+    poses.len() > BOTH && poses.windows(2).all(even)
+}
+
+/// Time of a leg at full speed over the braking time.
+fn leg(pair: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
     let limits = &options.limits;
     let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
-    let short = |pair: &&[Isometry3<f64>]| {
-        let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
-        let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
-        (way / limits.speed).max(turn / limits.angular_speed) <= LEG * brake
-    };
-    poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
+    let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
+    let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
+    (way / limits.speed).max(turn / limits.angular_speed) / brake
 }
 
 /// Whether the list is the other one of the two that are the same way there and back: the one that
