@@ -66,7 +66,6 @@ pub(crate) fn the_arm_stands_where_the_engine_says() {
         let n = 0; for (let k = 0; k < a.length; k += 4) n += a[k] !== b[k] || a[k + 1] !== b[k + 1]; return n; })()";
     let pixels = tab.number(count);
     assert!(pixels > 3000.0, "{pixels} pixels of arm");
-    assert_eq!(tab.number("__view.samples.gaps + 0") >= 0.0, true);
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
 }
 

@@ -97,6 +97,8 @@ function setStatus(message) {
   get('recover').hidden = kind !== 'fault';
   get('resume').hidden = kind !== 'held';
   get('pause').hidden = kind === 'held';
+  // What stands still for ever has nothing to stop.
+  document.body.dataset.live = replay || dry ? 'no' : 'yes';
   notice(message.engine ? '' : message.reason);
   if (message.replay) player.set(message.replay);
   if (!status || !robot) return;
