@@ -71,7 +71,6 @@ fn main() {
         worst = worst.max(motion / reference);
     }
     lines.extend(long_lists(limits));
-    let dense = dense_lists(limits);
     for line in lines {
         println!("{line}");
     }
@@ -80,14 +79,12 @@ fn main() {
         "ratio motion-geomean {:.4}",
         (sum / cases.len() as f64).exp()
     );
-    for line in dense {
-        println!("{line}");
-    }
+    dense_lists(limits);
 }
 
 /// Lists dense in poses, beside the least time along the exact curve. Budget: 1.02 of it, 20 ms for
-/// 1000 poses.
-fn dense_lists(limits: ToolLimits) -> Vec<String> {
+/// 1000 poses. Prints rows, then ratios.
+fn dense_lists(limits: ToolLimits) {
     let (mut lines, mut worst) = (Vec::new(), 0.0_f64);
     for case in dense::suite() {
         let options = SmoothOptions::new(case.tolerance, limits);
@@ -111,8 +108,10 @@ fn dense_lists(limits: ToolLimits) -> Vec<String> {
         lines.push(format!("ratio motion-dense-{} {ratio:.4}", case.name));
         worst = if ratio <= worst { worst } else { ratio };
     }
-    lines.push(format!("ratio motion-dense-worst {worst:.4}"));
-    lines
+    for line in lines {
+        println!("{line}");
+    }
+    println!("ratio motion-dense-worst {worst:.4}");
 }
 
 /// A zigzag of 1000 and of 10 000 poses in windows: time until motion can
