@@ -15,7 +15,7 @@ use crate::arm::{Kind, Order};
 use crate::cell::{Cell, ConnectionId, Inner, Last};
 use crate::framing::{Frame, Frames, LONGEST_DOCUMENT};
 use crate::report::Choice;
-use crate::server::Units;
+use crate::si::Units;
 use crate::stopper::Stop;
 
 /// How long a client may take to read a status before it is cut off.

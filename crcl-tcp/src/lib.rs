@@ -24,4 +24,5 @@ mod stopper;
 pub use allow::{AllowError, Network};
 pub use client::{Client, ClientError, Progress};
 pub use framing::{Frame, Frames, LONGEST_DOCUMENT};
-pub use server::{LARGEST_CROWD, Server, ServerConfig, ServerError, Units, WhenGone};
+pub use server::{LARGEST_CROWD, Server, ServerConfig, ServerError, WhenGone};
+pub use si::Units;

@@ -8,7 +8,6 @@ use std::thread::{Builder, JoinHandle, sleep};
 use std::time::Duration;
 
 use crcl::xml::{CommandState, CommandStatus, Status, write_status};
-use crcl::{AngleUnit, LengthUnit};
 use ipc::Arm;
 use thiserror::Error;
 
@@ -16,7 +15,7 @@ use crate::allow::Network;
 use crate::arm::Follower;
 use crate::cell::{Cell, ConnectionId};
 use crate::connection::{Connection, Manners, Ways};
-use crate::si::ConnectionUnits;
+use crate::si::Units;
 use crate::stopper::{self, Stop};
 
 /// How many connections are served at once.
@@ -24,25 +23,6 @@ pub const LARGEST_CROWD: usize = 64;
 
 /// How often the listener looks for a connection.
 const LOOK: Duration = Duration::from_millis(5);
-
-/// The units of a connection that has not set its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Units {
-    /// Unit of lengths. Default: millimetre, as NIST's clients expect.
-    pub length: LengthUnit,
-    /// Unit of angles. Default: degree, as NIST's clients expect.
-    pub angle: AngleUnit,
-}
-
-impl Units {
-    pub(crate) fn of_connection(self) -> ConnectionUnits {
-        ConnectionUnits {
-            length: self.length,
-            angle: self.angle,
-            ..ConnectionUnits::default()
-        }
-    }
-}
 
 /// What happens when a client goes away while its command is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

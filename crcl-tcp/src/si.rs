@@ -6,6 +6,25 @@ use crcl::xml::{
 };
 use crcl::{AngleUnit, ForceUnit, LengthUnit, Pose, TorqueUnit};
 
+/// The units of a connection that has not set its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Units {
+    /// Unit of lengths. Default: millimetre, as NIST's clients expect.
+    pub length: LengthUnit,
+    /// Unit of angles. Default: degree, as NIST's clients expect.
+    pub angle: AngleUnit,
+}
+
+impl Units {
+    pub(crate) fn of_connection(self) -> ConnectionUnits {
+        ConnectionUnits {
+            length: self.length,
+            angle: self.angle,
+            ..ConnectionUnits::default()
+        }
+    }
+}
+
 /// The units of a connection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ConnectionUnits {

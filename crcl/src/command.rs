@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::joint::{JointTarget, check_targets};
+use crate::joint::JointTarget;
 use crate::pose::Pose;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{self, ValueError};
@@ -655,7 +655,7 @@ impl Command {
             (Some(ArgumentKind::Reason), Value::Integer(reason)) => {
                 value::not_negative(ArgumentKind::Reason.noun(), reason as f64).map(drop)
             }
-            (Some(ArgumentKind::Joints), Value::Joints(joints)) => check_targets(&joints),
+            (Some(ArgumentKind::Joints), Value::Joints(joints)) => value::check_targets(&joints),
             (Some(ArgumentKind::Poses), Value::Poses(poses)) if poses.is_empty() => {
                 Err(ValueError::NoPoses)
             }

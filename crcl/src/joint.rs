@@ -3,9 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::pose::{LARGEST_ANGLE, LARGEST_COORDINATE};
-use crate::value::{ValueError, not_negative, within};
-
 /// The largest number of a joint.
 pub(crate) const MOST_JOINTS: i64 = 16;
 
@@ -30,7 +27,6 @@ pub struct JointTarget {
     pub acceleration: f64,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
@@ -63,35 +59,4 @@ impl JointTarget {
             acceleration: rest.get(1).copied().unwrap_or(0.0),
         })
     }
-
-    /// Checks every number that can be judged without settings and robot.
-    pub(crate) fn check(&self) -> Result<(), ValueError> {
-        let largest = LARGEST_ANGLE.max(LARGEST_COORDINATE);
-        let joint = not_negative("the number of a joint", self.joint as f64 - 1.0)?;
-        within("the number of a joint", joint + 1.0, MOST_JOINTS as f64)?;
-        within("the position of a joint", self.position, largest)?;
-        for (noun, value) in [
-            ("the speed of a joint", self.speed),
-            ("the acceleration of a joint", self.acceleration),
-        ] {
-            within(noun, not_negative(noun, value)?, largest)?;
-        }
-        Ok(())
-    }
-}
-
-/// Checks the targets of one command: at least one, and none for the same joint twice.
-pub(crate) fn check_targets(targets: &[JointTarget]) -> Result<(), ValueError> {
-    if targets.is_empty() {
-        return Err(ValueError::NoJoints);
-    }
-    for (index, target) in targets.iter().enumerate() {
-        target.check()?;
-        let before = targets.get(..index).unwrap_or_default();
-        if before.iter().any(|other| other.joint == target.joint) {
-            let joint = target.joint;
-            return Err(ValueError::SameJoint { joint });
-        }
-    }
-    Ok(())
 }

@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 use crate::command::{Argument, ArgumentKind, Command, CommandInfo, Value};
 use crate::fields::{Field, fields, items};
 use crate::finding::{Finding, Findings, code};
-use crate::joint::{JointTarget, check_targets};
+use crate::joint::JointTarget;
 use crate::lexer::clip;
 use crate::meaning::{doubt, refused_extension, unknown_command, unknown_name, value_finding};
 use crate::pose::{Pose, PosePart};
@@ -19,7 +19,7 @@ use crate::source::Walker;
 use crate::suggest;
 use crate::text;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
-use crate::value::ValueError;
+use crate::value::{ValueError, check_targets};
 
 /// The version of the JSON form that is read and written.
 pub const SCHEMA: u32 = 1;

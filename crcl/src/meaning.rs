@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use crate::command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, Standing, Value};
 use crate::finding::{Finding, Findings, code};
-use crate::joint::{JointTarget, check_targets};
+use crate::joint::JointTarget;
 use crate::lexer::clip;
 use crate::parser::{Call, Node, State, Tree};
 use crate::pose::{Pose, PosePart};
 use crate::suggest;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
-use crate::value::ValueError;
+use crate::value::{ValueError, check_targets};
 
 /// Reads meaning into calls of one source.
 pub(crate) struct Meaning<'a, 'f> {

@@ -4,6 +4,7 @@
 use thiserror::Error;
 
 use crate::finding::code;
+use crate::joint::{JointTarget, MOST_JOINTS};
 
 /// Why the value of a command is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -156,6 +157,39 @@ pub(crate) fn within(quantity: &'static str, value: f64, most: f64) -> Result<f6
             most,
         })
     }
+}
+
+/// The largest position, speed or acceleration of a joint, in units of the program.
+const LARGEST_OF_JOINT: f64 = 1e9;
+
+/// Checks the targets of one command: at least one, and none for the same joint twice.
+pub(crate) fn check_targets(targets: &[JointTarget]) -> Result<(), ValueError> {
+    if targets.is_empty() {
+        return Err(ValueError::NoJoints);
+    }
+    for (index, target) in targets.iter().enumerate() {
+        check_target(target)?;
+        let before = targets.get(..index).unwrap_or_default();
+        if before.iter().any(|other| other.joint == target.joint) {
+            let joint = target.joint;
+            return Err(ValueError::SameJoint { joint });
+        }
+    }
+    Ok(())
+}
+
+/// Checks every number of a target that can be judged without settings and robot.
+fn check_target(target: &JointTarget) -> Result<(), ValueError> {
+    let joint = not_negative("the number of a joint", target.joint as f64 - 1.0)?;
+    within("the number of a joint", joint + 1.0, MOST_JOINTS as f64)?;
+    within("the position of a joint", target.position, LARGEST_OF_JOINT)?;
+    for (noun, value) in [
+        ("the speed of a joint", target.speed),
+        ("the acceleration of a joint", target.acceleration),
+    ] {
+        within(noun, not_negative(noun, value)?, LARGEST_OF_JOINT)?;
+    }
+    Ok(())
 }
 
 /// Checks that a number is a percentage from 0 to 100.
