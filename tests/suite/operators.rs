@@ -308,12 +308,20 @@ impl Cell {
         self.injected = Instant::now();
     }
 
-    /// Waits until the engine answers.
+    /// Waits until the engine answers; starts another where one found no driver that is ready, as
+    /// a person would.
     fn wait_for_engine(&mut self) {
         let end = Instant::now() + 2 * PATIENCE;
         while Instant::now() < end {
             if self.client(&["status", "--json"]) == Some(0) {
                 return;
+            }
+            let ended = self.engine.child.try_wait().unwrap();
+            if ended.is_some_and(|status| status.code() == Some(4)) {
+                sleep(Duration::from_millis(50));
+                println!("an engine found no driver: {:?}", self.engine.printed());
+                self.engine = Self::engine(&self.arm);
+                self.engines += 1;
             }
             sleep(Duration::from_millis(100));
         }
