@@ -6,11 +6,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use engine::flight::FlightOptions;
+use engine::host::Host;
 use planner::robot::Robot;
 use recorder::{Rotation, Summary};
 
 use crate::failure::Failure;
-use crate::host_options::Host;
 use crate::printer::Printer;
 
 /// Where an engine records.
@@ -59,7 +59,7 @@ impl RecorderOptions {
     ///
     /// # Errors
     /// [`crate::exit::Exit::Unreadable`] when the file cannot be written.
-    pub(crate) fn start(&self, host: &mut Host, robot: &Robot) -> Result<(), Failure> {
+    pub(crate) fn start<D>(&self, host: &mut Host<D>, robot: &Robot) -> Result<(), Failure> {
         let record = self.record.as_ref().map(|path| {
             if path.as_os_str().is_empty() {
                 default_name(&robot.name)

@@ -1,10 +1,12 @@
 //! Reading a recording, whole or cut off.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use mcap::MessageStream;
-use mcap::read::Options;
+use mcap::parse_record;
+use mcap::records::Record;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::error::unreadable;
 use crate::{Head, Periods, RecorderError, Sample, message, topic};
@@ -54,6 +56,8 @@ struct Parts {
     certificates: Vec<String>,
     periods: Option<Periods>,
     messages: u64,
+    /// Topics by the numbers of their channels.
+    topics: BTreeMap<u16, String>,
 }
 
 /// Reads a recording. One that was cut off is read as far as it goes.
@@ -98,22 +102,33 @@ fn foreign(path: &Path, found: String) -> RecorderError {
     }
 }
 
-/// The messages up to the end or the first that is broken, and why it ended there.
+/// The messages up to the end or the first broken chunk, and why it ended there. The checksum of a
+/// chunk is looked at before the first message of it is taken.
 fn parse(bytes: &[u8]) -> Result<(Parts, Option<String>), String> {
     let whole = bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len();
-    let stream = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())
-        .map_err(|cause| cause.to_string())?;
+    if !bytes.starts_with(mcap::MAGIC) {
+        return Err("another kind of file".to_owned());
+    }
+    let options = LinearReaderOptions::default()
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true);
+    let mut reader = LinearReader::new_with_options(options);
     let mut parts = Parts::default();
-    for message in stream {
-        let message = match message {
-            Ok(message) => message,
+    let mut rest = bytes;
+    while let Some(event) = reader.next_event() {
+        match event {
             Err(cause) => return Ok((parts, Some(cause.to_string()))),
-        };
-        parts.messages += 1;
-        let (topic, data) = (message.channel.topic.as_str(), &message.data);
-        if parts.take(topic, message.log_time, data).is_none() {
-            let number = parts.messages;
-            return Err(format!("message {number}, on {topic}, in another form"));
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            Ok(LinearReadEvent::Record { opcode, data }) => match parse_record(opcode, data) {
+                Err(cause) => return Ok((parts, Some(cause.to_string()))),
+                Ok(Record::DataEnd(_)) => break,
+                Ok(record) => parts.read(record)?,
+            },
         }
     }
     let cut = (!whole).then(|| "the file has no end".to_owned());
@@ -121,6 +136,26 @@ fn parse(bytes: &[u8]) -> Result<(Parts, Option<String>), String> {
 }
 
 impl Parts {
+    /// Reads a record; those of no message and no channel say nothing here.
+    fn read(&mut self, record: Record<'_>) -> Result<(), String> {
+        match record {
+            Record::Channel(channel) => {
+                self.topics.insert(channel.id, channel.topic);
+            }
+            Record::Message { header, data } => {
+                self.messages += 1;
+                let number = self.messages;
+                let unknown = || format!("message {number} is on no channel");
+                let topic = self.topics.get(&header.channel_id).cloned();
+                let topic = topic.ok_or_else(unknown)?;
+                let taken = self.take(&topic, header.log_time, &data);
+                taken.ok_or_else(|| format!("message {number}, on {topic}, in another form"))?;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
     /// Takes a message; `None` where it is not in its form.
     fn take(&mut self, topic: &str, time_ns: u64, data: &[u8]) -> Option<()> {
         match topic {

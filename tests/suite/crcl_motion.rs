@@ -92,11 +92,18 @@ fn judge(way: &[Point3<f64>], waypoints: &[[f64; 3]]) {
     }
     let steps = way[first..at]
         .windows(2)
-        .map(|pair| (pair[1] - pair[0]).norm());
-    let slowest = steps.fold(f64::INFINITY, f64::min);
+        .map(|pair| (pair[1] - pair[0]).norm())
+        .enumerate();
+    let (row, slowest) = steps
+        .min_by(|(_, a), (_, b)| a.total_cmp(b))
+        .expect("more than one row");
     // The controlled point goes at 100 mm/s; a stop would be rows without any step. Rows may be
     // missing in the recording, none is there twice.
-    assert!(slowest > 1e-4, "the arm stops: a step of {slowest} mm");
+    assert!(
+        slowest > 1e-4,
+        "the arm stops: a step of {slowest} mm in row {row} of {}",
+        at - first
+    );
 }
 
 #[test]

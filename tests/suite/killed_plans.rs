@@ -143,7 +143,7 @@ fn a_pddl_run_goes_on_where_it_was() {
         let said = ["outcome", "code", "statements"].map(|name| report[name].to_string());
         assert_eq!(said, ["\"failed\"", "100", "6"], "{report}");
         let reason = report["reason"].as_str().unwrap();
-        assert!(reason.starts_with("step 7: command"), "{reason}");
+        assert!(reason.starts_with("step 7, (take-part "), "{reason}");
     }
     let shown = canter(["world", "show", database]).stdout;
     assert!(shown.contains("6 statements, 0 kits; failed"), "{shown}");

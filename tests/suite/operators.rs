@@ -189,7 +189,7 @@ impl Cell {
                 let code = status.code();
                 let name = format!("{} {code:?}", words[0]);
                 *self.codes.entry(name).or_default() += 1;
-                if !matches!(code, Some(0 | 1 | 4 | 5 | 6 | 7)) {
+                if !matches!(code, Some(0 | 1 | 3 | 4 | 5 | 6 | 7)) {
                     sleep(Duration::from_millis(50));
                     let said = process.printed();
                     self.broken
