@@ -159,7 +159,7 @@ pub(crate) fn moving(database: &str, statements: usize) {
             .split(", ")
             .nth(1)
             .and_then(|part| part.split(' ').next()?.parse().ok());
-        if count.is_some_and(|count: usize| count >= statements) && last.contains("under way") {
+        if count.is_some_and(|count: usize| count >= statements) && last.contains("not ended") {
             return;
         }
         std::thread::sleep(Duration::from_millis(50));
