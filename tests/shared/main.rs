@@ -78,7 +78,7 @@ fn main() {
     let missing = !folder().is_dir();
     // Python with lxml validates what is written; where it is missing nobody else can.
     let alone = !crcl_files::has_validator();
-    let run = |name| match name {
+    let run = |name: &str| match name {
         "crcl_files::what_is_written_is_valid" => !alone,
         name => !NOT_YET.contains(&name),
     };

@@ -93,7 +93,9 @@ fn judge(way: &[Point3<f64>], waypoints: &[[f64; 3]]) {
     let steps = way[first..at]
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).norm())
-        .enumerate();
+        .enumerate()
+        // Before the first of these rows the arm rests in the ball of the first waypoint.
+        .skip_while(|(_, step)| *step < 1e-4);
     let (row, slowest) = steps
         .min_by(|(_, a), (_, b)| a.total_cmp(b))
         .expect("more than one row");

@@ -65,10 +65,12 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
+        fit: bool,
     ) -> Result<(Draft<N>, Blend), MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
-        let options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        options.fit = fit;
         let plan = smooth::plan(&poses, &options)?;
         let blend = Blend {
             tolerance: motion.tolerance,

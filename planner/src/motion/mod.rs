@@ -192,18 +192,20 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        let attempt = |tolerance: f64| -> Result<_, MotionError> {
+        let plan = |tolerance: f64, fit: bool| -> Result<_, MotionError> {
             let tighter = Move {
                 tolerance,
                 ..motion.clone()
             };
-            let (draft, blend) = self.plan_smooth(&tighter, start)?;
+            let (draft, blend) = self.plan_smooth(&tighter, start, fit)?;
             let planned = self.certify(motion, start, draft)?;
             Ok(PlannedMove {
                 blend: Some(blend),
                 ..planned
             })
         };
+        // An arm that cannot follow the curve fitted through a dense list may follow the spline.
+        let attempt = |tolerance: f64| plan(tolerance, true).or_else(|_| plan(tolerance, false));
         let slower = |planned: &PlannedMove<N>, than: f64| planned.trajectory.duration() > than;
         match attempt(motion.tolerance) {
             Ok(planned) if slower(&planned, planned.blend.map_or(0.0, |b| b.exact_stop)) => {

@@ -56,6 +56,8 @@ pub struct SmoothOptions {
     pub limits: ToolLimits,
     /// Poses planned at once in a long list, at least as many as braking needs.
     pub window: usize,
+    /// Whether a curve may be fitted through a dense list; otherwise it is planned as any other.
+    pub fit: bool,
 }
 
 impl SmoothOptions {
@@ -68,6 +70,7 @@ impl SmoothOptions {
             angular_tolerance: None,
             limits,
             window: 25,
+            fit: true,
         }
     }
 

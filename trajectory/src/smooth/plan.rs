@@ -161,7 +161,7 @@ impl ToolCurve for SmoothPlan {
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
     let finite = options.finite();
-    match fitted(poses, &finite) {
+    match options.fit.then(|| fitted(poses, &finite)).flatten() {
         Some(fitted) if dense::suffices(poses, &finite) => Ok(fitted),
         Some(fitted) => {
             let plan = by_spline(poses, options)?;
