@@ -15,7 +15,6 @@ mod commands;
 mod console;
 mod damage;
 mod engine_client;
-mod equipment;
 mod exit;
 mod failure;
 mod forward;

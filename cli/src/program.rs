@@ -2,9 +2,9 @@ use std::io::{self, IsTerminal, Write};
 
 use clap::{Args, ValueEnum};
 use crcl::{CheckOptions, Finding, LengthUnit, Look, Program, ReadOptions, Reading, Source, code};
-use engine::host::GivenProgram;
+use engine::host::{GivenProgram, length_word};
 use planner::command_error::ErrorClass;
-use planner::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_program};
+use planner::dry_run::{FailurePolicy, Plan, PlanOptions, Refusal, plan_from};
 use planner::robot::Robot;
 
 use crate::exit::Exit;
@@ -154,11 +154,7 @@ impl ProgramFile {
         Self {
             source: Source::from_bytes(&given.name, bytes),
             reading: read(bytes, &ReadOptions::default()),
-            default_length: match given.default_length.as_str() {
-                "m" => LengthUnit::Meter,
-                "inch" => LengthUnit::Inch,
-                _ => LengthUnit::Millimeter,
-            },
+            default_length: given.length(),
             form,
         }
     }
@@ -190,16 +186,7 @@ impl ProgramFile {
             first: ids.first().copied().unwrap_or(0),
             last: ids.last().copied().unwrap_or(0),
             start,
-            default_length: self.length_word().to_owned(),
-        }
-    }
-
-    /// The same in one word.
-    pub(crate) fn length_word(&self) -> &'static str {
-        match self.default_length {
-            LengthUnit::Millimeter => "mm",
-            LengthUnit::Meter => "m",
-            LengthUnit::Inch => "inch",
+            default_length: length_word(self.default_length).to_owned(),
         }
     }
 
@@ -268,15 +255,37 @@ impl ProgramFile {
         start: Option<Vec<f64>>,
         on_refusal: FailurePolicy,
     ) -> Result<Plan, Failure> {
-        let options = PlanOptions {
+        self.plan_from(robot, &self.options(rate_hz, start, on_refusal), None)
+    }
+
+    /// As [`Self::plan`], unless `earlier` begins where the arm stands.
+    ///
+    /// # Errors
+    /// As [`Self::plan`].
+    pub(crate) fn plan_from(
+        &self,
+        robot: &Robot,
+        options: &PlanOptions,
+        earlier: Option<Plan>,
+    ) -> Result<Plan, Failure> {
+        plan_from(robot, &self.reading.program, options, earlier)
+            .map_err(|error| Failure::new(Exit::Unreadable, error))
+    }
+
+    /// How the program is planned.
+    pub(crate) fn options(
+        &self,
+        rate_hz: f64,
+        start: Option<Vec<f64>>,
+        on_refusal: FailurePolicy,
+    ) -> PlanOptions {
+        PlanOptions {
             rate_hz,
             default_length: self.default_length,
             on_refusal,
             start,
             clock: seconds,
-        };
-        plan_program(robot, &self.reading.program, &options)
-            .map_err(|error| Failure::new(Exit::Unreadable, error))
+        }
     }
 
     /// Adds the errors of the program with a robot. A command that already has an error is not

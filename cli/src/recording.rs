@@ -1,8 +1,7 @@
-use std::collections::VecDeque;
 use std::io::{self, Write};
 
+use engine::off_path::OffPath;
 use engine::session::RunSample;
-use nalgebra::Vector3;
 
 use crate::samples::{SampleRow, SampleWriter};
 
@@ -12,13 +11,9 @@ pub(crate) struct Recording<W: Write> {
     period: f64,
     first: Option<u64>,
     last: u64,
-    worst: f64,
-    path: VecDeque<Vector3<f64>>,
+    off_path: OffPath,
     command: u32,
 }
-
-/// Number of published points that the measured one is compared with: the arm is behind by less.
-const BEHIND: usize = 100;
 
 impl<W: Write> Recording<W> {
     /// A recording of `joints` joints at `rate_hz`; the file gets the columns of a plan and, beside
@@ -39,8 +34,7 @@ impl<W: Write> Recording<W> {
             period,
             first: None,
             last: 0,
-            worst: 0.0,
-            path: VecDeque::with_capacity(BEHIND + 1),
+            off_path: OffPath::default(),
             command: 0,
         })
     }
@@ -53,7 +47,7 @@ impl<W: Write> Recording<W> {
         for sample in samples {
             let first = *self.first.get_or_insert(sample.tick);
             self.last = sample.tick;
-            self.hold_against_path(sample);
+            self.off_path.take(sample);
             // The time at which a command begins belongs to the one that ends there.
             if sample.path_time > 0.0 {
                 self.command = sample.command;
@@ -76,24 +70,6 @@ impl<W: Write> Recording<W> {
         Ok(())
     }
 
-    /// Distance of the measured point from the path that was published recently: off the path, not
-    /// behind on it.
-    fn hold_against_path(&mut self, sample: &RunSample) {
-        self.path
-            .push_back(sample.workstation_from_tool.translation.vector);
-        if self.path.len() > BEHIND {
-            self.path.pop_front();
-        }
-        let measured = sample.measured_pose.translation.vector;
-        let mut nearest = f64::INFINITY;
-        for (from, to) in self.path.iter().zip(self.path.iter().skip(1)) {
-            nearest = nearest.min(off_line(&measured, from, to));
-        }
-        if nearest.is_finite() {
-            self.worst = self.worst.max(nearest);
-        }
-    }
-
     /// Length of a servo period, s.
     pub(crate) fn period(&self) -> f64 {
         self.period
@@ -107,7 +83,7 @@ impl<W: Write> Recording<W> {
 
     /// Largest distance of the measured controlled point from the published path, m.
     pub(crate) fn worst(&self) -> f64 {
-        self.worst
+        self.off_path.largest()
     }
 
     /// Ends the file.
@@ -117,16 +93,4 @@ impl<W: Write> Recording<W> {
     pub(crate) fn finish(self) -> io::Result<()> {
         self.writer.map_or(Ok(()), SampleWriter::finish)
     }
-}
-
-/// Distance of a point from the line between two others.
-fn off_line(point: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
-    let way = to - from;
-    let squared = way.norm_squared();
-    let part = if squared > 0.0 {
-        ((point - from).dot(&way) / squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (from + way * part - point).norm()
 }

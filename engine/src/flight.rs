@@ -3,12 +3,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use ipc::Arm;
 use planner::robot::Robot;
 use recorder::{Head, Periods, Recording, Ring, Rotation, Sample, Summary, topic};
 
+use crate::recorded_arm::{RecordedArm, joint_numbers, level, pose_numbers, wall_ns};
 use crate::session::{Note, RunSample, Session, Status};
 use crate::texts::GivenProgram;
 
@@ -80,25 +81,16 @@ impl Flight {
             rate_hz,
             ..
         } = recorded;
-        let tick = session.progress().tick;
-        let period_ns = (1e9 / rate_hz).round() as u64;
-        let head = Head {
-            form: recorder::FORM,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+        let head = RecordedArm {
+            robot,
             arm: recorded.arm.to_string(),
-            robot: robot.name.clone(),
             driver: session.driver.clone(),
-            joints: robot.joint_names(),
-            root_link: robot.model.base_link.clone(),
-            period_ns,
-            begin_ns: wall_ns().saturating_sub(tick * period_ns),
-            workstation_from_base: numbers(&robot.workstation_from_base),
+            period_ns: (1e9 / rate_hz).round() as u64,
+            tick: session.progress().tick,
             start: session.start.clone(),
             default_length: recorded.default_length.to_owned(),
-            reason: "record".to_owned(),
-            urdf: robot.urdf.clone(),
-            robot_toml: robot.toml.clone(),
-        };
+        }
+        .head();
         let recording = options
             .record
             .as_deref()
@@ -168,13 +160,9 @@ impl Flight {
 
     /// Takes what happened.
     pub(crate) fn note(&mut self, note: &Note) {
-        let level = match note {
-            Note::Faulted { .. } => 40,
-            Note::Refused { .. } | Note::Aborted { .. } | Note::Stopped => 30,
-            _ => 20,
-        };
-        let (json, words) = (serde_json::to_string(note), note.to_string());
-        let json = json.unwrap_or_default();
+        let json = serde_json::to_value(note).unwrap_or_default();
+        let level = level(json["event"].as_str().unwrap_or_default());
+        let (json, words) = (json.to_string(), note.to_string());
         for recording in self.recordings() {
             recording.note(level, json.clone(), words.clone());
         }
@@ -281,25 +269,8 @@ fn remove_oldest(folder: &Path) {
     }
 }
 
-fn wall_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| since.as_nanos() as u64)
-}
-
-/// A pose as x, y, z (m), qw, qx, qy, qz.
-fn numbers(pose: &nalgebra::Isometry3<f64>) -> [f64; 7] {
-    let (place, turn) = (pose.translation, pose.rotation);
-    [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
-}
-
 fn sample(from: &RunSample) -> Sample {
-    let list = |values: &[f64]| {
-        let mut all = [0.0; recorder::MAX_JOINTS];
-        for (to, from) in all.iter_mut().zip(values) {
-            *to = *from;
-        }
-        all
-    };
+    let list = |values: &[f64]| joint_numbers(values, values.len());
     Sample {
         tick: from.tick,
         command: from.command,
@@ -309,7 +280,7 @@ fn sample(from: &RunSample) -> Sample {
         velocity: list(&from.dq),
         acceleration: list(&from.ddq),
         measured: list(&from.measured),
-        tool: numbers(&from.workstation_from_tool),
+        tool: pose_numbers(&from.workstation_from_tool),
         measured_tool: from.measured_pose.translation.vector.into(),
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crcl::{LengthUnit, ReadOptions};
+use crcl::ReadOptions;
 use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
@@ -14,8 +14,8 @@ use crate::flight::{Flight, FlightOptions, Recorded};
 use crate::session::{
     Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
 };
-pub use crate::texts::GivenProgram;
 use crate::texts::Texts;
+pub use crate::texts::{GivenProgram, length_word};
 
 /// Time between two status reports.
 const REPORT: Duration = Duration::from_millis(100);
@@ -305,15 +305,6 @@ impl<D> Host<D> {
                 _ => Answer::refuse("this engine cannot do that"),
             }
         })
-    }
-}
-
-/// A unit of length in one word.
-fn length_word(unit: LengthUnit) -> &'static str {
-    match unit {
-        LengthUnit::Millimeter => "mm",
-        LengthUnit::Meter => "m",
-        LengthUnit::Inch => "inch",
     }
 }
 

@@ -4,7 +4,9 @@
 //! The planner's thread of the [`session`] takes a command from the [`queue`], plans it and sends
 //! the pieces to the servo thread. The [`host`] answers the requests of other processes, and the
 //! [`run_loop`] has commands executed while an operator watches. With [`arm_motion`] a kitting plan
-//! moves an arm. [`doctor`] checks the machine.
+//! moves an arm; [`equipment`] gives the robot the end effectors of the plan's world.
+//! [`repetition`] compares a recorded run with the same program executed again, and [`off_path`]
+//! measures how far an arm left its path. [`doctor`] checks the machine.
 //!
 //! This crate has no planning of its own, never names iceoryx2, prints nothing and reads no
 //! environment variable.
@@ -13,10 +15,14 @@
 pub mod arm_motion;
 pub mod control;
 pub mod doctor;
+pub mod equipment;
 pub mod flight;
 pub mod host;
+pub mod off_path;
 pub mod queue;
 mod recent;
+pub mod recorded_arm;
+pub mod repetition;
 pub mod run_loop;
 pub mod session;
 mod texts;

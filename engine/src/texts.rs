@@ -1,5 +1,6 @@
 //! Long texts that clients ask for, in parts that fit into an answer.
 
+use crcl::LengthUnit;
 use ipc::Answer;
 use planner::robot::Robot;
 use serde::{Deserialize, Serialize};
@@ -46,12 +47,32 @@ impl GivenProgram {
         }
     }
 
+    /// The unit of length until the program sets one.
+    #[must_use]
+    pub fn length(&self) -> LengthUnit {
+        match self.default_length.as_str() {
+            "m" => LengthUnit::Meter,
+            "inch" => LengthUnit::Inch,
+            _ => LengthUnit::Millimeter,
+        }
+    }
+
     /// The same with another unit of length.
     pub(crate) fn in_unit(self, default_length: &str) -> Self {
         Self {
             default_length: default_length.to_owned(),
             ..self
         }
+    }
+}
+
+/// A unit of length in one word, as [`GivenProgram`] has it: `mm`, `m` or `inch`.
+#[must_use]
+pub fn length_word(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Millimeter => "mm",
+        LengthUnit::Meter => "m",
+        LengthUnit::Inch => "inch",
     }
 }
 

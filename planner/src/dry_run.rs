@@ -133,7 +133,7 @@ pub struct Plan {
     pub dof: usize,
     /// Joint positions at the start (rad, m).
     pub start: Vec<f64>,
-    /// How many moves were planned, refused ones included.
+    /// How many moves were planned, refused ones and those of an earlier plan included.
     pub plans: u64,
     /// Length of the program, s.
     pub duration_s: f64,
@@ -147,6 +147,19 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Whether the plan is for an arm that stands at `joints` (rad, m): it begins exactly there.
+    #[must_use]
+    pub fn begins_at(&self, joints: &[f64]) -> bool {
+        self.start == joints
+    }
+
+    /// Whether the plan may be executed under this policy: with refused commands only if the policy
+    /// is not to abort.
+    #[must_use]
+    pub fn may_run(&self, policy: FailurePolicy) -> bool {
+        self.refusals.is_empty() || policy != FailurePolicy::Abort
+    }
+
     /// States at `0, period, 2 period, ...` up to the end; a time that two commands share belongs
     /// to the one that ends there.
     pub fn samples(&self, period: f64) -> impl Iterator<Item = PlanSample> + '_ {
@@ -192,6 +205,40 @@ pub fn plan_program(
     options: &PlanOptions,
 ) -> Result<Plan, RobotError> {
     with_dof!(robot.dof(), N => plan_with::<N>(robot, program, options))
+}
+
+/// The plan of a program for an arm that stands at `options.start`: `earlier`, a plan of the same
+/// program at the same rate, if it begins exactly there, otherwise a new one.
+///
+/// # Errors
+/// As [`plan_program`].
+///
+/// ```
+/// use planner::dry_run::{PlanOptions, plan_from, plan_program};
+///
+/// let robot = planner::robot::load("ur5e").unwrap();
+/// let program = crcl::text::read("InitCanon()", &crcl::ReadOptions::default()).program;
+/// let options = PlanOptions::default();
+/// let from_home = plan_program(&robot, &program, &options).unwrap();
+/// let start = vec![0.1; 6];
+/// let options = PlanOptions { start: Some(start.clone()), ..options };
+/// let plan = plan_from(&robot, &program, &options, Some(from_home)).unwrap();
+/// assert!(plan.begins_at(&start));
+/// ```
+pub fn plan_from(
+    robot: &Robot,
+    program: &Program,
+    options: &PlanOptions,
+    earlier: Option<Plan>,
+) -> Result<Plan, RobotError> {
+    let made = earlier.as_ref().map_or(0, |plan| plan.plans);
+    let start = options.start.as_ref().unwrap_or(&robot.home);
+    if let Some(plan) = earlier.filter(|plan| plan.begins_at(start)) {
+        return Ok(plan);
+    }
+    let mut plan = plan_program(robot, program, options)?;
+    plan.plans += made;
+    Ok(plan)
 }
 
 fn plan_with<const N: usize>(
@@ -380,6 +427,37 @@ EndCanon(0)
         let program = crcl::text::read(text, &crcl::ReadOptions::default()).program;
         let plan = plan_program(&robot, &program, &PlanOptions::default()).unwrap();
         assert!(plan.refusals.is_empty(), "{:?}", plan.refusals);
+    }
+
+    /// A plan is used where the arm stands at its start, and made again where it stands elsewhere;
+    /// the moves of both plans are counted.
+    #[test]
+    fn a_plan_is_made_again_where_the_arm_stands_elsewhere() {
+        let robot = crate::robot::load("ur5e").unwrap();
+        let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
+        let mut options = PlanOptions {
+            start: Some(robot.home.clone()),
+            ..PlanOptions::default()
+        };
+        let first = plan_program(&robot, &program, &options).unwrap();
+        let (moves, duration) = (first.plans, first.duration_s);
+        let same = plan_from(&robot, &program, &options, Some(first)).unwrap();
+        assert_eq!((same.plans, same.duration_s), (moves, duration));
+        let mut elsewhere = robot.home.clone();
+        elsewhere[0] += f64::EPSILON * 4.0;
+        options.start = Some(elsewhere.clone());
+        let again = plan_from(&robot, &program, &options, Some(same)).unwrap();
+        assert!(again.begins_at(&elsewhere));
+        assert_eq!(again.plans, 2 * moves);
+    }
+
+    #[test]
+    fn a_plan_with_refusals_runs_only_where_the_policy_allows_it() {
+        let robot = crate::robot::load("ur5e").unwrap();
+        let text = "InitCanon()\nMoveTo({{9000, 0, 0}, {0, 0, -1}, {1, 0, 0}})\n";
+        let program = crcl::text::read(text, &crcl::ReadOptions::default()).program;
+        let plan = plan_program(&robot, &program, &PlanOptions::default()).unwrap();
+        assert!(!plan.may_run(FailurePolicy::Abort) && plan.may_run(FailurePolicy::Skip));
     }
 
     #[test]

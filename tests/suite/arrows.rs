@@ -224,6 +224,48 @@ fn the_planner_is_pure() {
     assert_eq!(impurity("// std::thread"), None);
 }
 
+/// What the sources of the command line must not contain: code that chooses a motion by the arm,
+/// makes commands, plans one command, or waits for a session by itself.
+const MOTION_DECISIONS: [&str; 9] = [
+    ".dof() <",
+    ".dof() >",
+    ".dof() ==",
+    ".dof() !=",
+    "Command::Move",
+    "planner::controller",
+    "planner::way",
+    "host.turn(",
+    "session.note(",
+];
+
+/// The first of these in the code of a source, without comments.
+fn motion_decision(text: &str) -> Option<&'static str> {
+    let code: Vec<_> = text
+        .lines()
+        .filter_map(|line| line.split("//").next())
+        .collect();
+    MOTION_DECISIONS
+        .into_iter()
+        .find(|name| code.iter().any(|line| line.contains(name)))
+}
+
+#[test]
+fn the_command_line_decides_nothing_about_motion() {
+    for path in sources("cli/src") {
+        let found = motion_decision(&fs::read_to_string(&path).unwrap());
+        assert_eq!(found, None, "{}", path.display());
+    }
+    assert_eq!(
+        motion_decision("    straight: robot.dof() <= 6,"),
+        Some(".dof() <")
+    );
+    assert_eq!(
+        motion_decision("    let note = host.turn()?;"),
+        Some("host.turn(")
+    );
+    assert_eq!(motion_decision("// robot.dof() <= 6"), None);
+}
+
 /// Inside crates: only one file uses `k`, and the real-time crate has no heap.
 #[test]
 fn fences_inside_crates_hold() {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use clap::Args;
 use crcl::LengthUnit;
 use engine::arm_motion::ArmMotion;
+use engine::equipment::equip;
 use engine::run_loop::RunLoop;
 use plan::PlanError;
 use plan::interp::{PddlInterpreter, Pull, PulledRun, pull};
@@ -16,7 +17,6 @@ use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 
 use crate::console::{Console, SampleOptions, Voice, exit_of};
-use crate::equipment::equip;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{Company, HostOptions};
@@ -202,10 +202,7 @@ impl PlanRun {
     fn robot_options(&self, robot: &Robot) -> RobotOptions {
         RobotOptions {
             percent: Some(self.speed),
-            // After several straight paths in a row a seven-joint arm may be in a bad posture; free
-            // paths between them let it choose a good one.
-            straight: robot.dof() <= 6,
-            ..RobotOptions::default()
+            ..RobotOptions::for_arm(robot.dof())
         }
     }
 

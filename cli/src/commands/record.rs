@@ -2,13 +2,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use engine::host::GivenProgram;
+use engine::recorded_arm::{RecordedArm, joint_numbers, level, pose_numbers};
 use ipc::{Observer, Setpoint, State, Verb};
 use planner::robot::Robot;
-use recorder::{Head, MAX_JOINTS, Periods, Recording, Sample, topic};
+use recorder::{Head, Periods, Recording, Sample, topic};
 use serde_json::Value;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -172,27 +173,16 @@ fn first_setpoint(
 }
 
 fn head(robot: &Robot, arm: &str, first: &Setpoint) -> Head {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    let now = since.map_or(0, |since| since.as_nanos() as u64);
-    let base = robot.workstation_from_base;
-    let (place, turn) = (base.translation, base.rotation);
-    Head {
-        form: recorder::FORM,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
+    RecordedArm {
+        robot,
         arm: arm.to_owned(),
-        robot: robot.name.clone(),
         driver: String::new(),
-        joints: robot.joint_names(),
-        root_link: robot.model.base_link.clone(),
         period_ns: first.period_ns,
-        begin_ns: now.saturating_sub(first.tick.saturating_mul(first.period_ns)),
-        workstation_from_base: [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k],
+        tick: first.tick,
         start: first.position.iter().take(robot.dof()).copied().collect(),
         default_length: "mm".to_owned(),
-        reason: "record".to_owned(),
-        urdf: robot.urdf.clone(),
-        robot_toml: robot.toml.clone(),
     }
+    .head()
 }
 
 /// Setpoints and states as they come.
@@ -239,16 +229,9 @@ impl Watch {
             self.missed += setpoint.sequence.saturating_sub(last + 1);
         }
         self.last = Some(setpoint.sequence);
-        let list = |values: &[f64]| {
-            let mut all = [0.0; MAX_JOINTS];
-            for (to, from) in all.iter_mut().zip(values.iter().take(self.joints)) {
-                *to = *from;
-            }
-            all
-        };
+        let list = |values: &[f64]| joint_numbers(values, self.joints);
         let pose = (self.forward)(&setpoint.position);
         let measured = (self.forward)(&self.state.position);
-        let (place, turn) = (pose.translation, pose.rotation);
         Sample {
             tick: setpoint.tick,
             command: setpoint.command,
@@ -258,7 +241,7 @@ impl Watch {
             velocity: list(&setpoint.velocity),
             acceleration: list(&setpoint.acceleration),
             measured: list(&self.state.position),
-            tool: [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k],
+            tool: pose_numbers(&pose),
             measured_tool: measured.translation.vector.into(),
         }
     }
@@ -304,13 +287,8 @@ impl Chronicle {
         for note in body["notes"].as_array().into_iter().flatten() {
             self.note = note["number"].as_u64().unwrap_or(self.note);
             let event = note["note"]["event"].as_str().unwrap_or_default();
-            let level = match event {
-                "faulted" => 40,
-                "refused" | "aborted" | "stopped" => 30,
-                _ => 20,
-            };
             let json = note["note"].to_string();
-            recording.note(level, json.clone(), json);
+            recording.note(level(event), json.clone(), json);
         }
     }
 }

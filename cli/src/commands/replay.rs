@@ -1,18 +1,19 @@
-use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::host::{ClientChannels, GivenProgram};
-use engine::session::{Note, RunSample, SessionConfig};
+use engine::repetition::{RepetitionOperator, compare};
+use engine::run_loop::{RunEnd, RunLoop};
+use engine::session::{RunSample, SessionConfig};
 use ipc::{Clock, Domain};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
-use recorder::Sample;
 use view::Source;
 
+use crate::console::exit_of;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::host_options::{Company, Host};
@@ -82,15 +83,6 @@ fn summary(printer: &Printer, recorded: &RecordedFile) {
     ));
 }
 
-/// What a comparison came to.
-#[derive(Default)]
-struct Comparison {
-    equal: usize,
-    /// Periods without a counterpart: under an override, a pause or a stop.
-    altered: usize,
-    difference: Option<String>,
-}
-
 fn check(recorded: &RecordedFile) -> Result<Exit, Failure> {
     let robot = recorded.robot()?;
     let mut exit = Exit::Done;
@@ -111,10 +103,10 @@ fn check(recorded: &RecordedFile) -> Result<Exit, Failure> {
             count => format!("; {count} periods under an override, a pause or a stop"),
         };
         match compared.difference {
-            Some(text) => {
+            Some(difference) => {
                 exit = Exit::Refused;
                 output::note(&format!(
-                    "canter: {name}: after {} equal periods: {text}{altered}",
+                    "canter: {name}: after {} equal periods: {difference}{altered}",
                     compared.equal
                 ));
             }
@@ -168,45 +160,26 @@ fn execute(
         _driver: Some(simulation),
         view: None,
     };
-    let mut host = Host::start(channels, robot, &config, company)
+    let host = Host::start(channels, robot, &config, company)
         .map_err(|error| Failure::new(Exit::NoPeer, error))?;
-    let ids = host
-        .session
+    let mut running = RunLoop::new(host, RepetitionOperator::new(PATIENCE));
+    let ids = running
+        .session()
         .execute(program.program(), plan)
         .map_err(|error| Failure::new(Exit::Refused, error))?;
-    finish(&mut host, ids.last().copied().unwrap_or(0))
-}
-
-/// Waits for the last command and gives all periods.
-fn finish(host: &mut Host, last: u32) -> Result<Vec<RunSample>, Failure> {
-    let mut samples = Vec::new();
-    let mut heard = Instant::now();
-    loop {
-        let note = host.turn()?;
-        let fresh = host.samples();
-        if !fresh.is_empty() {
-            heard = Instant::now();
+    match running.wait_for(&ids)? {
+        RunEnd::Done => {}
+        RunEnd::Stopped | RunEnd::ShutDown => {
+            let cause = anyhow!("no period for {} s", PATIENCE.as_secs());
+            return Err(Failure::new(Exit::NoPeer, cause));
         }
-        samples.extend(fresh);
-        match note {
-            Some(Note::Done { id, .. }) if id == last => break,
-            Some(Note::Faulted { reason, .. }) => {
-                return Err(Failure::new(Exit::DriverFault, anyhow!(reason)));
-            }
-            Some(Note::Refused { error, .. }) => {
-                return Err(Failure::new(Exit::Refused, anyhow!(error.message)));
-            }
-            Some(Note::Closed) => return Err(Failure::new(Exit::Internal, anyhow!("it ended"))),
-            _ if heard.elapsed() > PATIENCE => {
-                let cause = anyhow!("no period for {} s", PATIENCE.as_secs());
-                return Err(Failure::new(Exit::NoPeer, cause));
-            }
-            _ => {}
+        RunEnd::Refused { reason, .. } => return Err(Failure::new(Exit::Refused, anyhow!(reason))),
+        RunEnd::Faulted { blame, reason } => {
+            return Err(Failure::new(exit_of(blame), anyhow!(reason)));
         }
+        RunEnd::Closed => return Err(Failure::new(Exit::Internal, anyhow!("it ended"))),
     }
-    host.close()?;
-    samples.extend(host.samples());
-    Ok(samples)
+    Ok(running.finish()?.operator.into_samples())
 }
 
 /// A folder with the robot, whose home is where the recorded arm stood: the simulated arm begins
@@ -227,83 +200,4 @@ fn robot_at(folder: &Path, robot: &Robot, start: &[f64]) -> Result<PathBuf, Fail
         Ok(place)
     };
     write().map_err(|cause| Failure::new(Exit::Unreadable, cause))
-}
-
-/// A place in a program: number of the command from 0, and the planned time in it as bits.
-type Place = (u32, u64);
-
-/// Holds the recorded periods against those that were made again.
-fn compare(
-    recorded: &[Sample],
-    again: &[RunSample],
-    given: &GivenProgram,
-    joints: usize,
-) -> Comparison {
-    let made: HashMap<Place, &RunSample> = again
-        .iter()
-        .filter(|sample| sample.path_time > 0.0 && sample.command > 0)
-        .map(|sample| ((sample.command - 1, sample.path_time.to_bits()), sample))
-        .collect();
-    let mut found = Comparison::default();
-    let mut altered = None;
-    for sample in recorded {
-        if sample.path_time <= 0.0 || sample.command < given.first {
-            continue;
-        }
-        let command = sample.command - given.first;
-        // A command that was slowed down once is at other places of its path from then on.
-        if sample.time_scaling.to_bits() != 1.0_f64.to_bits() && sample.time_scaling > 0.0 {
-            altered = Some(command);
-        }
-        let counterpart = made.get(&(command, sample.path_time.to_bits()));
-        let Some(made) = counterpart else {
-            if altered == Some(command) {
-                found.altered += 1;
-                continue;
-            }
-            found.difference = Some(format!(
-                "command {} at {} s (period {}): it does not come to this time",
-                command + 1,
-                sample.path_time,
-                sample.tick
-            ));
-            return found;
-        };
-        if altered == Some(command) {
-            found.altered += 1;
-            continue;
-        }
-        if let Some(text) = difference(sample, made, joints) {
-            found.difference = Some(format!(
-                "command {} at {} s (period {}): {text}",
-                command + 1,
-                sample.path_time,
-                sample.tick
-            ));
-            return found;
-        }
-        found.equal += 1;
-    }
-    found
-}
-
-/// The first number of a period that is another one now.
-fn difference(recorded: &Sample, made: &RunSample, joints: usize) -> Option<String> {
-    let lists = [
-        ("position", &recorded.position, &made.q),
-        ("velocity", &recorded.velocity, &made.dq),
-        ("acceleration", &recorded.acceleration, &made.ddq),
-    ];
-    for (name, was, is) in lists {
-        for joint in 0..joints {
-            let (was, is) = (was.get(joint)?, is.get(joint)?);
-            if was.to_bits() != is.to_bits() {
-                return Some(format!(
-                    "{name} of joint {}: recorded {was}, now {is}",
-                    joint + 1
-                ));
-            }
-        }
-    }
-    None
 }

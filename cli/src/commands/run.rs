@@ -3,8 +3,7 @@ use std::path::PathBuf;
 use clap::Args;
 use engine::run_loop::{Finished, RunEnd, RunLoop};
 use engine::session::Status;
-use planner::dry_run::{FailurePolicy, Plan};
-use planner::robot::Robot;
+use planner::dry_run::Plan;
 use serde_json::json;
 
 use crate::console::{Console, SampleOptions, Voice, exit_of};
@@ -51,14 +50,17 @@ impl Run {
         if program.exit() != Exit::Done {
             return Ok(program.exit());
         }
-        // The simulated arm starts where the dry run does, so that a program that cannot be
-        // executed starts nothing. The position of another arm is known to its driver only.
-        let mut plan = None;
+        // The simulated arm starts at home, where the dry run does, so that a program that cannot be
+        // executed starts nothing. Only the driver of another arm knows where it stands.
+        let mut options = program.options(self.host.rate, None, self.refusal.policy());
+        let mut earlier = None;
         if self.host.driver != DriverChoice::External {
-            plan = self.plan(&program, &robot, None)?;
-            if plan.is_none() {
+            let plan = program.plan_from(&robot, &options, None)?;
+            if !plan.may_run(options.on_refusal) {
+                report_refusals(&program, &plan);
                 return Ok(Exit::Refused);
             }
+            earlier = Some(plan);
         }
         if self.json {
             printer.expect_json();
@@ -69,16 +71,12 @@ impl Run {
             .host
             .start(&robot, place, length, self.refusal.policy())?;
         host.own("canter run");
-        let start = host.session.start.clone();
-        let mut plans = plan.as_ref().map_or(0, |plan| plan.plans);
-        let mut plan = plan.filter(|plan| plan.start == start);
-        if plan.is_none() {
-            plan = self.plan(&program, &robot, Some(start))?;
-            plans += plan.as_ref().map_or(0, |plan| plan.plans);
-        }
-        let Some(plan) = plan else {
+        options.start = Some(host.session.start.clone());
+        let plan = program.plan_from(&robot, &options, earlier)?;
+        report_refusals(&program, &plan);
+        if !plan.may_run(options.on_refusal) {
             return Ok(Exit::Refused);
-        };
+        }
         let samples = SampleOptions {
             joints: robot.dof(),
             rate_hz: self.host.rate,
@@ -86,7 +84,7 @@ impl Run {
         };
         let voice = if self.json { Voice::Json } else { Voice::Lines };
         let console = Console::new(printer, signals, &host.session, &samples, voice)?;
-        let (exit, summary) = execute(RunLoop::new(host, console), &program, plan, plans)?;
+        let (exit, summary) = execute(RunLoop::new(host, console), &program, plan)?;
         if let Some(recorded) = &summary.recorded {
             recorder_options::report(printer, recorded);
         }
@@ -97,33 +95,22 @@ impl Run {
         });
         Ok(exit)
     }
+}
 
-    /// Plans the whole program from `start`, or from home, and reports refused commands; no plan if
-    /// it may not be run. With a policy that allows refusals it always may.
-    fn plan(
-        &self,
-        program: &ProgramFile,
-        robot: &Robot,
-        start: Option<Vec<f64>>,
-    ) -> Result<Option<Plan>, Failure> {
-        let policy = self.refusal.policy();
-        let plan = program.plan(robot, self.host.rate, start, policy)?;
-        for refusal in &plan.refusals {
-            program.report_refusal(refusal);
-        }
-        let may_run = plan.refusals.is_empty() || policy != FailurePolicy::Abort;
-        Ok(may_run.then_some(plan))
+/// Reports the refused commands of a plan.
+fn report_refusals(program: &ProgramFile, plan: &Plan) {
+    for refusal in &plan.refusals {
+        program.report_refusal(refusal);
     }
 }
 
-/// Has the program executed as it was planned, after `plans` moves were planned for it.
+/// Has the program executed as it was planned.
 fn execute(
     mut running: RunLoop<Company, Console>,
     program: &ProgramFile,
     plan: Plan,
-    plans: u64,
 ) -> Result<(Exit, Summary), Failure> {
-    let start = Some(plan.start.clone());
+    let (start, plans) = (Some(plan.start.clone()), plan.plans);
     // All keys of a plan are texts, so it can be written.
     let certificate = serde_json::to_string(&plan).ok();
     let ids = running

@@ -35,7 +35,27 @@ impl Default for RobotOptions {
     }
 }
 
+/// The largest number of joints with which an arm travels in straight lines.
+const STRAIGHT_JOINTS: usize = 6;
+
 impl RobotOptions {
+    /// The options for an arm of so many joints. An arm with more joints than a pose needs may come
+    /// into a bad posture after several straight lines in a row: it travels on free paths, so that
+    /// it can choose a good one.
+    ///
+    /// ```
+    /// use plan::run::RobotOptions;
+    /// assert!(RobotOptions::for_arm(6).straight);
+    /// assert!(!RobotOptions::for_arm(7).straight);
+    /// ```
+    #[must_use]
+    pub fn for_arm(joints: usize) -> Self {
+        Self {
+            straight: joints <= STRAIGHT_JOINTS,
+            ..Self::default()
+        }
+    }
+
     /// The commands that every plan begins with: metres, radians, and the speed where one is asked
     /// for.
     #[must_use]

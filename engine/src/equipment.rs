@@ -9,7 +9,10 @@ use planner::robot::Robot;
 const NOMINAL_S: f64 = 0.2;
 
 /// Gives the robot the end effectors of the world, and the places where they are kept.
-pub(crate) fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanError> {
+///
+/// # Errors
+/// [`plan::PlanError`] when an object of the world has no place.
+pub fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanError> {
     robot.end_effectors.clear();
     robot.mounted = None;
     let down = Isometry3::from_parts([0.0; 3].into(), pointing_down());
