@@ -1,7 +1,9 @@
 //! Inverse kinematics: from a pose of the tool to joint positions.
 
+mod branches;
 mod classify;
 mod closed;
+mod failure;
 mod frames;
 mod goal;
 mod numeric;
@@ -23,20 +25,15 @@ use simd::Frame;
 
 use crate::chain::Chain;
 use crate::measure::{self, LENGTH};
-use closed::{Branching, Closed, Raw};
+use closed::Closed;
 use goal::Target;
-use nalgebra::{Isometry3, Point3, SMatrix, SVector};
+use nalgebra::{Isometry3, SMatrix, SVector};
 use numeric::{Descent, SolverResult, Stop};
-use std::f64::consts::PI;
 
 /// Restarts before a goal is reported as not reached.
 const RESTARTS: u32 = 1500;
 /// Restarts after which the search ends if the position alone is out of reach.
 const PATIENCE: u32 = 40;
-/// Restarts before a position alone is reported as out of reach.
-const PLACES: u32 = 120;
-/// Values of the free parameter that are tried before a closed form gives up.
-const SWEEP: u32 = 360;
 /// Restarts of the search for all solutions.
 const SEARCH: u32 = 120;
 
@@ -221,36 +218,6 @@ impl<const N: usize> Solver<N> {
         }
     }
 
-    /// The free parameter (rad) at a fraction of its range.
-    fn parameter_at(&self, closed: &Closed, fraction: f64) -> f64 {
-        let joint = closed.given::<N>();
-        let (low, high) = joint.map_or((-PI, PI), |i| numeric::window(&self.chain, i));
-        low + (high - low) * fraction
-    }
-
-    /// The nearest solution over the whole range of the free parameter, on a fine grid: near the
-    /// edge of the reach only few values have a solution.
-    #[cold]
-    fn sweep(
-        &self,
-        closed: &Closed,
-        pose: &Isometry3<f64>,
-        seed: &SVector<f64, N>,
-    ) -> Option<Solution<N>> {
-        let mut best: Option<(f64, Solution<N>)> = None;
-        for i in 0..SWEEP {
-            let parameter = self.parameter_at(closed, (f64::from(i) + 0.5) / f64::from(SWEEP));
-            let Some(solution) = self.nearest_at(closed, pose, seed, parameter) else {
-                continue;
-            };
-            let distance = (solution.q - seed).norm_squared();
-            if best.as_ref().is_none_or(|(least, _)| distance < *least) {
-                best = Some((distance, solution));
-            }
-        }
-        best.map(|(_, solution)| solution)
-    }
-
     /// Distance (m) and angle (rad) of the tool at `q` from a pose.
     #[must_use]
     pub fn error(&self, pose: &Isometry3<f64>, q: &SVector<f64, N>) -> (f64, f64) {
@@ -367,211 +334,6 @@ impl<const N: usize> Solver<N> {
         Solution {
             q: turns::nearest(&self.chain, &result.q, seed),
             branch: None,
-        }
-    }
-
-    #[inline(always)]
-    fn branch(
-        &self,
-        closed: &Closed,
-        (pose, parameter): (&Isometry3<f64>, f64),
-        seed: &SVector<f64, N>,
-        raw: &mut Raw<N>,
-    ) {
-        let Some(compute) = (const { closed::branching::<N>() }) else {
-            return;
-        };
-        let branching = Branching {
-            closed,
-            pose,
-            parameter,
-            seed,
-            raw,
-        };
-        compute(self.chain.build(), branching);
-    }
-
-    fn branches_at(
-        &self,
-        closed: &Closed,
-        pose: &Isometry3<f64>,
-        seed: &SVector<f64, N>,
-        parameter: f64,
-    ) -> Branches<N> {
-        if !closed.exact() {
-            return self.near_branches(closed, pose, seed, parameter);
-        }
-        let mut raw = Raw::none();
-        self.branch(closed, (pose, parameter), seed, &mut raw);
-        let mut found = Branches::new();
-        for id in 0..8_u8 {
-            if let Some(q) = raw.inside(id) {
-                let branch = Some(id);
-                found.push(Solution { q, branch });
-            }
-        }
-        found
-    }
-
-    fn nearest_at(
-        &self,
-        closed: &Closed,
-        pose: &Isometry3<f64>,
-        seed: &SVector<f64, N>,
-        parameter: f64,
-    ) -> Option<Solution<N>> {
-        if closed.exact() {
-            let mut raw = Raw::none();
-            self.branch(closed, (pose, parameter), seed, &mut raw);
-            let (id, q) = raw.nearest()?;
-            let branch = Some(id);
-            return Some(Solution { q, branch });
-        }
-        let mut best: Option<(f64, Solution<N>)> = None;
-        for solution in &self.near_branches(closed, pose, seed, parameter) {
-            let distance = (solution.q - seed).norm_squared();
-            if best.as_ref().is_none_or(|(least, _)| distance < *least) {
-                best = Some((distance, *solution));
-            }
-        }
-        best.map(|(_, solution)| solution)
-    }
-
-    /// Whether the closed form finds a thousand joint positions again from their poses.
-    fn closed_form_holds(&self) -> bool {
-        let Some(closed) = &self.closed else {
-            return false;
-        };
-        let (mut lost, mut wrong) = (0, 0);
-        for index in 0..1000 {
-            let q = numeric::restart(&self.chain, index);
-            let pose = self.chain.forward(&q);
-            let branches = self.branches_at(closed, &pose, &q, closed.parameter(&q));
-            lost += u32::from(
-                !branches
-                    .iter()
-                    .any(|b| turns::distance(&self.chain, &b.q, &q) < 1e-6),
-            );
-            for branch in &branches {
-                let (position, rotation) = self.error(&pose, &branch.q);
-                wrong += u32::from(position > 2e-9 || rotation > 2e-9);
-            }
-        }
-        wrong == 0 && lost <= if closed.exact() { 0 } else { 20 }
-    }
-
-    /// Finds out why a goal was not reached.
-    #[cold]
-    fn report(&self, goal: &Goal, best: &SolverResult<N>) -> IkReport<N> {
-        let (point, pose) = match goal {
-            Goal::Pose(pose) => (pose.translation.vector.into(), Some(pose)),
-            Goal::Position(point) | Goal::Axis(point, _) => (*point, None),
-        };
-        let finite = point.coords.iter().all(|x| x.is_finite())
-            && pose.is_none_or(|pose| pose.rotation.coords.iter().all(|x| x.is_finite()));
-        if !finite {
-            return self.report_with(best, IkFailure::NotFinite);
-        }
-        // If the search for the position alone fails, the distance is the reason.
-        let place = self.best_place(point, &best.q);
-        if !place.reached {
-            return self.report_with(
-                best,
-                IkFailure::OutOfReach {
-                    distance: place.position,
-                },
-            );
-        }
-        let free = self.best_of(
-            goal,
-            24,
-            Stop {
-                limits: false,
-                ..self.stop
-            },
-            &best.q,
-        );
-        if free.reached {
-            let q = turns::nearest(&self.chain, &free.q, &best.q);
-            let (joint, beyond) = self.worst_joint(&q);
-            if beyond > 1e-9 {
-                return self.report_with(best, IkFailure::AtLimit { joint, beyond });
-            }
-        }
-        if best.position < 1e-4 && best.rotation < 1e-4 {
-            let smallest = measure::dexterity(&self.chain, &best.q).smallest;
-            return self.report_with(best, IkFailure::Singular { smallest });
-        }
-        self.report_with(
-            best,
-            IkFailure::Orientation {
-                angle: best.rotation,
-            },
-        )
-    }
-
-    /// Whether the position of a goal can be reached, with any orientation.
-    fn place_reached(&self, goal: &Goal, seed: &SVector<f64, N>) -> bool {
-        let point = match goal {
-            Goal::Pose(pose) => pose.translation.vector.into(),
-            Goal::Position(point) | Goal::Axis(point, _) => *point,
-        };
-        self.best_place(point, seed).reached
-    }
-
-    /// The nearest that the tool comes to a position, with any orientation.
-    fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
-        let target = Goal::Position(point).target();
-        let mut best = self.descend(&target, seed, self.stop);
-        for index in 0..PLACES {
-            if best.reached {
-                break;
-            }
-            let next = self.restarted(&target, index);
-            if next.reached || score(&next) < score(&best) {
-                best = next;
-            }
-        }
-        best
-    }
-
-    fn best_of(
-        &self,
-        goal: &Goal,
-        tries: u32,
-        stop: Stop,
-        seed: &SVector<f64, N>,
-    ) -> SolverResult<N> {
-        let target = goal.target();
-        let mut best = self.descend(&target, seed, stop);
-        for index in 0..tries {
-            if best.reached {
-                break;
-            }
-            let next = self.descend(&target, &numeric::restart(&self.chain, index), stop);
-            if next.reached || score(&next) < score(&best) {
-                best = next;
-            }
-        }
-        best
-    }
-
-    /// The joint farthest beyond its limits, and by how much.
-    fn worst_joint(&self, q: &SVector<f64, N>) -> (usize, f64) {
-        let beyond = |i: usize| (q[i] - self.chain.upper()[i]).max(self.chain.lower()[i] - q[i]);
-        (0..N)
-            .map(|i| (i, beyond(i)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((0, 0.0))
-    }
-
-    fn report_with(&self, best: &SolverResult<N>, failure: IkFailure) -> IkReport<N> {
-        IkReport {
-            failure,
-            nearest: best.q,
-            nearest_pose: self.chain.forward(&best.q),
-            position_error: best.position,
-            rotation_error: best.rotation,
         }
     }
 }

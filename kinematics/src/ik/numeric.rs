@@ -57,15 +57,10 @@ impl<const N: usize> Op for Descent<'_, N> {
     /// T. Sugihara, "Solvability-unconcerned inverse kinematics by the
     /// Levenberg-Marquardt method", IEEE Trans. Robotics 27(5), 2011, eq. 8 and 23.
     #[inline(always)]
-    fn run<A: Four>(self, a: A) -> SolverResult<N> {
-        let Self {
-            chain,
-            target,
-            stop,
-            mut seed,
-        } = self;
+    fn run<A: Four>(mut self, a: A) -> SolverResult<N> {
+        let (target, stop) = (self.target, self.stop);
         let mut best = SolverResult {
-            q: seed,
+            q: self.seed,
             position: f64::INFINITY,
             rotation: f64::INFINITY,
             reached: false,
@@ -73,7 +68,7 @@ impl<const N: usize> Op for Descent<'_, N> {
         let mut best_square = f64::INFINITY;
         let (mut mark, mut marked_at) = (f64::INFINITY, 0);
         for step in 0..=stop.steps {
-            let reached = chain.reach(a, &seed);
+            let reached = self.chain.reach(a, &self.seed);
             let tool = reached.end.frame();
             let pose_error = target.pose_error(a, &tool);
             let square = pose_error
@@ -83,7 +78,7 @@ impl<const N: usize> Op for Descent<'_, N> {
             if square < best_square {
                 best_square = square;
                 best = SolverResult {
-                    q: seed,
+                    q: self.seed,
                     position: pose_error.position,
                     rotation: pose_error.rotation,
                     reached: pose_error.position <= stop.position
@@ -98,102 +93,122 @@ impl<const N: usize> Op for Descent<'_, N> {
             } else if step - marked_at >= PATIENCE || !square.is_finite() {
                 break;
             }
-            let mut rows = chain.rows(&reached);
-            target.shape(&tool, &mut rows);
-            let mut rest = pose_error.rows;
-            let damping = a.fma(0.03, square, 1e-12);
-            let mut held = [None; 8];
-            let mut step = [0.0; 8];
-            for round in 0..=HELD {
-                let pull = gradient(a, &rows, &rest);
-                if stop.limits && round == 0 {
-                    freeze(a, chain, &seed, &pull, &mut rows);
-                }
-                step = solve_damped::<A, N>(a, &rows, &pull, damping);
-                for i in 0..N {
-                    step[i] = held[i].unwrap_or(step[i]);
-                }
-                if !stop.limits
-                    || !hold(a, chain, (&seed, &step), &mut held, (&mut rows, &mut rest))
-                {
-                    break;
-                }
-            }
-            advance(chain, &mut seed, &step, stop.limits);
+            let mut linearized = Linearized {
+                rows: self.chain.rows(&reached),
+                rest: pose_error.rows,
+            };
+            target.shape(&tool, &mut linearized.rows);
+            let step = linearized.step(a, &self, a.fma(0.03, square, 1e-12));
+            advance(self.chain, &mut self.seed, &step, stop.limits);
         }
         best
     }
 }
 
-/// `J^T e`.
-#[inline(always)]
-fn gradient<A: Four>(a: A, rows: &[[F4<A>; 2]; 6], pose_error: &[f64; 6]) -> [f64; 8] {
-    let mut sum = [F4::splat(a, 0.0); 2];
-    for r in 0..6 {
-        let e = F4::splat(a, pose_error[r]);
-        sum = [rows[r][0].fma(e, sum[0]), rows[r][1].fma(e, sum[1])];
-    }
-    let ([a, b, c, d], [e, f, g, h]) = (sum[0].array(), sum[1].array());
-    [a, b, c, d, e, f, g, h]
+/// The error of the pose to first order in a step of the joints: `rest - rows * step`.
+struct Linearized<A: Four> {
+    rows: [[F4<A>; 2]; 6],
+    rest: [f64; 6],
 }
 
-/// Excludes joints that are at a limit and would be moved beyond it.
-#[inline(always)]
-fn freeze<A: Four, const N: usize>(
-    a: A,
-    chain: &Chain<N>,
-    q: &SVector<f64, N>,
-    gradient: &[f64; 8],
-    rows: &mut [[F4<A>; 2]; 6],
-) {
-    let mut keep = [[1.0; 4]; 2];
-    let mut frozen = false;
-    for i in 0..N {
-        let outward = (q[i] >= chain.upper()[i] && gradient[i] > 0.0)
-            || (q[i] <= chain.lower()[i] && gradient[i] < 0.0);
-        if outward {
-            keep[i / 4][i % 4] = 0.0;
-            frozen = true;
+impl<A: Four> Linearized<A> {
+    /// The damped Newton step from the seed of a descent, inside the joint limits if they count.
+    #[inline(always)]
+    fn step<const N: usize>(&mut self, a: A, descent: &Descent<'_, N>, damping: f64) -> [f64; 8] {
+        let (chain, q) = (descent.chain, &descent.seed);
+        let mut held = [None; 8];
+        let mut step = [0.0; 8];
+        for round in 0..=HELD {
+            let pull = self.gradient(a);
+            if descent.stop.limits && round == 0 {
+                self.freeze(a, chain, q, &pull);
+            }
+            step = solve_damped::<A, N>(a, &self.rows, &pull, damping);
+            for i in 0..N {
+                step[i] = held[i].unwrap_or(step[i]);
+            }
+            if !descent.stop.limits || !self.hold(a, descent, &step, &mut held) {
+                break;
+            }
         }
+        step
     }
-    if frozen {
-        let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
-        for row in rows {
-            *row = [row[0] * keep[0], row[1] * keep[1]];
-        }
-    }
-}
 
-/// Holds joints that a step would move beyond a limit: they move to the limit, and their effect is
-/// subtracted from `rest`, which the other joints must do. Returns whether there are any.
-#[inline(always)]
-fn hold<A: Four, const N: usize>(
-    a: A,
-    chain: &Chain<N>,
-    (q, step): (&SVector<f64, N>, &[f64; 8]),
-    held: &mut [Option<f64>; 8],
-    (rows, rest): (&mut [[F4<A>; 2]; 6], &mut [f64; 6]),
-) -> bool {
-    let (mut keep, mut moved) = ([[1.0; 4]; 2], [[0.0; 4]; 2]);
-    let mut any = false;
-    for i in 0..N {
-        let inside = (q[i] + step[i]).min(chain.upper()[i]).max(chain.lower()[i]) - q[i];
-        if held[i].is_none() && (inside - step[i]).abs() > 1e-9 {
-            (keep[i / 4][i % 4], moved[i / 4][i % 4]) = (0.0, inside);
-            held[i] = Some(inside);
-            any = true;
+    /// `J^T e`.
+    #[inline(always)]
+    fn gradient(&self, a: A) -> [f64; 8] {
+        let mut sum = [F4::splat(a, 0.0); 2];
+        for r in 0..6 {
+            let e = F4::splat(a, self.rest[r]);
+            sum = [
+                self.rows[r][0].fma(e, sum[0]),
+                self.rows[r][1].fma(e, sum[1]),
+            ];
+        }
+        let ([a, b, c, d], [e, f, g, h]) = (sum[0].array(), sum[1].array());
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Excludes joints that are at a limit and would be moved beyond it.
+    #[inline(always)]
+    fn freeze<const N: usize>(
+        &mut self,
+        a: A,
+        chain: &Chain<N>,
+        q: &SVector<f64, N>,
+        gradient: &[f64; 8],
+    ) {
+        let mut keep = [[1.0; 4]; 2];
+        let mut frozen = false;
+        for i in 0..N {
+            let outward = (q[i] >= chain.upper()[i] && gradient[i] > 0.0)
+                || (q[i] <= chain.lower()[i] && gradient[i] < 0.0);
+            if outward {
+                keep[i / 4][i % 4] = 0.0;
+                frozen = true;
+            }
+        }
+        if frozen {
+            let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
+            for row in &mut self.rows {
+                *row = [row[0] * keep[0], row[1] * keep[1]];
+            }
         }
     }
-    if any {
-        let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
-        let moved = [F4::new(a, moved[0]), F4::new(a, moved[1])];
-        for (row, rest) in rows.iter_mut().zip(rest) {
-            let [x, y, z, w] = row[0].fma(moved[0], row[1] * moved[1]).array();
-            *rest -= x + y + z + w;
-            *row = [row[0] * keep[0], row[1] * keep[1]];
+
+    /// Holds joints that a step would move beyond a limit: they move to the limit, and their effect
+    /// is subtracted from `rest`, which the other joints must do. Returns whether there are any.
+    #[inline(always)]
+    fn hold<const N: usize>(
+        &mut self,
+        a: A,
+        descent: &Descent<'_, N>,
+        step: &[f64; 8],
+        held: &mut [Option<f64>; 8],
+    ) -> bool {
+        let (lower, upper) = (descent.chain.lower(), descent.chain.upper());
+        let q = &descent.seed;
+        let (mut keep, mut moved) = ([[1.0; 4]; 2], [[0.0; 4]; 2]);
+        let mut any = false;
+        for i in 0..N {
+            let inside = (q[i] + step[i]).min(upper[i]).max(lower[i]) - q[i];
+            if held[i].is_none() && (inside - step[i]).abs() > 1e-9 {
+                (keep[i / 4][i % 4], moved[i / 4][i % 4]) = (0.0, inside);
+                held[i] = Some(inside);
+                any = true;
+            }
         }
+        if any {
+            let keep = [F4::new(a, keep[0]), F4::new(a, keep[1])];
+            let moved = [F4::new(a, moved[0]), F4::new(a, moved[1])];
+            for (row, rest) in self.rows.iter_mut().zip(&mut self.rest) {
+                let [x, y, z, w] = row[0].fma(moved[0], row[1] * moved[1]).array();
+                *rest -= x + y + z + w;
+                *row = [row[0] * keep[0], row[1] * keep[1]];
+            }
+        }
+        any
     }
-    any
 }
 
 /// Solves `(J^T J + damping) x = b` by elimination; the matrix is positive definite.

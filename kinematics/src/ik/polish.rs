@@ -4,7 +4,7 @@
 //! together (a fold: elbow straight, wrist straight), both descents may end in the same branch or
 //! in none; then the other branch is searched for across the fold.
 
-use super::closed::{Closed, Raw};
+use super::closed::{Branching, Closed, Raw};
 use super::goal::{Goal, Target};
 use super::numeric::Stop;
 use super::report::{Branches, Solution};
@@ -30,7 +30,13 @@ impl<const N: usize> Solver<N> {
         parameter: f64,
     ) -> Branches<N> {
         let mut raw = Raw::none();
-        self.branch(closed, (pose, parameter), seed, &mut raw);
+        self.branch(Branching {
+            closed,
+            pose,
+            parameter,
+            seed,
+            raw: &mut raw,
+        });
         let target = Goal::Pose(*pose).target();
         // All branches, also those beyond the limits: a branch outside is not missing.
         let (mut all, mut lost) = (Branches::new(), Branches::new());
