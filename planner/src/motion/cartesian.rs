@@ -72,25 +72,11 @@ impl<const N: usize> Planner<N> {
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.fit = fit;
         let plan = smooth::plan(&poses, &options)?;
-        let blend = Blend {
-            tolerance: motion.tolerance,
-            exact_stop: plan.exact_stop(),
-            corridor_ratio: plan.certificate().corridor.ratio,
-            jerk_ratio: plan
-                .certificate()
-                .jerk
-                .ratio
-                .max(plan.certificate().angular_jerk.ratio),
-            fallbacks: plan.fallbacks(),
-        };
+        let blend = blend(&plan, motion.tolerance);
         let crossings: Vec<f64> = plan.crossings().iter().map(|pass| pass.time).collect();
-        let draft = |trajectory, crossings| Draft {
-            crossings,
-            ..Draft::of(trajectory)
-        };
         if is_still(&poses) || plan.duration() <= 0.0 {
             let at_once = vec![0.0; crossings.len()];
-            return Ok((draft(Trajectory::new(Vec::new()), at_once), blend));
+            return Ok((passing(Trajectory::new(Vec::new()), at_once), blend));
         }
         let towards = |u: f64| {
             1 + plan
@@ -104,28 +90,36 @@ impl<const N: usize> Planner<N> {
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
         let free = direct.duration();
-        let direct = self.slowed(draft(direct, crossings.clone()), motion);
+        let direct = self.slowed(passing(direct, crossings.clone()), motion);
         if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
             return Ok((direct, blend));
         }
+        let path = joint_path(&plan, &points)?;
+        match self.retimed(&path, &crossings, motion) {
+            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => {
+                Ok((timed, blend))
+            }
+            _ => Ok((direct, blend)),
+        }
+    }
+
+    /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
+    /// `crossings` are the times at which the smooth motion passes its poses (s).
+    fn retimed(
+        &self,
+        path: &HermitePath<N, &dyn ToolCurve>,
+        crossings: &[f64],
+        motion: &Move,
+    ) -> Result<Draft<N>, MotionError> {
         let options = TimingOptions {
             start: Boundary::Free,
             end: Boundary::Free,
             rate_cap: Some(1.0),
             ..Default::default()
         };
-        let path = joint_path(&plan, &points)?;
-        let timed = time_path(&path, &self.limits, &motion.limits, &options);
-        let timed = timed.map(|timed| {
-            let times = crossings.iter().map(|u| moment(&timed.law, *u)).collect();
-            self.slowed(draft(timed.trajectory, times), motion)
-        });
-        match timed {
-            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => {
-                Ok((timed, blend))
-            }
-            _ => Ok((direct, blend)),
-        }
+        let timed = time_path(path, &self.limits, &motion.limits, &options)?;
+        let times = crossings.iter().map(|u| moment(&timed.law, *u)).collect();
+        Ok(self.slowed(passing(timed.trajectory, times), motion))
     }
 
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine
@@ -231,6 +225,26 @@ impl<const N: usize> Planner<N> {
             percent: 100.0 * error.u / end,
             cause,
         }
+    }
+}
+
+/// What a smooth motion of the tool promises.
+fn blend(plan: &smooth::SmoothPlan, tolerance: f64) -> Blend {
+    let certificate = plan.certificate();
+    Blend {
+        tolerance,
+        exact_stop: plan.exact_stop(),
+        corridor_ratio: certificate.corridor.ratio,
+        jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
+        fallbacks: plan.fallbacks(),
+    }
+}
+
+/// A draft that passes its poses at these times (s).
+fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<f64>) -> Draft<N> {
+    Draft {
+        crossings,
+        ..Draft::of(trajectory)
     }
 }
 

@@ -1,5 +1,7 @@
 //! What was proved of a planned move, as data.
 
+use std::ops::Range;
+
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
@@ -242,10 +244,7 @@ fn crossings<const N: usize>(
             let after = times
                 .get(index + 1)
                 .map_or(trajectory.duration(), |next| *next);
-            let window = (
-                since.max(time_s - NEAR),
-                (time_s + NEAR).min(after.max(time_s)),
-            );
+            let window = since.max(time_s - NEAR)..(time_s + NEAR).min(after.max(time_s));
             let (closest_s, least) = closest(window, |t| seen(t).0);
             if least < deviation_m {
                 time_s = closest_s;
@@ -306,8 +305,9 @@ const EXACT_ANGLE: f64 = 1e-6;
 const NEAR: f64 = 2e-3;
 
 /// Minimum of a unimodal function between two times, by golden section.
-fn closest((mut low, mut high): (f64, f64), distance: impl Fn(f64) -> f64) -> (f64, f64) {
+fn closest(within: Range<f64>, distance: impl Fn(f64) -> f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (within.start, within.end);
     let mut left = high - GOLDEN * (high - low);
     let mut right = low + GOLDEN * (high - low);
     let (mut at_left, mut at_right) = (distance(left), distance(right));

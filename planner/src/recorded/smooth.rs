@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::arm::{ToolState, angle_between};
 use super::between::{Quintic, from_rest, off_quintic};
@@ -252,8 +252,8 @@ impl SmoothMove<'_> {
             };
         }
         let between = Between::new(self, row);
-        let target = (&pose.translation.vector, &pose.rotation);
-        between.approach(target, (self.tolerance(), self.angular_tolerance), slack)
+        let (distance, angle) = (self.tolerance() + slack.0, self.angular_tolerance + slack.1);
+        between.approach(pose, distance, angle)
     }
 
     /// How far the tool may be from the interpolation between two samples `h` (s) apart: m, rad.
@@ -300,13 +300,12 @@ impl<'a> Between<'a> {
         self.smooth.recording.arm.flange(&joints) * self.smooth.span.tools[1]
     }
 
-    fn approach(
-        &self,
-        (point, rotation): (&Vector3<f64>, &UnitQuaternion<f64>),
-        (tolerance, angular): (f64, f64),
-        slack: (f64, f64),
-    ) -> Approach {
-        let off = |pose: &Isometry3<f64>| (pose.translation.vector - point).norm();
+    /// How near the motion comes to a pose: it passes within `distance` (m), with its orientation
+    /// within `angle` (rad).
+    fn approach(&self, goal: &Isometry3<f64>, distance: f64, angle: f64) -> Approach {
+        let rotation = &goal.rotation;
+        let off =
+            |pose: &Isometry3<f64>| (pose.translation.vector - goal.translation.vector).norm();
         let places: Vec<_> = (0..=PARTS)
             .map(|part| part as f64 / PARTS as f64)
             .map(|share| (share, self.pose(share)))
@@ -314,31 +313,28 @@ impl<'a> Between<'a> {
         let at = (0..=PARTS)
             .min_by(|a, b| off(&places[*a].1).total_cmp(&off(&places[*b].1)))
             .unwrap_or(0);
-        let window = (
-            places[at.saturating_sub(1)].0,
-            places[(at + 1).min(PARTS)].0,
-        );
+        let window = places[at.saturating_sub(1)].0..places[(at + 1).min(PARTS)].0;
         let share = least(window, |share| off(&self.pose(share)));
         let closest = self.pose(share);
-        let inside = off(&closest) <= tolerance + slack.0;
+        let inside = off(&closest) <= distance;
         // Orientation: at the closest approach, or anywhere else in the ball.
-        let mut angle = angle_between(&closest.rotation, rotation);
+        let mut least_angle = angle_between(&closest.rotation, rotation);
         for pair in places.windows(2) {
             let [(_, a), (_, b)] = pair else { continue };
             let turn = angle_between(&a.rotation, &b.rotation);
             for pose in [a, b] {
-                if off(pose) <= tolerance + slack.0 {
+                if off(pose) <= distance {
                     // Between two places it may be nearer by half of the rotation between them.
                     let near = angle_between(&pose.rotation, rotation) - turn / 2.0;
-                    angle = angle.min(near.max(0.0));
+                    least_angle = least_angle.min(near.max(0.0));
                 }
             }
         }
         Approach {
             distance: off(&closest),
             time: self.start + share * self.time,
-            passes: [inside, inside && angle <= angular + slack.1],
-            angle: if inside { angle } else { f64::INFINITY },
+            passes: [inside, inside && least_angle <= angle],
+            angle: if inside { least_angle } else { f64::INFINITY },
         }
     }
 }
@@ -362,8 +358,9 @@ fn nearer(known: Option<Approach>, other: Approach) -> Approach {
 }
 
 /// The minimum of a unimodal function, by golden section.
-fn least((mut low, mut high): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
+fn least(within: Range<f64>, value: impl Fn(f64) -> f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (within.start, within.end);
     let mut left = high - GOLDEN * (high - low);
     let mut right = low + GOLDEN * (high - low);
     let (mut at_left, mut at_right) = (value(left), value(right));

@@ -96,7 +96,7 @@ pub(super) fn spans<'a>(
         let stands = own.start.saturating_sub(1);
         let task = task
             .ok()
-            .map(|task| of_point(recording, task, (stands, &before)));
+            .map(|task| of_point(recording, task, stands, &before));
         let tool_time = match &task {
             Some(Task::Tool(action)) => modal.tooling().nominal_time(*action),
             _ => 0.0,
@@ -133,7 +133,8 @@ pub(super) fn spans<'a>(
 fn of_point(
     recording: &Recording<'_>,
     task: Task,
-    (row, flange_from_tool): (usize, &Isometry3<f64>),
+    row: usize,
+    flange_from_tool: &Isometry3<f64>,
 ) -> Task {
     match task {
         Task::Joints(motion) => {

@@ -39,7 +39,7 @@ pub(super) fn straight(
         line
     };
     let times = recording.rows[span.own.clone()].iter().map(|row| row.t_s);
-    let (mut reached, mut worst) = ((0.0, 0.0), 0.0_f64);
+    let (mut reached, mut worst) = (Progress::default(), 0.0_f64);
     for (state, time) in own.iter().zip(times) {
         worst = worst.max(line.along(&state.point()).1);
         for (rule, what, measure) in line.measures(state, &mut reached) {
@@ -47,6 +47,13 @@ pub(super) fn straight(
         }
     }
     worst
+}
+
+/// The greatest distance along the line (m) and angle about the axis (rad) so far.
+#[derive(Clone, Copy, Default)]
+struct Progress {
+    along: f64,
+    angle: f64,
 }
 
 /// A line of the controlled point with the rotation about one axis of the tool.
@@ -74,17 +81,17 @@ impl Line {
         }
     }
 
-    /// The values to check at one state; `reached` is the greatest distance (m) and angle (rad) so
-    /// far.
+    /// The values to check at one state; `reached` is the progress so far.
     fn measures(
         &self,
         state: &ToolState,
-        reached: &mut (f64, f64),
+        reached: &mut Progress,
     ) -> [(Rule, &'static str, Measure); 5] {
         let (along, off) = self.along(&state.point());
         let (angle, tilt) = self.turned(&state.pose.rotation);
-        let (way_back, turn_back) = (reached.0 - along, reached.1 - angle);
-        *reached = (reached.0.max(along), reached.1.max(angle));
+        let (way_back, turn_back) = (reached.along - along, reached.angle - angle);
+        reached.along = reached.along.max(along);
+        reached.angle = reached.angle.max(angle);
         // On a line of no length the tool turns on the spot, so there is no proportion to check.
         let rate = if self.length > 0.0 {
             self.turn.norm() / self.length

@@ -46,6 +46,13 @@ struct Joints {
     jerk_per_s3: Option<Spanned<Vec<f64>>>,
 }
 
+/// One limit of the joints: its key in `robot.toml`, the values there, and that of a joint's URDF.
+struct LimitEntry<'a> {
+    key: &'a str,
+    given: Option<&'a Spanned<Vec<f64>>>,
+    urdf: fn(&urdf::JointInfo) -> Option<f64>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Tool {
@@ -198,61 +205,62 @@ impl Files<'_> {
         model: &Model,
         joints: &Spanned<Joints>,
     ) -> Result<JointLimits, RobotError> {
-        let (span, given) = (joints.span(), joints.get_ref());
-        let of = |key: &str, ours: &Option<Spanned<Vec<f64>>>, urdf: Vec<Option<f64>>| {
-            let key = format!("joints.{key}");
-            if let Some(ours) = ours {
-                self.check_count(&key, ours, model.dof())?;
-                if !ours
-                    .get_ref()
-                    .iter()
-                    .all(|value| *value > 0.0 && value.is_finite())
-                {
-                    return Err(self.value(ours.span(), &key, "positive finite numbers"));
-                }
-            }
-            let one = |(index, urdf): (usize, Option<f64>)| {
-                let ours = ours
-                    .as_ref()
-                    .and_then(|ours| ours.get_ref().get(index).copied());
-                urdf.or(ours).ok_or_else(|| {
-                    let name = model.joints.get(index).map_or("", |joint| &joint.name);
-                    let expected = format!("a value for joint \"{name}\", as its URDF has none");
-                    let mut error = self.value(span.clone(), &key, &expected);
-                    if let RobotError::Value { found, .. } = &mut error {
-                        "no such key".clone_into(found);
-                    }
-                    error
-                })
-            };
-            urdf.into_iter()
-                .enumerate()
-                .map(one)
-                .collect::<Result<Vec<f64>, RobotError>>()
-        };
-        let each = |take: fn(&urdf::JointInfo) -> Option<f64>| -> Vec<Option<f64>> {
-            model.joints.iter().map(take).collect()
-        };
+        let given = joints.get_ref();
+        let of = |limit: &LimitEntry<'_>| self.joint_limit(model, joints.span(), limit);
         Ok(JointLimits {
             lower: model.joints.iter().map(|joint| joint.lower).collect(),
             upper: model.joints.iter().map(|joint| joint.upper).collect(),
-            velocity: of(
-                "velocity_per_s",
-                &given.velocity_per_s,
-                each(|joint| joint.velocity),
-            )?,
-            acceleration: of(
-                "acceleration_per_s2",
-                &given.acceleration_per_s2,
+            velocity: of(&LimitEntry {
+                key: "joints.velocity_per_s",
+                given: given.velocity_per_s.as_ref(),
+                urdf: |joint| joint.velocity,
+            })?,
+            acceleration: of(&LimitEntry {
+                key: "joints.acceleration_per_s2",
+                given: given.acceleration_per_s2.as_ref(),
                 // One bound is for both directions, so the smaller of the two is used.
-                each(|joint| match (joint.acceleration, joint.deceleration) {
+                urdf: |joint| match (joint.acceleration, joint.deceleration) {
                     (Some(up), Some(down)) => Some(up.min(down)),
                     (up, down) => up.or(down),
-                }),
-            )?,
-            jerk: of("jerk_per_s3", &given.jerk_per_s3, each(|joint| joint.jerk))?,
+                },
+            })?,
+            jerk: of(&LimitEntry {
+                key: "joints.jerk_per_s3",
+                given: given.jerk_per_s3.as_ref(),
+                urdf: |joint| joint.jerk,
+            })?,
             source: given.source.clone(),
         })
+    }
+
+    /// One limit of every joint; `joints` is where a missing one is reported.
+    fn joint_limit(
+        &self,
+        model: &Model,
+        joints: Range<usize>,
+        limit: &LimitEntry<'_>,
+    ) -> Result<Vec<f64>, RobotError> {
+        let key = limit.key;
+        if let Some(given) = limit.given {
+            self.check_count(key, given, model.dof())?;
+            let values = given.get_ref();
+            if !values.iter().all(|value| *value > 0.0 && value.is_finite()) {
+                return Err(self.value(given.span(), key, "positive finite numbers"));
+            }
+        }
+        let one = |(index, joint): (usize, &urdf::JointInfo)| {
+            let given = limit.given.and_then(|given| given.get_ref().get(index));
+            (limit.urdf)(joint).or(given.copied()).ok_or_else(|| {
+                let name = &joint.name;
+                let expected = format!("a value for joint \"{name}\", as its URDF has none");
+                let mut error = self.value(joints.clone(), key, &expected);
+                if let RobotError::Value { found, .. } = &mut error {
+                    "no such key".clone_into(found);
+                }
+                error
+            })
+        };
+        model.joints.iter().enumerate().map(one).collect()
     }
 
     fn check_count(

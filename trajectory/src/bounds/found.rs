@@ -1,6 +1,6 @@
 //! The search for the largest value of polynomials over time.
 
-use std::ops::{Add, Mul};
+use std::ops::{Add, Mul, Range};
 
 use crate::poly::halve;
 
@@ -35,48 +35,62 @@ impl Found {
         }
     }
 
-    /// Adds a quantity that is within `error` of a polynomial in Bernstein form over `[from, to]`
-    /// (s); its size is `norm` of the vector, which must be convex.
+    /// Adds a quantity over a range of time (s) in which it is within `error` of a polynomial in
+    /// Bernstein form; its size is `norm` of the vector, which must be convex.
     pub(super) fn take<T, const M: usize>(
         &mut self,
         control: &[T; M],
-        (from, to): (f64, f64),
-        (error, norm): (f64, &impl Fn(&T) -> f64),
+        when: Range<f64>,
+        error: f64,
+        norm: impl Fn(&T) -> f64,
     ) where
         T: Copy + Add<Output = T> + Mul<f64, Output = T>,
     {
-        self.halved(control, (from, to), (error, norm), DEPTH);
+        let mut search = Search {
+            found: self,
+            error,
+            norm,
+        };
+        search.take(control, when, DEPTH);
     }
+}
 
-    fn halved<T, const M: usize>(
-        &mut self,
-        control: &[T; M],
-        (from, to): (f64, f64),
-        (error, norm): (f64, &impl Fn(&T) -> f64),
-        depth: u32,
-    ) where
+/// The search for the largest value of one quantity.
+struct Search<'a, F> {
+    found: &'a mut Found,
+    error: f64,
+    norm: F,
+}
+
+impl<F> Search<'_, F> {
+    /// Adds a polynomial, and halves it at most `depth` times.
+    fn take<T, const M: usize>(&mut self, control: &[T; M], when: Range<f64>, depth: u32)
+    where
         T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+        F: Fn(&T) -> f64,
     {
         let (mut hull, mut at) = (0.0_f64, 0);
         for (i, c) in control.iter().enumerate() {
-            let size = norm(c);
+            let size = (self.norm)(c);
             if size > hull || size.is_nan() {
                 (hull, at) = (size, i);
             }
         }
-        let bound = hull + error;
-        let ends = norm(&control[0]).max(norm(&control[M - 1])) - error;
-        self.reached = self.reached.max(ends);
-        if bound <= self.bound {
+        let bound = hull + self.error;
+        let ends = (self.norm)(&control[0]).max((self.norm)(&control[M - 1])) - self.error;
+        let found = &mut *self.found;
+        found.reached = found.reached.max(ends);
+        if bound <= found.bound {
             return;
         }
-        if depth == 0 || self.enough(bound) || !bound.is_finite() {
-            self.raise(bound, from + (to - from) * at as f64 / (M - 1) as f64);
+        if depth == 0 || found.enough(bound) || !bound.is_finite() {
+            let share = at as f64 / (M - 1) as f64;
+            found.raise(bound, when.start + (when.end - when.start) * share);
             return;
         }
-        let middle = 0.5 * (from + to);
+        let middle = 0.5 * (when.start + when.end);
         let (left, right) = halve(control);
-        self.halved(&left, (from, middle), (error, norm), depth - 1);
-        self.halved(&right, (middle, to), (error, norm), depth - 1);
+        self.take(&left, when.start..middle, depth - 1);
+        self.take(&right, middle..when.end, depth - 1);
     }
 }

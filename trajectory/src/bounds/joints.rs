@@ -1,5 +1,7 @@
 //! Bounds of the joint motion: hulls of its polynomials.
 
+use std::ops::Range;
+
 use nalgebra::SVector;
 use realtime::Piece;
 
@@ -21,6 +23,13 @@ pub(super) struct Joints<const N: usize> {
 
 /// Hulls that exceed the known positions by less than this (rad, m) are not refined.
 const POSITION: f64 = 1e-6;
+
+/// A limit of a joint: 0 for velocity, 1 for acceleration, 2 for jerk, and the joint from 0.
+#[derive(Clone, Copy)]
+struct Column {
+    order: usize,
+    joint: usize,
+}
 
 /// Derivatives 1 to 3 of a piece in Bernstein form.
 struct Derivatives<const N: usize> {
@@ -52,21 +61,16 @@ impl<const N: usize> Derivatives<N> {
     }
 
     /// Adds one derivative of one joint, divided by its limit, to a search.
-    fn search(
-        &self,
-        (order, joint): (usize, usize),
-        limit: f64,
-        when: (f64, f64),
-        found: &mut Found,
-    ) {
+    fn search(&self, column: Column, limit: f64, when: Range<f64>, found: &mut Found) {
         fn one<const N: usize, const M: usize>(c: &[SVector<f64, N>; M], j: usize) -> [f64; M] {
             c.map(|c| c[j])
         }
         let size = |x: &f64| x.abs() / limit;
-        match order {
-            0 => found.take(&one(&self.velocity, joint), when, (0.0, &size)),
-            1 => found.take(&one(&self.acceleration, joint), when, (0.0, &size)),
-            _ => found.take(&one(&self.jerk, joint), when, (0.0, &size)),
+        let j = column.joint;
+        match column.order {
+            0 => found.take(&one(&self.velocity, j), when, 0.0, size),
+            1 => found.take(&one(&self.acceleration, j), when, 0.0, size),
+            _ => found.take(&one(&self.jerk, j), when, 0.0, size),
         }
     }
 }
@@ -91,35 +95,37 @@ pub(super) fn bound<const N: usize>(
         Limit::JointAcceleration,
         Limit::JointJerk,
     ];
-    let columns: Vec<(usize, usize)> = (0..3)
-        .flat_map(|order| (0..N).map(move |j| (order, j)))
-        .filter(|(order, j)| values[*order][*j].is_finite())
+    let columns: Vec<Column> = (0..3)
+        .flat_map(|order| (0..N).map(move |joint| Column { order, joint }))
+        .filter(|column| values[column.order][column.joint].is_finite())
         .collect();
     let mut found = vec![Found::default(); columns.len()];
     let mut rows = Vec::with_capacity(columns.len() * trajectory.pieces().len());
     for piece in trajectory.pieces() {
         let hulls = Derivatives::of(piece).hulls();
-        for ((order, j), found) in columns.iter().zip(&mut found) {
-            let ([most, ends], limit) = (&hulls[*order], values[*order][*j]);
-            found.reached = found.reached.max(ends[*j] / limit);
-            rows.push(most[*j] / limit);
+        for (Column { order, joint }, found) in columns.iter().zip(&mut found) {
+            let ([most, ends], limit) = (&hulls[*order], values[*order][*joint]);
+            found.reached = found.reached.max(ends[*joint] / limit);
+            rows.push(most[*joint] / limit);
         }
     }
     // Only pieces that may contain the largest value are refined.
     let starts = trajectory.times();
     for (i, piece) in trajectory.pieces().iter().enumerate() {
         let mut derivatives = None;
-        let when = (starts[i], starts[i + 1]);
-        for (c, (order, j)) in columns.iter().enumerate() {
+        for (c, column) in columns.iter().enumerate() {
             let (row, found) = (rows[i * columns.len() + c], &mut found[c]);
             if row <= found.bound {
                 continue;
             }
             let derivatives = derivatives.get_or_insert_with(|| Derivatives::of(piece));
-            derivatives.search((*order, *j), values[*order][*j], when, found);
+            let limit = values[column.order][column.joint];
+            derivatives.search(*column, limit, starts[i]..starts[i + 1], found);
         }
     }
-    let limits = columns.iter().map(|(order, j)| names[*order](*j));
+    let limits = columns
+        .iter()
+        .map(|column| names[column.order](column.joint));
     Joints {
         found: limits.zip(found).collect(),
         positions: positions(trajectory),

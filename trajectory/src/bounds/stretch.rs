@@ -53,7 +53,37 @@ pub(super) struct Stretch {
     since: f64,
 }
 
+/// A part of a piece.
+#[derive(Clone, Copy)]
+struct PiecePart {
+    /// The piece, from 0.
+    index: usize,
+    /// Its start in the piece, and its length (s).
+    since: f64,
+    width: f64,
+}
+
+impl PiecePart {
+    fn halves(self) -> [Self; 2] {
+        let width = 0.5 * self.width;
+        [self.since, self.since + width].map(|since| Self {
+            since,
+            width,
+            ..self
+        })
+    }
+}
+
 impl Stretch {
+    /// The part of a piece that it is.
+    fn part(&self) -> PiecePart {
+        PiecePart {
+            index: self.piece,
+            since: self.since,
+            width: self.duration,
+        }
+    }
+
     /// The end of the stretch (s).
     pub(super) fn end(&self) -> f64 {
         self.start + self.duration
@@ -84,8 +114,13 @@ struct Looker<'a, T, const N: usize> {
 }
 
 impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
-    /// The interval of `width` (s) from `since` (s) on in a piece.
-    fn stretch(&self, index: usize, since: f64, width: f64) -> Stretch {
+    /// The interval of a part of a piece.
+    fn stretch(&self, part: PiecePart) -> Stretch {
+        let PiecePart {
+            index,
+            since,
+            width,
+        } = part;
         let piece = &self.trajectory.pieces()[index];
         let mut values = [[Vector3::zeros(); 5]; 6];
         let mut places = [Vector3::zeros(); 5];
@@ -135,17 +170,17 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
     }
 
     /// Adds the intervals of a part of a piece, each short enough for its error.
-    fn divide(&self, (index, since, width): (usize, f64, f64), depth: u32, out: &mut Vec<Stretch>) {
-        let stretch = self.stretch(index, since, width);
+    fn divide(&self, part: PiecePart, depth: u32, out: &mut Vec<Stretch>) {
+        let stretch = self.stretch(part);
         let good =
             stretch.error.iter().all(|error| *error <= ERROR) && stretch.place_error <= self.place;
         if good || depth == 0 {
             out.push(stretch);
             return;
         }
-        let half = 0.5 * width;
-        self.divide((index, since, half), depth - 1, out);
-        self.divide((index, since + half, half), depth - 1, out);
+        let [first, second] = part.halves();
+        self.divide(first, depth - 1, out);
+        self.divide(second, depth - 1, out);
     }
 
     /// All stretches of the motion.
@@ -160,7 +195,16 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
             let parts = (turn / TURN).ceil().clamp(1.0, 1e4) as usize;
             let width = piece.duration / parts as f64;
             for part in 0..parts {
-                self.divide((index, width * part as f64, width), DEPTH, &mut out);
+                let since = width * part as f64;
+                self.divide(
+                    PiecePart {
+                        index,
+                        since,
+                        width,
+                    },
+                    DEPTH,
+                    &mut out,
+                );
             }
         }
         out
@@ -174,17 +218,15 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
         }
         let hidden = stretch.error[q] > 0.25 * TOLERANCE * found.reached;
         if hidden && depth > 0 && !found.enough(stretch.upper[q]) {
-            let half = 0.5 * stretch.duration;
-            for part in [0.0, half] {
-                let closer = self.stretch(stretch.piece, stretch.since + part, half);
+            for part in stretch.part().halves() {
+                let closer = self.stretch(part);
                 found.reached = found.reached.max(ends(&closer, q));
                 self.search(&closer, q, depth - 1, found);
             }
             return;
         }
-        let when = (stretch.start, stretch.end());
-        let size = |x: &Vector3<f64>| x.norm();
-        found.take(&stretch.control[q], when, (stretch.error[q], &size));
+        let when = stretch.start..stretch.end();
+        found.take(&stretch.control[q], when, stretch.error[q], Vector3::norm);
     }
 }
 

@@ -1,5 +1,7 @@
 //! Bounds of the tool's distance from a line or from the legs between poses.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::MotionBounds;
@@ -35,8 +37,8 @@ impl<const N: usize> MotionBounds<N> {
             ..Found::default()
         };
         for stretch in &self.stretches {
-            let when = (stretch.start, stretch.end());
-            found.take(&stretch.place, when, (stretch.place_error, &size));
+            let when = stretch.start..stretch.end();
+            found.take(&stretch.place, when, stretch.place_error, size);
         }
         (found.bound, found.time)
     }
@@ -62,7 +64,7 @@ impl<const N: usize> MotionBounds<N> {
             let during = self.stretches[first..].iter();
             for stretch in during.take_while(|s| s.start <= leg.when[1]) {
                 let (control, when) = part(stretch, leg.when);
-                found.take(&control, when, (stretch.place_error, &size));
+                found.take(&control, when, stretch.place_error, size);
             }
         }
         (found.bound, found.time)
@@ -70,7 +72,7 @@ impl<const N: usize> MotionBounds<N> {
 }
 
 /// The position over the part of an interval within `[from, to]` (s), and that part.
-fn part(stretch: &Stretch, [from, to]: [f64; 2]) -> ([Vector3<f64>; 5], (f64, f64)) {
+fn part(stretch: &Stretch, [from, to]: [f64; 2]) -> ([Vector3<f64>; 5], Range<f64>) {
     let share = |time: f64| ((time - stretch.start) / stretch.duration).clamp(0.0, 1.0);
     let (low, high) = (share(from), share(to));
     let mut control = stretch.place;
@@ -81,7 +83,7 @@ fn part(stretch: &Stretch, [from, to]: [f64; 2]) -> ([Vector3<f64>; 5], (f64, f6
         control = split(&control, if high > 0.0 { low / high } else { 1.0 }).1;
     }
     let at = |share: f64| stretch.start + stretch.duration * share;
-    (control, (at(low), at(high)))
+    (control, at(low)..at(high))
 }
 
 /// Both parts of a polynomial in Bernstein form, divided at `x` from 0 to 1 (de Casteljau).

@@ -62,41 +62,19 @@ impl Audit {
         for joint in 0..N {
             let scale = Scale::of(joint, limits, start, motion);
             let pieces = until(&pieces, motion.arrival(joint).unwrap_or(0.0));
-            audit.ends(joint, &scale, pieces, (start, target));
+            if let (Some(first), Some(last)) = (pieces.first(), pieces.last()) {
+                let off = scale.difference(at(first, joint, 0.0), of_joint(start, joint));
+                raise(&mut audit.start, off);
+                let reached = at(last, joint, last.duration);
+                raise(
+                    &mut audit.end,
+                    scale.difference(reached, of_joint(target, joint)),
+                );
+            }
             audit.pieces(joint, &scale, pieces, limits);
             audit.joins(joint, &scale, pieces);
         }
         audit
-    }
-
-    fn ends<const N: usize>(
-        &mut self,
-        joint: usize,
-        scale: &Scale,
-        pieces: &[Piece<N>],
-        (start, target): (&State<N>, &State<N>),
-    ) {
-        let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
-            return;
-        };
-        let wanted = [
-            start.position[joint],
-            start.velocity[joint],
-            start.acceleration[joint],
-        ];
-        raise(
-            &mut self.start,
-            scale.difference(at(first, joint, 0.0), wanted),
-        );
-        let wanted = [
-            target.position[joint],
-            target.velocity[joint],
-            target.acceleration[joint],
-        ];
-        raise(
-            &mut self.end,
-            scale.difference(at(last, joint, last.duration), wanted),
-        );
     }
 
     fn joins<const N: usize>(&mut self, joint: usize, scale: &Scale, pieces: &[Piece<N>]) {
@@ -237,6 +215,15 @@ fn until<const N: usize>(pieces: &[Piece<N>], arrival: f64) -> &[Piece<N>] {
         middle < arrival
     });
     &pieces[..count.count()]
+}
+
+/// Position, velocity and acceleration of a joint in a state.
+fn of_joint<const N: usize>(state: &State<N>, joint: usize) -> [f64; 3] {
+    [
+        state.position[joint],
+        state.velocity[joint],
+        state.acceleration[joint],
+    ]
 }
 
 /// Position, velocity and acceleration of a joint at `t` (s) in a piece.

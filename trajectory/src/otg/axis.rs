@@ -118,10 +118,14 @@ impl Axis {
 
     /// The first possible duration in a window in which the velocities can be joined.
     fn first_in(&self, from: f64, last: f64) -> Option<f64> {
+        let goal = |distance: f64| Goal {
+            distance,
+            slack: self.slack,
+        };
         let mut time = from;
         for _ in 0..8 {
-            let forward = first_above(&self.up, (self.distance, self.slack), time, last)?;
-            let both = first_above(&self.down, (-self.distance, self.slack), forward, last)?;
+            let forward = first_above(&self.up, goal(self.distance), time, last)?;
+            let both = first_above(&self.down, goal(-self.distance), forward, last)?;
             if both <= time || both <= forward {
                 return Some(both);
             }
@@ -266,19 +270,39 @@ fn pulse_windows(square: f64, bound: f64, a0: f64, af: f64) -> (Option<f64>, f64
     (first, 2.0 * next - a0 - af)
 }
 
-/// The first time in `from..=last` at which `side` gets at least `target.0` far; `target.1` is how
-/// exactly that is known.
+/// A distance to be reached, and how exactly it is known.
+#[derive(Clone, Copy)]
+struct Goal {
+    distance: f64,
+    slack: f64,
+}
+
+/// A time, and the distance beyond the goal that is reached then.
+#[derive(Clone, Copy)]
+struct Excess {
+    time: f64,
+    distance: f64,
+}
+
+/// The first time in `from..=last` at which a member of the family gets at least as far as the goal.
 ///
 /// The slope of the distance falls, then rises (until the velocity bound is reached, where it is
 /// constant and positive): there is at most one hump before the last rise.
-fn first_above(family: &ExtremalFamily, target: (f64, f64), from: f64, last: f64) -> Option<f64> {
-    let (goal, slack) = target;
+fn first_above(family: &ExtremalFamily, goal: Goal, from: f64, last: f64) -> Option<f64> {
+    let Goal {
+        distance: goal,
+        slack,
+    } = goal;
     let here = family.at(from);
     if here.distance >= goal - slack - family.noise(&here) {
         return Some(from);
     }
-    let below = (from, here.distance - goal);
-    let until = |time: f64, distance: f64| root(family, goal, below, (time, distance - goal));
+    let excess = |time: f64, distance: f64| Excess {
+        time,
+        distance: distance - goal,
+    };
+    let below = excess(from, here.distance);
+    let until = |time: f64, distance: f64| root(family, goal, below, excess(time, distance));
     if !here.crossing
         && here.slope > 0.0
         && let Some(top) = hump(family, from, last)
@@ -305,13 +329,13 @@ fn first_above(family: &ExtremalFamily, target: (f64, f64), from: f64, last: f64
 }
 
 /// The root where velocity has no bound: double the time until it is enclosed.
-fn unbounded_root(family: &ExtremalFamily, goal: f64, below: (f64, f64)) -> Option<f64> {
-    let mut step = 1.0 + below.0;
+fn unbounded_root(family: &ExtremalFamily, goal: f64, below: Excess) -> Option<f64> {
+    let mut step = 1.0 + below.time;
     for _ in 0..1100 {
-        let time = below.0 + step;
-        let error = family.at(time).distance - goal;
-        if error >= 0.0 {
-            return Some(root(family, goal, below, (time, error)));
+        let time = below.time + step;
+        let distance = family.at(time).distance - goal;
+        if distance >= 0.0 {
+            return Some(root(family, goal, below, Excess { time, distance }));
         }
         step *= 2.0;
     }
@@ -335,13 +359,16 @@ fn hump(family: &ExtremalFamily, from: f64, last: f64) -> Option<f64> {
     Some(low)
 }
 
-/// The time between `below` (not far enough) and `above` (far enough) at which `goal` is reached;
-/// both are a time and the distance beyond the goal there.
-fn root(family: &ExtremalFamily, goal: f64, below: (f64, f64), above: (f64, f64)) -> f64 {
-    let (mut low, mut high) = (below.0, above.0);
-    let width = above.1 - below.1;
+/// The time between `below` (not far enough) and `above` (far enough) at which `goal` is reached.
+fn root(family: &ExtremalFamily, goal: f64, below: Excess, above: Excess) -> f64 {
+    let (mut low, mut high) = (below.time, above.time);
+    let width = above.distance - below.distance;
     // Without limits but jerk, distance grows with the cube of time.
-    let share = if width > 0.0 { -below.1 / width } else { 1.0 };
+    let share = if width > 0.0 {
+        -below.distance / width
+    } else {
+        1.0
+    };
     let mut time = (low + (high - low) * rough_cube_root(share.max(0.0))).min(high);
     for _ in 0..100 {
         let here = family.at(time);

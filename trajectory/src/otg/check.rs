@@ -183,13 +183,13 @@ pub(crate) fn keep_positions<const N: usize>(
     options: &Options<N>,
 ) -> Result<(), OtgError> {
     for joint in 0..N {
-        let range = (limits.position_min[joint], limits.position_max[joint]);
-        let bounded = range.0.is_finite() || range.1.is_finite();
+        let (lower, upper) = (limits.position_min[joint], limits.position_max[joint]);
+        let bounded = lower.is_finite() || upper.is_finite();
         if !bounded || !options.enabled[joint] || options.interface[joint] != Interface::Position {
             continue;
         }
         let track = &mut motion.tracks[joint];
-        let Some((value, limit)) = beyond(track, range) else {
+        let Some((value, limit)) = beyond(track, lower, upper) else {
             continue;
         };
         let mut other = *track;
@@ -206,7 +206,7 @@ pub(crate) fn keep_positions<const N: usize>(
                 });
             }
         }
-        match beyond(&other, range) {
+        match beyond(&other, lower, upper) {
             None => *track = other,
             Some((value, limit)) => {
                 return Err(OtgError::PositionLimit {
@@ -221,7 +221,7 @@ pub(crate) fn keep_positions<const N: usize>(
 }
 
 /// The position farthest beyond a limit, and that limit.
-fn beyond(track: &Track, (lower, upper): (f64, f64)) -> Option<(f64, f64)> {
+fn beyond(track: &Track, lower: f64, upper: f64) -> Option<(f64, f64)> {
     let (low, high) = track.extent();
     let room = ROUNDING * (low.abs() + high.abs());
     if high > upper.max(track.start[0]) + room {

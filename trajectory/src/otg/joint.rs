@@ -120,6 +120,30 @@ pub(crate) struct Frame {
     launch: Point,
 }
 
+impl Frame {
+    /// The frame of a joint that begins in `from` (normalised) and brakes first.
+    fn new(units: Units, from: End, brake: Brake) -> Self {
+        let start = Point {
+            velocity: from.velocity,
+            acceleration: from.acceleration,
+            ..Point::default()
+        };
+        let pause = brake.duration();
+        let launch = if pause > 0.0 {
+            brake.point(start, pause)
+        } else {
+            start
+        };
+        Self {
+            units,
+            brake,
+            pause,
+            start,
+            launch,
+        }
+    }
+}
+
 /// One joint's problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Joint {
@@ -165,17 +189,8 @@ impl Joint {
         };
         let (from, to) = (normal(&given.start), normal(&given.target));
         let brake = Brake::new(from, bounds, interface == Interface::Position);
-        let start = Point {
-            velocity: from.velocity,
-            acceleration: from.acceleration,
-            ..Point::default()
-        };
-        let pause = brake.duration();
-        let launch = if pause > 0.0 {
-            brake.point(start, pause)
-        } else {
-            start
-        };
+        let frame = Frame::new(units, from, brake);
+        let launch = frame.launch;
         let ready = End {
             velocity: launch.velocity,
             acceleration: launch.acceleration,
@@ -193,13 +208,6 @@ impl Joint {
                 ))
             }
             Interface::Velocity => Task::VelocityProblem(VelocityProblem::new(ready, to, bounds)),
-        };
-        let frame = Frame {
-            units,
-            brake,
-            pause,
-            start,
-            launch,
         };
         Self {
             frame,

@@ -3,7 +3,7 @@
 use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
-use super::bound::bound;
+use super::bound::{Precision, bound};
 use super::grid::Bounded;
 use super::gridpoints::ToolGridpoint;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
@@ -235,17 +235,20 @@ impl<const N: usize> JointBounds<N> {
         let [_, c1, c2, c3, c4, c5] = &piece.coefficients;
         let (c1, c2, c3, c4, c5) = (c1[j], c2[j], c3[j], c4[j], c5[j]);
         let limit = self.limits[order][j];
-        let room = (FLOOR * limit, TOLERANCE * limit);
+        let precision = Precision {
+            floor: FLOOR * limit,
+            tolerance: TOLERANCE * limit,
+        };
         let found = match order {
             0 => {
                 let v = [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
-                bound(&v, piece.duration, room)
+                bound(&v, piece.duration, precision)
             }
             1 => {
                 let a = [2.0 * c2, 6.0 * c3, 12.0 * c4, 20.0 * c5];
-                bound(&a, piece.duration, room)
+                bound(&a, piece.duration, precision)
             }
-            _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, room),
+            _ => bound(&[6.0 * c3, 24.0 * c4, 60.0 * c5], piece.duration, precision),
         };
         found / limit
     }

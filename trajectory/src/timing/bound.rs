@@ -2,8 +2,15 @@
 
 use crate::poly::bernstein;
 
-/// An upper bound of `|sum_k coefficients[k] t^k|` over `0 <= t <= duration`, exact to `tolerance`
-/// where it is above `floor`; at most five coefficients.
+/// How exact a bound must be: to `tolerance` where it is above `floor`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Precision {
+    pub(super) floor: f64,
+    pub(super) tolerance: f64,
+}
+
+/// An upper bound of `|sum_k coefficients[k] t^k|` over `0 <= t <= duration`; at most five
+/// coefficients.
 ///
 /// # Source
 /// Convex hull property of the Bernstein form, tightened by subdivision (Farin, Curves and
@@ -11,19 +18,20 @@ use crate::poly::bernstein;
 pub(super) fn bound<const M: usize>(
     coefficients: &[f64; M],
     duration: f64,
-    (floor, tolerance): (f64, f64),
+    precision: Precision,
 ) -> f64 {
     let mut points = [0.0; 5];
     let control = bernstein(coefficients, 0.0, duration);
     for (point, c) in points.iter_mut().zip(control) {
         *point = c;
     }
-    refine(points, M.min(5), (floor, tolerance), 12)
+    refine(points, M.min(5), precision, 12)
 }
 
 /// Splits at the extremum until the hull is tight: the parts on both sides of it are monotonic, so
 /// that their ends bound them.
-fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth: usize) -> f64 {
+fn refine(points: [f64; 5], count: usize, precision: Precision, depth: usize) -> f64 {
+    let Precision { floor, tolerance } = precision;
     let (mut hull, mut peak) = (0.0_f64, 0);
     for (i, x) in points.iter().take(count).enumerate() {
         if x.abs() > hull {
@@ -43,11 +51,12 @@ fn refine(points: [f64; 5], count: usize, (floor, tolerance): (f64, f64), depth:
             row[i] = (1.0 - x) * row[i] + x * row[i + 1];
         }
     }
-    let first = refine(left, count, (floor, tolerance), depth - 1);
+    let first = refine(left, count, precision, depth - 1);
+    let floor = floor.max(first);
     first.max(refine(
         right,
         count,
-        (floor.max(first), tolerance),
+        Precision { floor, tolerance },
         depth - 1,
     ))
 }
@@ -83,7 +92,11 @@ mod tests {
         let value = |t: f64| polynomial.iter().rev().fold(0.0, |sum, c| sum * t + c);
         let dense = (0..=100_000).map(|i| value(1.4 * f64::from(i) / 1e5).abs());
         let dense = dense.fold(0.0, f64::max);
-        let bound = bound(&polynomial, 1.4, (0.0, 1e-9));
+        let precision = Precision {
+            floor: 0.0,
+            tolerance: 1e-9,
+        };
+        let bound = bound(&polynomial, 1.4, precision);
         assert!(
             bound >= dense - 1e-12 && bound < dense + 1e-7,
             "{bound} {dense}"

@@ -62,6 +62,13 @@ pub(super) struct Maker<'a, const N: usize> {
     out: Pieces<N>,
 }
 
+/// An end of a piece: its place in the grid's parameter, and the state there.
+#[derive(Clone, Copy)]
+struct PieceEnd<'a, const N: usize> {
+    w: f64,
+    state: &'a State<N>,
+}
+
 impl<'a, const N: usize> Maker<'a, N> {
     /// For laws over the grid of `gridpoints`.
     pub(super) fn new(bounded: Bounded<'a, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
@@ -92,20 +99,18 @@ impl<'a, const N: usize> Maker<'a, N> {
                 gridpoints.right(k),
                 spot.moved(problem.widths[k]),
             );
-            self.halve(k, (nodes[k], &start), (nodes[k + 1], &end), DEPTH);
+            let [start, end] =
+                [(nodes[k], &start), (nodes[k + 1], &end)].map(|(w, state)| PieceEnd { w, state });
+            self.halve(k, start, end, DEPTH);
         }
         self.out
     }
 
     /// Adds the pieces between two places in cell `k`: one if it is close enough to the path,
     /// otherwise those of both halves.
-    fn halve(
-        &mut self,
-        k: usize,
-        (w0, start): (f64, &State<N>),
-        (w1, end): (f64, &State<N>),
-        depth: usize,
-    ) {
+    fn halve(&mut self, k: usize, from: PieceEnd<'_, N>, to: PieceEnd<'_, N>, depth: usize) {
+        let (w0, start) = (from.w, from.state);
+        let (w1, end) = (to.w, to.state);
         let duration = passage(start.spot, w1 - w0);
         let (joint, jerk_off) = self.build.run(Join {
             duration,
@@ -134,8 +139,12 @@ impl<'a, const N: usize> Maker<'a, N> {
                     spot,
                 )
             };
-            self.halve(k, (w0, start), (middle, &state), depth - 1);
-            self.halve(k, (middle, &state), (w1, end), depth - 1);
+            let middle = PieceEnd {
+                w: middle,
+                state: &state,
+            };
+            self.halve(k, from, middle, depth - 1);
+            self.halve(k, middle, to, depth - 1);
             return;
         }
         self.out.fit_error = self.out.fit_error.max(error);

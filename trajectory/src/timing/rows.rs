@@ -10,6 +10,20 @@ use super::reachability::{joint_ratio, speed_cap};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, ToolLimits};
 
+/// A place on the path with what is known there.
+#[derive(Clone, Copy)]
+struct Place<'a, const N: usize> {
+    gridpoint: &'a Gridpoint<N>,
+    tool: ToolGridpoint,
+}
+
+/// Where a row is: its slot in the problem, and the lane of its cell.
+#[derive(Clone, Copy)]
+struct Slot {
+    slot: usize,
+    lane: usize,
+}
+
 /// Limits as factors: what rows are multiplied by.
 struct Rows<'a, const N: usize> {
     joint: &'a JointLimits<N>,
@@ -49,40 +63,52 @@ impl<const N: usize> Bounded<'_, N> {
                 gridpoints.right(k),
             );
             let [left_tool, middle_tool] = gridpoints.tools(k);
-            let (left, middle) = ((left, left_tool), (middle, middle_tool));
-            rows.values(&mut problem, (k, false), left);
-            rows.values(&mut problem, (k, true), middle);
+            let at = |gridpoint, tool| Place { gridpoint, tool };
+            let lane = k % LANE;
+            let value = |middle: bool| Slot {
+                slot: Problem::value_slot(k, middle),
+                lane,
+            };
+            let jerk = |slot: usize| Slot { slot, lane };
+            let (left, middle) = (at(left, left_tool), at(middle, middle_tool));
+            rows.values(&mut problem, value(false), left);
+            rows.values(&mut problem, value(true), middle);
             let slots = problem.jerk_slots(k);
             let (first, last) = (slots.start, slots.end - 1);
-            rows.jerks(&mut problem, (k, first), left);
-            rows.jerks(&mut problem, (k, first + slots.len() / 2), middle);
-            rows.jerks(&mut problem, (k, last), (right, gridpoints.tool_right(k)));
+            rows.jerks(&mut problem, jerk(first), left);
+            rows.jerks(&mut problem, jerk(first + slots.len() / 2), middle);
+            let right = at(right, gridpoints.tool_right(k));
+            rows.jerks(&mut problem, jerk(last), right);
             if problem.dense(k) {
                 for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
                     let w = nodes[k] + share * problem.widths[k];
                     let (joint, tool) = gridpoints.grid.place(self.path, w, 0.0);
-                    rows.jerks(&mut problem, (k, slot), (&joint, tool));
+                    let place = Place {
+                        gridpoint: &joint,
+                        tool,
+                    };
+                    rows.jerks(&mut problem, jerk(slot), place);
                 }
             }
         }
-        let end = (
-            gridpoints.right(cells - 1),
-            gridpoints.tool_right(cells - 1),
-        );
-        rows.values(&mut problem, (cells, false), end);
+        let end = Place {
+            gridpoint: gridpoints.right(cells - 1),
+            tool: gridpoints.tool_right(cells - 1),
+        };
+        let slot = Slot {
+            slot: Problem::value_slot(cells, false),
+            lane: cells % LANE,
+        };
+        rows.values(&mut problem, slot, end);
         problem
     }
 }
 
 impl<const N: usize> Rows<'_, N> {
-    /// Sets the rows at an end or the middle of cell `k` that do not contain the jerk.
-    fn values(
-        &self,
-        problem: &mut Problem,
-        (k, middle): (usize, bool),
-        (gridpoint, tool): (&Gridpoint<N>, ToolGridpoint),
-    ) {
-        let (slot, l) = (Problem::value_slot(k, middle), k % LANE);
+    /// Sets the rows of a slot of values: those that do not contain the jerk.
+    fn values(&self, problem: &mut Problem, to: Slot, place: Place<'_, N>) {
+        let Place { gridpoint, tool } = place;
+        let Slot { slot, lane: l } = to;
         let [first, second, _] = &gridpoint.joint;
         for (j, row) in problem.acceleration[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.acceleration[j];
@@ -113,14 +139,10 @@ impl<const N: usize> Rows<'_, N> {
             (1.0 / speed_cap::<N>(speeds, self.tool, rate)).max(1e-6);
     }
 
-    /// Sets the jerk rows of cell `k` at a slot.
-    fn jerks(
-        &self,
-        problem: &mut Problem,
-        (k, slot): (usize, usize),
-        (gridpoint, tool): (&Gridpoint<N>, ToolGridpoint),
-    ) {
-        let l = k % LANE;
+    /// Sets the rows of a jerk slot.
+    fn jerks(&self, problem: &mut Problem, to: Slot, place: Place<'_, N>) {
+        let Place { gridpoint, tool } = place;
+        let Slot { slot, lane: l } = to;
         let [first, second, third] = &gridpoint.joint;
         for (j, row) in problem.jerk[slot * N..][..N].iter_mut().enumerate() {
             let narrow = self.jerk[j];
