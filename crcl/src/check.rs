@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use crate::code;
 use crate::command::Command;
-use crate::finding::{Finding, code};
+use crate::finding::Finding;
 use crate::program::{Located, Program};
 use crate::units::{CoordinateFrame, LengthUnit};
 

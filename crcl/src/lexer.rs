@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use crate::finding::{Finding, Findings, code};
+use crate::code;
+use crate::finding::{Finding, Findings};
 
 /// The kinds of brackets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

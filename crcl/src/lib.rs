@@ -1,17 +1,24 @@
 //! The canonical robot command language: text, JSON, XML, diagnostics.
 
+mod argument;
+mod call;
 mod check;
+pub mod code;
 mod command;
+mod command_finding;
+mod command_info;
 mod fields;
 mod finding;
 mod joint;
 pub mod json;
 mod lexer;
+mod literal;
 mod meaning;
 mod parser;
 mod pose;
 mod program;
 mod report;
+mod shape;
 mod source;
 mod suggest;
 pub mod text;
@@ -19,9 +26,11 @@ mod units;
 mod value;
 pub mod xml;
 
+pub use argument::{Argument, ArgumentKind, LONGEST_S};
 pub use check::{CheckOptions, check};
-pub use command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, LONGEST_S, Standing};
-pub use finding::{Finding, Note, Omitted, Severity, code};
+pub use command::Command;
+pub use command_info::{COMMANDS, CommandInfo, Standing};
+pub use finding::{Finding, Note, Omitted, Severity};
 pub use joint::JointTarget;
 pub use pose::{LARGEST_ANGLE, LARGEST_COORDINATE, ORTHOGONALITY, Pose, PosePart};
 pub use program::{Located, Program, ReadOptions, Reading};

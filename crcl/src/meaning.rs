@@ -2,13 +2,19 @@
 
 use std::ops::Range;
 
-use crate::command::{Argument, ArgumentKind, COMMANDS, Command, CommandInfo, Standing, Value};
-use crate::finding::{Finding, Findings, code};
+use crate::argument::{Argument, ArgumentKind, Value};
+use crate::call::{Call, Node, State, Tree};
+use crate::code;
+use crate::command::Command;
+use crate::command_finding::{
+    doubt, refused_extension, unknown_command, unknown_name, value_finding,
+};
+use crate::command_info::CommandInfo;
+use crate::finding::{Finding, Findings};
 use crate::joint::JointTarget;
 use crate::lexer::clip;
-use crate::parser::{Call, Node, State, Tree};
 use crate::pose::{Pose, PosePart};
-use crate::suggest;
+use crate::shape::{Shape, arguments, describe, shape};
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{ValueError, check_targets};
 
@@ -434,154 +440,5 @@ impl Meaning<'_, '_> {
         let finding = Finding::error(code::POSE_SHAPE, node.span.clone(), message);
         let found = describe(node, self.source);
         self.fail(finding.found(found).help(help))
-    }
-}
-
-/// The finding for a value out of range.
-pub(crate) fn value_finding(error: &ValueError, span: Range<usize>) -> Finding {
-    Finding::error(error.code(), span, error.to_string()).help(error.help())
-}
-
-/// A percentage that was probably meant as a fraction.
-pub(crate) fn doubt(kind: ArgumentKind, number: f64, span: Range<usize>) -> Option<Finding> {
-    let small = kind == ArgumentKind::Percent && 0.0 < number && number < 1.0;
-    small.then(|| {
-        let message = format!("{number} percent is very little: the range is 0 to 100");
-        let help = format!(
-            "for {number} of the maximum write `{}`",
-            shortest(number * 100.0)
-        );
-        Finding::warning(code::FRACTION, span, message).help(help)
-    })
-}
-
-/// A number in as few digits as its first nine need.
-fn shortest(number: f64) -> f64 {
-    format!("{number:.9e}").parse().unwrap_or(number)
-}
-
-/// The finding for a name that is not a command.
-pub(crate) fn unknown_command(name: &str, span: Range<usize>) -> Finding {
-    let names: Vec<_> = COMMANDS.iter().map(|info| info.name).collect();
-    let message = format!("there is no command `{}`", clip(name));
-    let finding = Finding::error(code::UNKNOWN_COMMAND, span, message)
-        .expected("the name of a command")
-        .found(format!("`{}`", clip(name)));
-    match suggest::advice(name, &names) {
-        Some(advice) => finding.help(advice),
-        None => finding,
-    }
-}
-
-/// The finding of strict mode for an extension; nothing for a standard command.
-pub(crate) fn refused_extension(info: &CommandInfo, span: Range<usize>) -> Option<Finding> {
-    let Standing::Extension { instead } = info.standing else {
-        return None;
-    };
-    let message = format!("{} is not in the standard language", info.name);
-    let finding = Finding::error(code::EXTENSION, span, message);
-    Some(match instead {
-        Some(standard) => finding.help(format!("the standard command is {standard}")),
-        None => finding.help("no standard command does the same; read without strict mode"),
-    })
-}
-
-/// The finding for a unit or frame that is none of those to choose from.
-pub(crate) fn unknown_name(kind: ArgumentKind, name: &str, span: Range<usize>) -> Finding {
-    let (code, names) = match kind {
-        ArgumentKind::LengthUnit => (code::UNKNOWN_UNIT, LengthUnit::NAMES),
-        ArgumentKind::AngleUnit => (code::UNKNOWN_UNIT, AngleUnit::NAMES),
-        _ => (code::UNKNOWN_FRAME, CoordinateFrame::NAMES),
-    };
-    let choices: Vec<_> = names.iter().map(|name| format!("\"{name}\"")).collect();
-    let noun = kind
-        .noun()
-        .trim_start_matches("an ")
-        .trim_start_matches("a ");
-    let message = format!("there is no {noun} \"{}\"", clip(name));
-    let finding = Finding::error(code, span, message)
-        .expected(format!("one of {}", choices.join(", ")))
-        .found(format!("\"{}\"", clip(name)));
-    match unit_advice(kind, name).or_else(|| suggest::nearest(name, names)) {
-        Some(near) => finding.help(format!("did you mean \"{near}\"?")),
-        None => finding,
-    }
-}
-
-/// Abbreviations and plurals that people write.
-fn unit_advice(kind: ArgumentKind, name: &str) -> Option<&'static str> {
-    let name = name.to_lowercase();
-    match (kind, name.as_str()) {
-        (ArgumentKind::LengthUnit, "m" | "meters" | "metres") => Some("meter"),
-        (ArgumentKind::LengthUnit, "in" | "inches" | "\"") => Some("inch"),
-        (ArgumentKind::LengthUnit, "millimeters" | "millimetres" | "mms") => Some("mm"),
-        (ArgumentKind::AngleUnit, "deg" | "degs" | "degrees") => Some("degree"),
-        (ArgumentKind::AngleUnit, "rad" | "rads" | "radians") => Some("radian"),
-        _ => None,
-    }
-}
-
-/// What a value looks like from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shape {
-    /// Braces with numbers only.
-    Vector,
-    /// Braces with vectors, or a call of Pose.
-    Pose,
-    /// Braces with poses.
-    Poses(usize),
-    /// Anything else.
-    Other,
-}
-
-fn shape(node: &Node, source: &str) -> Shape {
-    let is_number = |node: &Node| matches!(node.value, Tree::Number { .. } | Tree::Faulty);
-    match &node.value {
-        Tree::Call { name, .. } if source.get(name.clone()) == Some("Pose") => Shape::Pose,
-        Tree::Braces(items) => match items.first() {
-            None => Shape::Other,
-            Some(first) if is_number(first) && items.iter().all(is_number) => Shape::Vector,
-            Some(first) => match shape(first, source) {
-                Shape::Vector => Shape::Pose,
-                Shape::Pose => Shape::Poses(items.len()),
-                _ => Shape::Other,
-            },
-        },
-        _ => Shape::Other,
-    }
-}
-
-/// A description of a value, for "found".
-fn describe(node: &Node, source: &str) -> String {
-    let written = || clip(source.get(node.span.clone()).unwrap_or_default());
-    match (&node.value, shape(node, source)) {
-        (Tree::Number { .. }, _) => format!("the number `{}`", written()),
-        (Tree::Text(text), _) => format!("the text \"{}\"", clip(text)),
-        (Tree::Word, _) => format!("the word `{}`", written()),
-        (Tree::Call { name, .. }, _) => {
-            format!(
-                "a call of `{}`",
-                clip(source.get(name.clone()).unwrap_or_default())
-            )
-        }
-        (_, Shape::Poses(count)) => plural(count, "a list of", "pose"),
-        (Tree::Braces(items), Shape::Vector) => plural(items.len(), "braces with", "number"),
-        (Tree::Braces(items), _) => plural(items.len(), "braces with", "part"),
-        (Tree::Faulty, _) => "a faulty value".to_owned(),
-    }
-}
-
-fn plural(count: usize, before: &str, noun: &str) -> String {
-    format!(
-        "{before} {count} {noun}{}",
-        if count == 1 { "" } else { "s" }
-    )
-}
-
-fn arguments(count: usize) -> String {
-    match count {
-        0 => "no argument".to_owned(),
-        1 => "1 argument".to_owned(),
-        _ => format!("{count} arguments"),
     }
 }

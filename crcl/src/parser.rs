@@ -2,62 +2,18 @@
 
 use std::ops::Range;
 
-use crate::command::CommandInfo;
-use crate::finding::{Finding, Findings, code};
+use crate::call::{Call, Node, State, Tree};
+use crate::code;
+use crate::command_info::CommandInfo;
+use crate::finding::{Finding, Findings};
 use crate::lexer::{Bracket, Kind, Lexer, Token, clip};
+use crate::literal::{number_help, parse_number, unescape};
 
 /// Brackets within brackets: the deepest command, a list of RollPitchYaw poses, needs 4.
 const DEEPEST: usize = 16;
 
 /// Names that stand inside a command and never begin one.
 const VALUE_NAMES: [&str; 3] = ["Pose", "Point", "RollPitchYaw"];
-
-/// A name with arguments in parentheses.
-#[derive(Debug)]
-pub(crate) struct Call {
-    pub(crate) name: Range<usize>,
-    pub(crate) arguments: Vec<Node>,
-    /// From the name to the closing parenthesis.
-    pub(crate) span: Range<usize>,
-    pub(crate) state: State,
-}
-
-/// How whole a call is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum State {
-    /// As it should be.
-    Sound,
-    /// An error was reported, but the meaning is clear enough to continue.
-    Mended,
-    /// Beyond use.
-    Broken,
-}
-
-/// A value and its place.
-#[derive(Debug)]
-pub(crate) struct Node {
-    pub(crate) value: Tree,
-    pub(crate) span: Range<usize>,
-}
-
-/// A value before it means anything.
-#[derive(Debug)]
-pub(crate) enum Tree {
-    /// A number; `whole` when it is written without point and exponent.
-    Number {
-        number: f64,
-        whole: bool,
-    },
-    Text(String),
-    Word,
-    Braces(Vec<Node>),
-    Call {
-        name: Range<usize>,
-        arguments: Vec<Node>,
-    },
-    /// A value that was reported already.
-    Faulty,
-}
 
 /// The call that is being parsed cannot be finished.
 struct Abandoned;
@@ -517,67 +473,4 @@ impl<'a, 'f> Parser<'a, 'f> {
         self.last_end = token.end;
         token
     }
-}
-
-/// The number of a text in C++ form: `12`, `-1.5`, `.12`, `+3.`, `2e-3`.
-fn parse_number(text: &str) -> Option<f64> {
-    let plain = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-' | 'e' | 'E');
-    if text.chars().all(plain) {
-        text.parse().ok()
-    } else {
-        None
-    }
-}
-
-fn number_help(text: &str) -> &'static str {
-    let unit = text.trim_start_matches(|c: char| !c.is_alphabetic());
-    match unit {
-        "mm" | "cm" | "m" | "in" | "inch" | "meter" => {
-            "numbers carry no unit; set it before with `SetLengthUnits (\"mm\")`"
-        }
-        "deg" | "degree" | "rad" => {
-            "numbers carry no unit; set it before with `SetAngleUnits (\"degree\")`"
-        }
-        "s" | "ms" => "numbers carry no unit; times are in seconds",
-        "f" | "F" | "l" | "L" => "leave out the letter at the end",
-        _ => "write a plain decimal number such as `-12.5` or `2e-3`",
-    }
-}
-
-/// The text that a quoted one stands for, or the range of a bad escape and what to do.
-fn unescape(body: &str) -> Result<String, (Range<usize>, &'static str)> {
-    let mut text = String::with_capacity(body.len());
-    let mut characters = body.char_indices();
-    while let Some((start, character)) = characters.next() {
-        if character != '\\' {
-            text.push(character);
-            continue;
-        }
-        let Some((at, escaped)) = characters.next() else {
-            return Err((start..start + 1, "write `\\\\` for a backslash"));
-        };
-        match escaped {
-            'n' => text.push('\n'),
-            'r' => text.push('\r'),
-            't' => text.push('\t'),
-            '"' | '\\' | '\'' => text.push(escaped),
-            'u' => {
-                let digits = body.get(at + 1..at + 5).unwrap_or_default();
-                let value = u32::from_str_radix(digits, 16)
-                    .ok()
-                    .and_then(char::from_u32);
-                let Some(value) = value.filter(|_| !digits.starts_with('+')) else {
-                    return Err((start..at + 1, "write `\\u` and four hexadecimal digits"));
-                };
-                text.push(value);
-                characters.nth(3);
-            }
-            _ => {
-                let help =
-                    "write `\\\\` for a backslash; the escapes are \\\" \\\\ \\n \\r \\t \\uXXXX";
-                return Err((start..at + escaped.len_utf8(), help));
-            }
-        }
-    }
-    Ok(text)
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::command::Command;
-use crate::finding::{Finding, Omitted};
+use crate::finding::{Finding, Findings, Omitted};
 
 /// A command and where it stands in the source.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,5 +82,18 @@ impl Reading {
     /// Whether the program must be refused.
     pub fn has_errors(&self) -> bool {
         self.omitted.errors > 0 || self.findings.iter().any(Finding::is_error)
+    }
+}
+
+impl Findings {
+    /// The findings in the order of the source, with what could be read.
+    pub(crate) fn into_reading(self, program: Program) -> Reading {
+        let (mut findings, omitted) = (self.kept, self.omitted);
+        findings.sort_by_key(|finding| (finding.span.start, finding.span.end));
+        Reading {
+            program,
+            findings,
+            omitted,
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! The text form of programs: the C++ calls of NIST's files.
 
-use crate::command::{Command, Value};
-use crate::finding::{Finding, Findings, code};
+use crate::argument::Value;
+use crate::code;
+use crate::command::Command;
+use crate::finding::{Finding, Findings};
 use crate::joint::JointTarget;
 use crate::meaning::Meaning;
 use crate::parser::Parser;

@@ -3,7 +3,7 @@
 
 use thiserror::Error;
 
-use crate::finding::code;
+use crate::code;
 use crate::joint::{JointTarget, MOST_JOINTS};
 
 /// Why the value of a command is refused.

@@ -15,8 +15,7 @@ type Arrows = BTreeMap<Name, BTreeSet<Name>>;
 
 /// Remaining circles, by crate and modules; decision 0006 explains each. None may be added; remove
 /// an entry when its circle is resolved.
-const KNOWN: [(&str, &str); 4] = [
-    ("crcl", "command, finding, pose, program, value"),
+const KNOWN: [(&str, &str); 3] = [
     ("plan", "kitting, run"),
     ("plan", "world::object, world::place"),
     ("trajectory", "smooth::plan, smooth::windows"),

@@ -5,7 +5,8 @@ use roxmltree::{Error, Node, ParsingOptions};
 use super::command::Instruction;
 use super::elements::{Reader, opening};
 use super::status::{ProgramPlace, Status};
-use crate::finding::{Finding, Findings, code};
+use crate::code;
+use crate::finding::{Finding, Findings};
 use crate::lexer::clip;
 
 /// Elements, texts and comments of one document that are read at most.

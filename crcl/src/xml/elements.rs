@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use roxmltree::Node;
 
-use crate::finding::{Finding, Findings, code};
+use crate::code;
+use crate::finding::{Finding, Findings};
 use crate::lexer::clip;
 
 /// The namespace of `xsi:type`.

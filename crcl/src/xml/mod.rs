@@ -44,10 +44,11 @@ use std::ops::Range;
 
 use roxmltree::Node;
 
+use crate::code;
 use crate::command::Command;
-use crate::finding::{Finding, Findings, code};
+use crate::command_finding::{refused_extension, value_finding};
+use crate::finding::{Finding, Findings};
 use crate::lexer::clip;
-use crate::meaning::{refused_extension, value_finding};
 use crate::program::{Located, Program, ReadOptions, Reading};
 use crate::source::Walker;
 use crate::text;

@@ -8,7 +8,8 @@ use super::command::{
 };
 use super::elements::{Children, Reader, opening};
 use super::read_data::whole;
-use crate::finding::{Finding, code};
+use crate::code;
+use crate::finding::Finding;
 use crate::lexer::clip;
 use crate::suggest;
 use crate::units::{AngleUnit, ForceUnit, LengthUnit, TorqueUnit};

@@ -6,8 +6,9 @@ use super::data::{
     Guard, GuardLimit, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint,
 };
 use super::elements::{Reader, opening, value_span};
-use crate::finding::{Finding, code};
-use crate::meaning::value_finding;
+use crate::code;
+use crate::command_finding::value_finding;
+use crate::finding::Finding;
 use crate::pose::{Pose, PosePart};
 
 /// How far the axes of a pose in XML may be from perpendicular: the product of the unit axes.

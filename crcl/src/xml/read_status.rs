@@ -8,7 +8,8 @@ use super::status::{
     CommandState, CommandStatus, GripperState, GripperStatus, GuardsStatus, JointLimits,
     JointStatus, PoseStatus, ProgramPlace, SensorStatus, SensorValue, SettingsStatus, Status,
 };
-use crate::finding::{Finding, code};
+use crate::code;
+use crate::finding::Finding;
 use crate::lexer::clip;
 use crate::units::{AngleUnit, ForceUnit, LengthUnit, TorqueUnit};
 

@@ -7,8 +7,9 @@ use super::data::Waypoint;
 use super::document::Instance;
 use super::form::form;
 use super::out::Out;
+use crate::code;
 use crate::command::Command;
-use crate::finding::{Finding, code};
+use crate::finding::Finding;
 use crate::program::{Located, Program};
 use crate::units::{AngleUnit, ForceUnit, LengthUnit, TorqueUnit};
 
