@@ -2,7 +2,10 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crcl::Command;
 use crcl::xml::{CommandState, Instance, ProgramPlace};
+
+use crate::parameters::Parameters;
 
 /// Number of a connection, from 1.
 pub(crate) type ConnectionId = u64;
@@ -39,6 +42,49 @@ pub(crate) struct Settings {
     pub(crate) end_point: f64,
 }
 
+/// The largest values that settings can have on this robot, SI; infinite where there is no limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Largest {
+    pub(crate) speed: f64,
+    pub(crate) acceleration: f64,
+    pub(crate) rot_speed: f64,
+    pub(crate) rot_accel: f64,
+}
+
+impl Default for Largest {
+    fn default() -> Self {
+        Self {
+            speed: f64::INFINITY,
+            acceleration: f64::INFINITY,
+            rot_speed: f64::INFINITY,
+            rot_accel: f64::INFINITY,
+        }
+    }
+}
+
+impl Largest {
+    /// The command with a speed or acceleration that the robot can reach: in CRCL these are
+    /// targets, and clients ask for more than an arm can do.
+    pub(crate) fn cap(&self, command: Command) -> Command {
+        use Command as C;
+        match command {
+            C::SetAbsoluteSpeed { value } => C::SetAbsoluteSpeed {
+                value: value.min(self.speed),
+            },
+            C::SetAbsoluteAcceleration { value } => C::SetAbsoluteAcceleration {
+                value: value.min(self.acceleration),
+            },
+            C::SetAbsoluteRotSpeed { value } => C::SetAbsoluteRotSpeed {
+                value: value.min(self.rot_speed),
+            },
+            C::SetAbsoluteRotAccel { value } => C::SetAbsoluteRotAccel {
+                value: value.min(self.rot_accel),
+            },
+            other => other,
+        }
+    }
+}
+
 /// How the arm is: SI units, workstation frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Picture {
@@ -58,6 +104,8 @@ pub(crate) struct Picture {
     pub(crate) orientation: [f64; 4],
     /// Settings in force.
     pub(crate) settings: Settings,
+    /// What the robot can do.
+    pub(crate) largest: Largest,
     /// The gripper: whether it holds or is open is not known; how far it is open (m).
     pub(crate) gripper: Option<f64>,
 }
@@ -78,6 +126,8 @@ pub(crate) struct Inner {
     pub(crate) failed: Option<String>,
     /// The last ConfigureStatusReport and who gave it.
     pub(crate) configured: Option<(i64, ConnectionId)>,
+    /// What clients have set.
+    pub(crate) parameters: Parameters,
     pub(crate) picture: Picture,
     status: i64,
 }

@@ -157,7 +157,8 @@ impl Connection {
                 self.private = None;
             }
             let last = self.private.as_ref().map_or(&inner.last, |(_, last)| last);
-            self.choice.write(last, number, &inner.picture)
+            self.choice
+                .write(last, number, &inner.picture, &inner.parameters)
         };
         match self.stream.write_all(text.as_bytes()) {
             Ok(()) => Ok(()),
@@ -235,6 +236,9 @@ impl Connection {
             let why = format!("connection {} commands the arm", inner.owner);
             return self.end(inner, instance, CommandState::Error, Some(why));
         }
+        if let Some(Err(why)) = inner.parameters.set(command) {
+            return self.end(inner, instance, CommandState::Error, Some(why));
+        }
         match self.order(inner, &instance.instruction) {
             Ok(None) => self.end(inner, instance, CommandState::Done, None),
             Ok(Some(order)) => self.give(inner, instance, order),
@@ -290,8 +294,12 @@ impl Connection {
             command,
             ..instruction.clone()
         };
-        let commands = match instruction.meaning() {
-            Ok(Meaning::Commands(commands)) => commands,
+        let commands: Vec<_> = match instruction.meaning() {
+            Ok(Meaning::Commands(commands)) => {
+                let largest = inner.picture.largest;
+                let capped = |command| largest.cap(command);
+                commands.into_iter().map(capped).collect()
+            }
             Ok(Meaning::NoEffect(_)) => return Ok(None),
             Ok(Meaning::LoopStart(_) | Meaning::LoopEnd { .. }) => {
                 let name = instruction.command.name();

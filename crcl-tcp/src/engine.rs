@@ -6,7 +6,7 @@ use crcl::{Command, Program, json};
 use ipc::{Arm, Client, IpcError, Observer, State, ToolStatus, Verb};
 use serde_json::Value;
 
-use crate::cell::{Picture, Settings};
+use crate::cell::{Largest, Picture, Settings};
 
 /// How long an engine may take to answer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
@@ -95,6 +95,7 @@ impl Engine {
                 intermediate_point: settings["intermediate_point"].as_f64().unwrap_or(0.0),
                 end_point: settings["end_point"].as_f64().unwrap_or(0.0),
             },
+            largest: largest(&status["largest"]),
             gripper: state.as_ref().and_then(opening),
             joints,
         };
@@ -163,6 +164,17 @@ fn opening(state: &State) -> Option<f64> {
     match ToolStatus::from_number(gripper.status)? {
         ToolStatus::Unknown => None,
         _ => Some(gripper.position),
+    }
+}
+
+/// What the robot can do; what is not there, or null, is not limited.
+fn largest(value: &Value) -> Largest {
+    let part = |name: &str| value[name].as_f64().unwrap_or(f64::INFINITY);
+    Largest {
+        speed: part("speed"),
+        acceleration: part("acceleration"),
+        rot_speed: part("rot_speed"),
+        rot_accel: part("rot_accel"),
     }
 }
 

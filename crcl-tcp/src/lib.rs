@@ -16,6 +16,7 @@ mod client;
 mod connection;
 mod engine;
 mod framing;
+mod parameters;
 mod report;
 mod server;
 mod si;

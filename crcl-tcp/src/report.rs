@@ -9,6 +9,7 @@ use crcl::xml::{
 };
 
 use crate::cell::{Last, Picture};
+use crate::parameters::Parameters;
 use crate::si::ConnectionUnits;
 
 /// The longest status (bytes): NIST's C++ client takes what one call of `recv` gives it for a
@@ -69,17 +70,34 @@ impl Choice {
     }
 
     /// The text of a status.
-    pub(crate) fn write(&self, last: &Last, number: i64, picture: &Picture) -> String {
+    pub(crate) fn write(
+        &self,
+        last: &Last,
+        number: i64,
+        picture: &Picture,
+        parameters: &Parameters,
+    ) -> String {
         let mut status = Status {
             command: command(last, number),
             joints: self.joints(picture),
             pose: self.parts.pose.then(|| self.pose(picture)),
             gripper: self.gripper(picture),
-            settings: self.parts.settings.then(|| self.settings(picture)),
+            settings: self.parts.settings.then(|| SettingsStatus {
+                robot_parameters: parameters.robot.clone(),
+                end_effector_parameters: parameters.end_effector.clone(),
+                ..self.settings(picture)
+            }),
             guards: self.parts.guards.then(GuardsStatus::default),
             ..Status::default()
         };
         let mut text = write_status(&status);
+        if text.len() > LONGEST
+            && let Some(settings) = &mut status.settings
+        {
+            settings.robot_parameters.clear();
+            settings.end_effector_parameters.clear();
+            text = write_status(&status);
+        }
         if text.len() > LONGEST {
             status.settings = None;
             text = write_status(&status);
@@ -228,7 +246,7 @@ fn axes(q: &[f64; 4]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crcl::xml::{CommandState, read_status};
+    use crcl::xml::{CommandState, Parameter, XmlCommand, read_status};
 
     fn picture(joints: usize) -> Picture {
         Picture {
@@ -252,6 +270,15 @@ mod tests {
             state: CommandState::Error,
             ..Last::default()
         };
+        let mut parameters = Parameters::default();
+        for number in 0..16 {
+            let parameter = Parameter {
+                name: format!("n{number}"),
+                value: "&".repeat(64),
+            };
+            let set = XmlCommand::SetRobotParameters(vec![parameter]);
+            assert_eq!(parameters.set(&set), Some(Ok(())));
+        }
         for joints in [0, 1, 6, 7, 16] {
             let mut choice = Choice::new(ConnectionUnits::default());
             let all = |joint| JointReport {
@@ -272,7 +299,7 @@ mod tests {
                 sensors: true,
                 guards: true,
             };
-            let text = choice.write(&last, i64::MAX, &picture(joints as usize));
+            let text = choice.write(&last, i64::MAX, &picture(joints as usize), &parameters);
             assert!(text.len() < 4095, "{} bytes, {joints} joints", text.len());
             read_status(&text).unwrap();
         }
@@ -306,7 +333,7 @@ mod tests {
             angle: crcl::AngleUnit::Radian,
             ..ConnectionUnits::default()
         });
-        let text = choice.write(&Last::default(), 1, &picture(1));
+        let text = choice.write(&Last::default(), 1, &picture(1), &Parameters::default());
         let status = read_status(&text).unwrap();
         assert_eq!(status.joints[0].position, Some(0.333333333));
         let Pose::Axes { point, z_axis, .. } = status.pose.unwrap().pose else {

@@ -81,11 +81,8 @@ pub(crate) fn run(
         let Some(serial) = stop.serial else { continue };
         let mut inner = cell.lock();
         match result {
-            Ok(()) => match inner.failed.clone() {
-                // An error stays until InitCanon, even when the stop was carried out.
-                Some(why) => inner.finish(serial, CommandState::Error, Some(why)),
-                None => inner.finish(serial, CommandState::Done, None),
-            },
+            // Done also after an error, which stays: the next command but InitCanon is refused.
+            Ok(()) => inner.finish(serial, CommandState::Done, None),
             Err(why) => inner.fail(serial, &why),
         }
     }

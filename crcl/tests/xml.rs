@@ -147,11 +147,6 @@ fn what_cannot_be_done_is_refused_at_its_element() {
         ),
         ("RunProgram", "<ProgramText>x</ProgramText>", "<ProgramText"),
         ("EnableSensor", "<SensorID>F</SensorID>", "<SensorID"),
-        (
-            "SetRobotParameters",
-            "<ParameterSetting><ParameterName>a</ParameterName><ParameterValue>b</ParameterValue></ParameterSetting>",
-            "<ParameterSetting",
-        ),
     ];
     for (kind, inside, element) in cases {
         let (code, line, _, text) = first(&program(&command(kind, inside)));

@@ -183,11 +183,9 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         X::SetRotAccel(Quantity::Relative(share)) => one(Command::SetRelativeRotAccel {
             percent: percent(*share),
         }),
-        X::SetEndEffectorParameters(parameters) | X::SetRobotParameters(parameters) => {
-            let name = parameters.first().map_or("", |first| first.name.as_str());
-            let message = format!("the parameter `{name}`: this robot has no parameters");
-            Err(refusal("ParameterSetting", message))
-        }
+        X::SetEndEffectorParameters(_) | X::SetRobotParameters(_) => Ok(Meaning::NoEffect(
+            "what parameters mean is not part of the language, and none means anything here",
+        )),
         X::EnableSensor { sensor, .. } | X::DisableSensor(sensor) => {
             let message = format!("the sensor `{sensor}`: no sensor is connected");
             Err(refusal("SensorID", message))

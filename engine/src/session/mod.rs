@@ -24,7 +24,7 @@ use thiserror::Error;
 
 pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
-pub use status::{Cycles, Status};
+pub use status::{Cycles, Largest, Status};
 
 use crate::queue::{Full, Given};
 use inbox::Inbox;

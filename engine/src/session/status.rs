@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use planner::modal::{CanonState, Settings};
 use servo::Counters;
+use trajectory::ToolLimits;
 
 /// A picture of a running session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -41,10 +42,36 @@ pub struct Status {
     pub orientation_wxyz: [f64; 4],
     /// Settings in force, SI.
     pub settings: Option<Settings>,
+    /// The largest values that settings can have.
+    pub largest: Option<Largest>,
     /// Number of moves that the session planned itself; moves that came with a plan do not count.
     pub plans: u64,
     /// Servo periods.
     pub cycles: Cycles,
+}
+
+/// What the robot can do at most, SI; infinite where there is no limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Largest {
+    /// Speed of the controlled point, m/s.
+    pub speed: f64,
+    /// Acceleration of the controlled point, m/s2.
+    pub acceleration: f64,
+    /// Speed of rotation, rad/s.
+    pub rot_speed: f64,
+    /// Acceleration of rotation, rad/s2.
+    pub rot_accel: f64,
+}
+
+impl From<ToolLimits> for Largest {
+    fn from(limits: ToolLimits) -> Self {
+        Self {
+            speed: limits.speed,
+            acceleration: limits.acceleration,
+            rot_speed: limits.angular_speed,
+            rot_accel: limits.angular_acceleration,
+        }
+    }
 }
 
 /// Counts of servo periods.

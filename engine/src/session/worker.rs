@@ -354,6 +354,7 @@ impl<const N: usize> Worker<'_, N> {
         status.held = self.is_held();
         status.plans = self.controller.plans();
         status.fault.clone_from(&self.fault);
+        status.largest = Some(self.most.into());
         status.settings = Some(self.controller.modal().settings().clone());
     }
 
