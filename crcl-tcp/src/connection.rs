@@ -322,7 +322,7 @@ impl Connection {
             serial: 0,
             epoch: inner.epoch,
             kind,
-            target: commands.iter().rev().find_map(target),
+            target: target(&commands),
             preempts: moves && !self.manners.queue,
             commands,
         }))
@@ -394,9 +394,12 @@ fn kind(command: &XmlCommand) -> Kind {
     }
 }
 
-/// Where a move stops (m).
-fn target(command: &Command) -> Option<[f64; 3]> {
-    command.poses().last().map(Pose::point)
+/// Where the last move stops (m), if a pose of its own says so.
+fn target(commands: &[Command]) -> Option<[f64; 3]> {
+    match commands.iter().rev().find(|command| command.is_move())? {
+        Command::MoveScrew { .. } => None,
+        last => last.poses().last().map(Pose::point),
+    }
 }
 
 fn sentence(refusal: &Refusal) -> String {

@@ -2,6 +2,7 @@
 
 use crate::joint::JointTarget;
 use crate::pose::Pose;
+use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{self, ValueError};
 
@@ -45,6 +46,8 @@ pub enum ArgumentKind {
     Poses,
     /// A list of joints with their targets.
     Joints,
+    /// A turn with an advance.
+    Screw,
 }
 
 impl ArgumentKind {
@@ -67,6 +70,7 @@ impl ArgumentKind {
             Self::Pose => "a pose",
             Self::Poses => "a list of poses",
             Self::Joints => "a list of joints",
+            Self::Screw => "a screw",
         }
     }
 
@@ -85,6 +89,7 @@ impl ArgumentKind {
             Self::Pose => "{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}",
             Self::Poses => "{{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}}, 1",
             Self::Joints => "{{1, 90}, {3, -45, 30}}",
+            Self::Screw => "{{-5, 720, -20}, {400, 0, 300}}",
         }
     }
 
@@ -124,69 +129,77 @@ pub(crate) enum Value {
     Pose(Pose),
     Poses(Vec<Pose>),
     Joints(Vec<JointTarget>),
+    Screw(Screw),
 }
 
 impl Value {
-    fn none(self) -> Option<()> {
+    pub(crate) fn none(self) -> Option<()> {
         matches!(self, Self::None).then_some(())
     }
-    fn integer(self) -> Option<i64> {
+    pub(crate) fn integer(self) -> Option<i64> {
         if let Self::Integer(integer) = self {
             Some(integer)
         } else {
             None
         }
     }
-    fn number(self) -> Option<f64> {
+    pub(crate) fn number(self) -> Option<f64> {
         if let Self::Number(number) = self {
             Some(number)
         } else {
             None
         }
     }
-    fn text(self) -> Option<String> {
+    pub(crate) fn text(self) -> Option<String> {
         if let Self::Text(text) = self {
             Some(text)
         } else {
             None
         }
     }
-    fn length_unit(self) -> Option<LengthUnit> {
+    pub(crate) fn length_unit(self) -> Option<LengthUnit> {
         if let Self::LengthUnit(unit) = self {
             Some(unit)
         } else {
             None
         }
     }
-    fn angle_unit(self) -> Option<AngleUnit> {
+    pub(crate) fn angle_unit(self) -> Option<AngleUnit> {
         if let Self::AngleUnit(unit) = self {
             Some(unit)
         } else {
             None
         }
     }
-    fn frame(self) -> Option<CoordinateFrame> {
+    pub(crate) fn frame(self) -> Option<CoordinateFrame> {
         if let Self::Frame(frame) = self {
             Some(frame)
         } else {
             None
         }
     }
-    fn pose(self) -> Option<Pose> {
+    pub(crate) fn pose(self) -> Option<Pose> {
         if let Self::Pose(pose) = self {
             Some(pose)
         } else {
             None
         }
     }
-    fn joints(self) -> Option<Vec<JointTarget>> {
+    pub(crate) fn screw(self) -> Option<Screw> {
+        if let Self::Screw(screw) = self {
+            Some(screw)
+        } else {
+            None
+        }
+    }
+    pub(crate) fn joints(self) -> Option<Vec<JointTarget>> {
         if let Self::Joints(joints) = self {
             Some(joints)
         } else {
             None
         }
     }
-    fn poses(self) -> Option<Vec<Pose>> {
+    pub(crate) fn poses(self) -> Option<Vec<Pose>> {
         if let Self::Poses(poses) = self {
             Some(poses)
         } else {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::argument::Value;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
+use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 
 /// One command, in raw numbers of the program.
@@ -61,6 +62,11 @@ pub enum Command {
         /// One target for each joint that moves.
         #[schemars(length(min = 1))]
         joints: Vec<JointTarget>,
+    },
+    /// Extension: turn and advance in step.
+    MoveScrew {
+        /// The screw.
+        screw: Screw,
     },
     /// Open the gripper.
     OpenGripper,
@@ -180,6 +186,7 @@ impl Command {
         match self {
             Self::MoveTo { pose } | Self::MoveStraightTo { pose } => std::slice::from_ref(pose),
             Self::MoveSmoothlyTo { poses } | Self::MoveThroughTo { poses } => poses,
+            Self::MoveScrew { screw } => screw.start.as_slice(),
             _ => &[],
         }
     }
@@ -209,6 +216,7 @@ impl Command {
             }
             Self::SaveSettings => ("SaveSettings", Value::None),
             Self::RestoreSettings => ("RestoreSettings", Value::None),
+            Self::MoveScrew { screw } => ("MoveScrew", Value::Screw(*screw)),
             Self::OpenGripper => ("OpenGripper", Value::None),
             Self::CloseGripper => ("CloseGripper", Value::None),
             Self::OpenToolChanger => ("OpenToolChanger", Value::None),

@@ -176,6 +176,12 @@ pub static COMMANDS: &[CommandInfo] = {
             None,
         ),
         extension(
+            with("MoveScrew", "screw", Kind::Screw, |v| {
+                v.screw().map(|screw| C::MoveScrew { screw })
+            }),
+            None,
+        ),
+        extension(
             with("SetAbsoluteRotSpeed", "value", Kind::AngularSpeed, |v| {
                 v.number().map(|value| C::SetAbsoluteRotSpeed { value })
             }),
@@ -259,6 +265,7 @@ impl Command {
             ArgumentKind::Pose,
             ArgumentKind::Poses,
             ArgumentKind::Joints,
+            ArgumentKind::Screw,
         ];
         self.info()
             .and_then(|info| info.argument)
@@ -286,6 +293,7 @@ impl Command {
             (Some(ArgumentKind::Reason), Value::Integer(reason)) => {
                 value::not_negative(ArgumentKind::Reason.noun(), reason as f64).map(drop)
             }
+            (_, Value::Screw(screw)) => screw.check(),
             (Some(ArgumentKind::Joints), Value::Joints(joints)) => value::check_targets(&joints),
             (Some(ArgumentKind::Poses), Value::Poses(poses)) if poses.is_empty() => {
                 Err(ValueError::NoPoses)

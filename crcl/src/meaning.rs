@@ -1,5 +1,7 @@
 //! Turns the calls of a text into commands: names, numbers of arguments, types, ranges.
 
+mod screw;
+
 use std::ops::Range;
 
 use crate::argument::{Argument, ArgumentKind, Value};
@@ -136,6 +138,7 @@ impl Meaning<'_, '_> {
             ArgumentKind::Pose => self.pose(node).map(Value::Pose),
             ArgumentKind::Poses => self.poses(node).map(Value::Poses),
             ArgumentKind::Joints => self.joints(node).map(Value::Joints),
+            ArgumentKind::Screw => self.screw(node).map(Value::Screw),
             _ => self.quantity(kind, node),
         }
     }

@@ -9,6 +9,7 @@ use crate::meaning::Meaning;
 use crate::parser::Parser;
 use crate::pose::Pose;
 use crate::program::{Located, Program, ReadOptions, Reading};
+use crate::screw::Screw;
 use crate::source::Walker;
 
 /// Reads a program in text form: every command that can be read, and every fault.
@@ -122,6 +123,7 @@ pub fn write_command(command: &Command) -> String {
         Value::Pose(value) => pose(&value),
         Value::Poses(poses) => list(&poses),
         Value::Joints(joints) => joint_list(&joints),
+        Value::Screw(screw) => screw_parts(&screw),
     };
     format!("{name} ({argument})")
 }
@@ -138,6 +140,15 @@ fn joint_list(joints: &[JointTarget]) -> String {
     };
     let all: Vec<_> = joints.iter().map(one).collect();
     format!("{{{}}}", all.join(", "))
+}
+
+fn screw_parts(screw: &Screw) -> String {
+    let numbers: Vec<_> = screw.numbers().into_iter().map(number).collect();
+    let mut parts = vec![format!("{{{}}}", numbers.join(", "))];
+    let point = screw.axis_point.as_ref();
+    parts.extend(point.map(|point| format!("{{{}}}", three(point))));
+    parts.extend(screw.start.as_ref().map(pose));
+    format!("{{{}}}", parts.join(", "))
 }
 
 fn pose(pose: &Pose) -> String {

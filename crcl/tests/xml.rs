@@ -6,7 +6,8 @@ use crcl::xml::{
     Instruction, JointStatus, PoseStatus, ProgramPlace, Status, XmlCommand,
 };
 use crcl::{
-    AngleUnit, Command, LengthUnit, Pose, Program, ReadOptions, Reading, Source, code, json, text,
+    AngleUnit, Command, LengthUnit, Pose, Program, ReadOptions, Reading, Screw, Source, code, json,
+    text,
 };
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -134,17 +135,9 @@ fn blocks_are_written_out() {
 #[test]
 fn what_cannot_be_done_is_refused_at_its_element() {
     let guard = "<Guard><SensorID>F</SensorID><LimitType>OVER_MAX</LimitType><LimitValue>3</LimitValue></Guard>";
+    let guarded = format!("{guard}<DwellTime>1</DwellTime>");
     let cases = [
-        (
-            "MoveScrew",
-            "<AxialDistanceScrew>1</AxialDistanceScrew><Turn>2</Turn>",
-            "<AxialDistanceScrew",
-        ),
-        (
-            "Dwell",
-            &format!("{guard}<DwellTime>1</DwellTime>"),
-            "<Guard",
-        ),
+        ("Dwell", guarded.as_str(), "<Guard"),
         ("RunProgram", "<ProgramText>x</ProgramText>", "<ProgramText"),
         ("EnableSensor", "<SensorID>F</SensorID>", "<SensorID"),
     ];
@@ -413,6 +406,20 @@ fn pose() -> impl Strategy<Value = Pose> {
     })
 }
 
+fn screw() -> impl Strategy<Value = Screw> {
+    let point = prop::option::of(prop::array::uniform3(number()));
+    let numbers = [-1e6..1e6_f64, -1e6..1e6_f64, 1.0..10.0_f64];
+    (numbers, point, prop::option::of(pose())).prop_map(
+        |([advance, turn, free], axis_point, start)| Screw {
+            advance,
+            turn,
+            free,
+            axis_point,
+            start,
+        },
+    )
+}
+
 /// Commands that text, JSON and XML can all say.
 fn shared_command() -> impl Strategy<Value = Command> {
     let size = || 0.0..1e6_f64;
@@ -439,6 +446,7 @@ fn shared_command() -> impl Strategy<Value = Command> {
                 unit: AngleUnit::Radian
             },
         ]),
+        screw().prop_map(|screw| Command::MoveScrew { screw }),
         size().prop_map(|value| Command::SetAbsoluteSpeed { value }),
         size().prop_map(|value| Command::SetAbsoluteAcceleration { value }),
         (0..=10_000_u32).prop_map(|n| Command::SetRelativeSpeed {

@@ -196,6 +196,21 @@ impl<const N: usize> Controller<N> {
                     ticks,
                 }
             }
+            Task::Screw(motion) => {
+                self.plans += 1;
+                let from = self.pose();
+                let planned = self.planner.screw(&motion, &self.joints);
+                let planned = planned.map_err(|error| {
+                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
+                })?;
+                self.joints = planned.end;
+                let ticks = self.ticks(planned.trajectory.duration());
+                Step {
+                    task: Task::Move(motion.of_point(&from)),
+                    planned: Some(planned),
+                    ticks,
+                }
+            }
             Task::Dwell { seconds } => Step {
                 ticks: self.ticks(seconds),
                 planned: None,

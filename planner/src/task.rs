@@ -1,7 +1,7 @@
 //! What a command means once every mode has been applied: SI units, workstation frame.
 
-use nalgebra::Isometry3;
-use trajectory::ToolLimits;
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use trajectory::{Helix, ToolCurve, ToolLimits};
 
 /// A self-contained piece of work; nothing after [`crate::modal`] has modes.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +29,8 @@ pub enum Task {
     Move(Move),
     /// Move single joints.
     Joints(JointMove),
+    /// Turn and advance in step.
+    Screw(ScrewMove),
     /// Open or close the gripper, or the tool changer.
     Tool(ToolAction),
     /// Stop on the path, as soon as the limits allow.
@@ -102,6 +104,57 @@ impl JointMove {
         Move {
             shape: Shape::Joint,
             poses: vec![workstation_from_tool],
+            tolerance: 0.0,
+            limits: self.limits,
+        }
+    }
+}
+
+/// A screw of the controlled point: to a pose, straight along the tool's z axis, then turn and
+/// advance in step about an axis that has the tool's direction. At rest before and after each part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScrewMove {
+    /// Where to go first, `workstation_from_tool`; along any way.
+    pub start: Option<Isometry3<f64>>,
+    /// A point of the axis, in the workstation, m; the controlled point itself where it is missing.
+    pub axis_point: Option<Point3<f64>>,
+    /// Straight way before the turn, along the tool's z axis, m.
+    pub free: f64,
+    /// Advance during the turn, along the tool's z axis, m.
+    pub advance: f64,
+    /// The turn, counterclockwise for who looks against the tool's z axis, rad.
+    pub turn: f64,
+    /// Limits of the controlled point.
+    pub limits: ToolLimits,
+}
+
+impl ScrewMove {
+    /// Where the turn begins, from where the controlled point stands.
+    #[must_use]
+    pub fn before_turn(&self, from: &Isometry3<f64>) -> Isometry3<f64> {
+        self.start.unwrap_or(*from) * Translation3::new(0.0, 0.0, self.free)
+    }
+
+    /// The turn with its advance, from where it begins.
+    #[must_use]
+    pub fn helix(&self, from: &Isometry3<f64>) -> Helix {
+        let axis = from.rotation * Vector3::z_axis();
+        let point = self.axis_point.unwrap_or(from.translation.vector.into());
+        Helix::new(*from, (point, axis), self.advance, self.turn)
+    }
+
+    /// Where the controlled point stands at the end.
+    #[must_use]
+    pub fn end(&self, from: &Isometry3<f64>) -> Isometry3<f64> {
+        self.helix(&self.before_turn(from)).at(1.0).pose
+    }
+
+    /// The motion as one of the controlled point: any way to its end.
+    #[must_use]
+    pub fn of_point(&self, from: &Isometry3<f64>) -> Move {
+        Move {
+            shape: Shape::Joint,
+            poses: vec![self.end(from)],
             tolerance: 0.0,
             limits: self.limits,
         }

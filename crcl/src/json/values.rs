@@ -12,6 +12,7 @@ use crate::fields::Field;
 use crate::finding::Finding;
 use crate::joint::JointTarget;
 use crate::pose::{Pose, PosePart};
+use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{ValueError, check_targets};
 
@@ -28,6 +29,7 @@ impl<'a> Reader<'a, '_> {
             ArgumentKind::Pose => self.pose(raw).map(Value::Pose),
             ArgumentKind::Poses => self.poses(raw).map(Value::Poses),
             ArgumentKind::Joints => self.joints(raw).map(Value::Joints),
+            ArgumentKind::Screw => self.screw(raw).map(Value::Screw),
             _ => self.quantity(kind, raw),
         }
     }
@@ -104,6 +106,41 @@ impl<'a> Reader<'a, '_> {
             self.findings.push(finding.found(describe(joint)));
         }
         target.filter(|_| known)
+    }
+
+    fn screw(&mut self, raw: &'a RawValue) -> Option<Screw> {
+        const NAMES: [&str; 5] = ["advance", "turn", "free", "axis_point", "start"];
+        let noun = "a screw";
+        let fields = self.fields(noun, raw)?;
+        let known = self.known(noun, &fields, &NAMES);
+        let advance = self.wanted(noun, raw, &fields, "advance")?;
+        let turn = self.wanted(noun, raw, &fields, "turn")?;
+        let mut number = |field| self.number("a part of a screw", field);
+        let (advance, turn) = (number(advance)?, number(turn)?);
+        let free = find(&fields, "free").map_or(Some(0.0), number)?;
+        let axis_point = match find(&fields, "axis_point") {
+            Some(_) => Some(self.vector(raw, &fields, "axis_point")?),
+            None => None,
+        };
+        let start = match find(&fields, "start") {
+            Some(pose) => Some(self.pose(pose)?),
+            None => None,
+        };
+        let screw = Screw {
+            advance,
+            turn,
+            free,
+            axis_point,
+            start,
+        };
+        let alone = Screw {
+            start: None,
+            ..screw
+        };
+        if let Err(error) = alone.check() {
+            self.findings.push(value_finding(&error, self.span(raw)));
+        }
+        Some(screw).filter(|_| known)
     }
 
     fn poses(&mut self, raw: &'a RawValue) -> Option<Vec<Pose>> {

@@ -1,6 +1,6 @@
 //! What commands of the language are in CRCL's XML.
 
-use super::command::{ActuateJoint, JointDetails, StopCondition, XmlCommand};
+use super::command::{ActuateJoint, JointDetails, MoveScrew, StopCondition, XmlCommand};
 use super::data::{PoseTolerance, Quantity, Waypoint};
 use crate::command::Command;
 use crate::joint::JointTarget;
@@ -59,6 +59,16 @@ pub(super) fn form(
             joints: joints.iter().map(actuate_joint).collect(),
             tolerances: Vec::new(),
         }),
+        Command::MoveScrew { screw } => plain(XmlCommand::MoveScrew(MoveScrew {
+            start: match &screw.start {
+                Some(pose) => Some(waypoint(pose, angle)?),
+                None => None,
+            },
+            axis_point: screw.axis_point,
+            free: (screw.free != 0.0).then_some(screw.free),
+            advance: screw.advance,
+            turn: screw.turn,
+        })),
         Command::OpenGripper => plain(XmlCommand::SetEndEffector(1.0)),
         Command::CloseGripper => plain(XmlCommand::SetEndEffector(0.0)),
         Command::OpenToolChanger => plain(XmlCommand::OpenToolChanger),

@@ -1,11 +1,14 @@
 //! What commands of CRCL's XML are in the language, and what has no place there.
 
-use super::command::{ActuateJoint, Instruction, JointDetails, StopCondition, XmlCommand};
+use super::command::{
+    ActuateJoint, Instruction, JointDetails, MoveScrew, StopCondition, XmlCommand,
+};
 use super::data::Quantity;
 use super::own_settings::{end_tolerance, own_settings, percent};
 use super::refusal::{Refusal, refusal};
 use crate::command::Command;
 use crate::joint::JointTarget;
+use crate::screw::Screw;
 
 /// What a command of XML is in the language.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,10 +103,7 @@ fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
             let poses = waypoints.iter().map(|waypoint| waypoint.pose).collect();
             own_settings(waypoints, Command::MoveSmoothlyTo { poses }).map(Meaning::Commands)
         }
-        XmlCommand::MoveScrew(_) => Err(refusal(
-            "AxialDistanceScrew",
-            "MoveScrew: turning and advancing in step",
-        )),
+        XmlCommand::MoveScrew(screw) => move_screw(screw),
         XmlCommand::ActuateJoints { joints, .. } => {
             let targets = joints
                 .iter()
@@ -114,6 +114,27 @@ fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
         }
         other => Err(refusal("CommandID", other.name())),
     }
+}
+
+/// A start with settings of its own becomes a move of its own: they hold on the way there only.
+fn move_screw(xml: &MoveScrew) -> Result<Meaning, Refusal> {
+    let own = xml.start.filter(|start| start.settings.is_some());
+    let screw = Screw {
+        advance: xml.advance,
+        turn: xml.turn,
+        free: xml.free.unwrap_or(0.0),
+        axis_point: xml.axis_point,
+        start: xml.start.filter(|_| own.is_none()).map(|start| start.pose),
+    };
+    let mut commands = match &own {
+        Some(start) => {
+            let pose = start.pose;
+            own_settings(std::slice::from_ref(start), Command::MoveTo { pose })?
+        }
+        None => Vec::new(),
+    };
+    commands.push(Command::MoveScrew { screw });
+    Ok(Meaning::Commands(commands))
 }
 
 fn target(joint: &ActuateJoint, occurrence: usize) -> Result<JointTarget, Refusal> {

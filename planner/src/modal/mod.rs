@@ -4,13 +4,13 @@
 mod pose;
 mod settings;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 pub use pose::isometry;
 pub use settings::Settings;
 
 use crate::command_error::CommandError;
-use crate::task::{JointGoal, JointMove, Move, Shape, Task, ToolAction};
+use crate::task::{JointGoal, JointMove, Move, ScrewMove, Shape, Task, ToolAction};
 use crate::tooling::Tooling;
 use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit, Pose};
 use trajectory::ToolLimits;
@@ -155,6 +155,7 @@ impl Modal {
                 self.motion(Shape::Smooth, poses, workstation_from_flange)
             }
             Command::ActuateJoints { joints } => self.joints(joints),
+            Command::MoveScrew { screw } => self.screw(screw, workstation_from_flange),
             Command::SaveSettings => self.save_settings(),
             Command::RestoreSettings => match self.saved.pop() {
                 Some(settings) => {
@@ -211,6 +212,28 @@ impl Modal {
                 share(self.settings.acceleration, self.maxima.acceleration),
             ),
             limits: self.maxima,
+        }))
+    }
+
+    fn screw(
+        &self,
+        screw: &crcl::Screw,
+        workstation_from_flange: &Isometry3<f64>,
+    ) -> Result<Task, CommandError> {
+        let frame = self.workstation_from_frame(workstation_from_flange);
+        let start = screw.start.as_ref().map(|pose| {
+            let frame_from_tool = isometry(pose, self.length, self.angle)?;
+            Ok::<_, CommandError>(frame * frame_from_tool)
+        });
+        let metres = self.length.metres();
+        let point = |point: [f64; 3]| frame * Point3::from(point.map(|value| value * metres));
+        Ok(Task::Screw(ScrewMove {
+            start: start.transpose()?,
+            axis_point: screw.axis_point.map(point),
+            free: screw.free * metres,
+            advance: screw.advance * metres,
+            turn: screw.turn * self.angle.radians(),
+            limits: self.settings.tool_limits(&self.maxima)?,
         }))
     }
 

@@ -37,16 +37,25 @@ impl<const N: usize> Planner<N> {
         if is_still(&[from, goal]) {
             return Ok(Draft::of(Trajectory::new(Vec::new())));
         }
-        let line = Line::new(from, goal);
+        self.along(&Line::new(from, goal), motion, start)
+    }
+
+    /// A motion along a curve whose parameter has no time in it, from rest to rest.
+    pub(super) fn along(
+        &self,
+        curve: &dyn ToolCurve,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Draft<N>, MotionError> {
         let points = self
-            .followed(&line, false, start, &|_| 1)
+            .followed(curve, false, start, &|_| 1)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
             ..Default::default()
         };
-        let path = joint_path(&line, &points)?;
+        let path = joint_path(curve, &points)?;
         let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
         let trajectory = self.finite(timed.trajectory, &points, &|_| 1)?;
         let draft = Draft {

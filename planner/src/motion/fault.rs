@@ -81,6 +81,14 @@ pub enum Fault {
         /// Largest distance allowed, m.
         allowed_m: f64,
     },
+    /// A screw leaves its helix.
+    #[error("the helix is left by {:.5} mm, {:.5} mm are allowed", .off_m * 1e3, .allowed_m * 1e3)]
+    Helix {
+        /// Largest distance found, m.
+        off_m: f64,
+        /// Largest distance allowed, m.
+        allowed_m: f64,
+    },
     /// The motion does not end in the last pose.
     #[error("it ends {:.6} mm and {angle_rad:.1e} rad off", .off_m * 1e3)]
     End {

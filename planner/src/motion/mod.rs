@@ -13,10 +13,12 @@ mod fault;
 mod figures;
 mod goal;
 mod jog;
+mod joined;
 mod kernel;
 mod least;
 mod motion_error;
 mod reach;
+mod screw;
 mod singular;
 
 use kinematics::{Chain, Solver};
@@ -35,7 +37,7 @@ use certificate::Arm;
 use draft::Draft;
 use kernel::Kernel;
 
-use crate::task::{JointMove, Move, Shape};
+use crate::task::{JointMove, Move, ScrewMove, Shape};
 
 /// Joint ratios may exceed 1 by rounding only.
 const ROUNDING: f64 = 1e-9;
@@ -153,6 +155,18 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         (self.kernel.actuate)(self, motion, start)
+    }
+
+    /// Plans a screw from `start`, at rest: all its parts, at rest between them.
+    ///
+    /// # Errors
+    /// [`MotionError`] when any part of the move cannot be made.
+    pub fn screw(
+        &self,
+        motion: &ScrewMove,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.screw)(self, motion, start)
     }
 
     /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the

@@ -129,7 +129,7 @@ pub(super) fn spans<'a>(
     spans
 }
 
-/// A move of single joints as one of the controlled point, from where the arm stands in a row.
+/// A move of single joints, or a screw, as one of the controlled point, from where the arm stands in a row.
 fn of_point(
     recording: &Recording<'_>,
     task: Task,
@@ -141,6 +141,11 @@ fn of_point(
             let mut joints = recording.rows[row].joints.clone();
             motion.apply(&mut joints);
             Task::Move(motion.of_point(recording.arm.flange(&joints) * flange_from_tool))
+        }
+        Task::Screw(motion) => {
+            let joints = &recording.rows[row].joints;
+            let from = recording.arm.flange(joints) * flange_from_tool;
+            Task::Move(motion.of_point(&from))
         }
         task => task,
     }
