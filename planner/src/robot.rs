@@ -20,7 +20,31 @@ use std::path::Path;
 use crate::end_effector::{EndEffector, Gripper, ToolChanger};
 use crate::tooling::{Holder, Tooling};
 
-/// Limits of the joints, root first: rad for turning joints, m for sliding ones.
+/// Shares of the maker's limits that are planned with, each above 0 and at most 1. An arm whose
+/// controller has a clock of its own needs a margin to catch up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margin {
+    /// Share of the speeds.
+    pub velocity: f64,
+    /// Share of the accelerations.
+    pub acceleration: f64,
+    /// Share of the jerks.
+    pub jerk: f64,
+}
+
+impl Default for Margin {
+    /// The whole limits.
+    fn default() -> Self {
+        Self {
+            velocity: 1.0,
+            acceleration: 1.0,
+            jerk: 1.0,
+        }
+    }
+}
+
+/// Limits of the joints that are planned with, root first: rad for turning joints, m for sliding
+/// ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
     /// Lower position limit; minus infinity for continuous joints.
@@ -35,6 +59,34 @@ pub struct JointLimits {
     pub jerk: Vec<f64>,
     /// Where the acceleration and jerk limits come from.
     pub source: String,
+    /// The shares of the maker's limits that these limits are.
+    pub margin: Margin,
+}
+
+impl JointLimits {
+    /// The limits to plan with, from the maker's.
+    pub(crate) fn with_margin(mut self, margin: Margin) -> Self {
+        let scale = |values: &mut [f64], share: f64| {
+            values.iter_mut().for_each(|value| *value *= share);
+        };
+        scale(&mut self.velocity, margin.velocity);
+        scale(&mut self.acceleration, margin.acceleration);
+        scale(&mut self.jerk, margin.jerk);
+        self.margin = margin;
+        self
+    }
+
+    /// The maker's limits: those without the margin.
+    pub fn of_the_maker(&self) -> Self {
+        let whole = |values: &[f64], share: f64| values.iter().map(|value| value / share).collect();
+        Self {
+            velocity: whole(&self.velocity, self.margin.velocity),
+            acceleration: whole(&self.acceleration, self.margin.acceleration),
+            jerk: whole(&self.jerk, self.margin.jerk),
+            margin: Margin::default(),
+            ..self.clone()
+        }
+    }
 }
 
 /// Limits of the controlled point.

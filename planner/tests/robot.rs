@@ -53,6 +53,27 @@ fn published_limits_are_kept() {
     assert_eq!(robot::load("ur5e").unwrap().joints.source, "canter default");
 }
 
+/// The margin makes the limits that are planned with, and the maker's are known.
+#[test]
+fn the_margin_is_planned_with() {
+    let fr3 = robot::load("fr3").unwrap();
+    let maker = fr3.joints.of_the_maker();
+    assert!((fr3.joints.acceleration[0] - 8.0).abs() < 1e-12);
+    assert!((maker.acceleration[0] - 10.0).abs() < 1e-12);
+    assert!((fr3.joints.jerk[3] - 0.5 * maker.jerk[3]).abs() < 1e-9);
+    assert!((fr3.joints.velocity[6] - 0.9 * maker.velocity[6]).abs() < 1e-12);
+    let ur5e = robot::load("ur5e").unwrap();
+    assert_eq!(ur5e.joints.of_the_maker(), ur5e.joints);
+    let old = "[joints]\n";
+    for (name, bad) in [("zero", "0.0"), ("more", "1.01"), ("nan", "nan")] {
+        let new = format!("[joints]\nmargin.jerk = {bad}\n");
+        let folder = folder(&format!("margin-{name}"), old, &new);
+        let error = robot::load(folder.to_str().unwrap()).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("a share above 0 and at most 1"), "{text}");
+    }
+}
+
 fn shipped(file: &str) -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../robots/ur5e")

@@ -1,7 +1,7 @@
 //! Reads `robot.toml` and combines it with the URDF.
 
 use super::error::RobotError;
-use super::{EndEffector, Gripper, JointLimits, Robot, ToolChanger, ToolLimits};
+use super::{EndEffector, Gripper, JointLimits, Margin, Robot, ToolChanger, ToolLimits};
 use kinematics::{Model, urdf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -44,6 +44,16 @@ struct Joints {
     velocity_per_s: Option<Spanned<Vec<f64>>>,
     acceleration_per_s2: Option<Spanned<Vec<f64>>>,
     jerk_per_s3: Option<Spanned<Vec<f64>>>,
+    margin: Option<Shares>,
+}
+
+/// Shares of the limits that are planned with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Shares {
+    velocity: Option<Spanned<f64>>,
+    acceleration: Option<Spanned<f64>>,
+    jerk: Option<Spanned<f64>>,
 }
 
 /// One limit of the joints: its key in `robot.toml`, the values there, and that of a joint's URDF.
@@ -127,7 +137,10 @@ impl Files<'_> {
                 most: MOST_JOINTS,
             });
         }
-        let joints = self.joint_limits(&model, &document.joints)?;
+        let margin = self.margin(document.joints.get_ref().margin.as_ref())?;
+        let joints = self
+            .joint_limits(&model, &document.joints)?
+            .with_margin(margin);
         let home = self.home(&document.home, &model)?;
         let end_effectors = self.end_effectors(&document.end_effector)?;
         Ok(Robot {
@@ -230,6 +243,29 @@ impl Files<'_> {
                 urdf: |joint| joint.jerk,
             })?,
             source: given.source.clone(),
+            margin: Margin::default(),
+        })
+    }
+
+    /// The shares of the limits that are planned with; the whole where nothing is given.
+    fn margin(&self, shares: Option<&Shares>) -> Result<Margin, RobotError> {
+        let share = |key: &str, given: Option<&Spanned<f64>>| match given {
+            None => Ok(1.0),
+            Some(given) if *given.get_ref() > 0.0 && *given.get_ref() <= 1.0 => {
+                Ok(*given.get_ref())
+            }
+            Some(given) => {
+                let key = format!("joints.margin.{key}");
+                Err(self.value(given.span(), &key, "a share above 0 and at most 1"))
+            }
+        };
+        let Some(shares) = shares else {
+            return Ok(Margin::default());
+        };
+        Ok(Margin {
+            velocity: share("velocity", shares.velocity.as_ref())?,
+            acceleration: share("acceleration", shares.acceleration.as_ref())?,
+            jerk: share("jerk", shares.jerk.as_ref())?,
         })
     }
 
