@@ -141,6 +141,7 @@ fn welcome() -> HelloAck {
     let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
     ack.session = 1;
     ack.position[..JOINTS].copy_from_slice(home().as_slice());
+    ack.commanded = ack.position;
     ack
 }
 

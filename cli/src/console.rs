@@ -109,6 +109,9 @@ impl Console {
                 "canter: error: line {line}: {name}: {}",
                 error.message
             )),
+            Note::NotArrived { .. } | Note::SpeedAsked { .. } => {
+                printer.note(&format!("canter: {note}"));
+            }
             Note::Faulted { reason, .. } => printer.note(&format!("canter: error: {reason}")),
             Note::Ended { reason } if *reason > 0 => {
                 printer.note(&format!("canter: the program ended with reason {reason}"));

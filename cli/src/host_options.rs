@@ -124,6 +124,8 @@ impl HostOptions {
             .map(|kind| Simulation::start(kind, place, &arm))
             .transpose()?;
         let mut config = SessionConfig::new(arm);
+        config.on_wait =
+            |reason| crate::output::note(&format!("canter: waiting for the driver: {reason}"));
         config.rate_hz = self.rate;
         config.clock = if self.lock_step {
             Clock::LockStep

@@ -6,14 +6,25 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define CANTER_PROTOCOL 1u
-#define CANTER_SCHEMA_CHECKSUM UINT64_C(0xd8087951eff3d88e)
+#define CANTER_PROTOCOL 2u
+#define CANTER_SCHEMA_CHECKSUM UINT64_C(0x21293f96d30c668c)
 #define CANTER_MAX_JOINTS 16u
 #define CANTER_MAX_TOOLS 2u
+#define CANTER_MAX_SENSORS 16u
+#define CANTER_MAX_ANALOGUE 8u
 #define CANTER_FLAG_HOLD 1u
 #define CANTER_FLAG_STOPPING 2u
 #define CANTER_FLAG_STOP_REQUEST 4u
 #define CANTER_FLAG_GOODBYE 8u
+#define CANTER_FLAG_EFFORT 16u
+#define CANTER_STATE_UNKNOWN 1u
+#define CANTER_STATE_NO_VELOCITY 2u
+#define CANTER_STATE_NO_EFFORT 4u
+#define CANTER_STATE_COMMANDED 8u
+#define CANTER_HAS_WALL 1u
+#define CANTER_HAS_LOCK_STEP 2u
+#define CANTER_HAS_OWN_CLOCK 4u
+#define CANTER_IS_REAL 8u
 #define CANTER_DISCONNECTED 0u
 #define CANTER_SYNCED 1u
 #define CANTER_ARMED 2u
@@ -28,6 +39,7 @@
 #define CANTER_FAULT_HARDWARE 5u
 #define CANTER_FAULT_STALLED 6u
 #define CANTER_FAULT_ENDED 7u
+#define CANTER_FAULT_NOT_READY 8u
 #define CANTER_WELCOME 0u
 #define CANTER_WRONG_PROTOCOL 1u
 #define CANTER_WRONG_SCHEMA 2u
@@ -37,13 +49,22 @@
 #define CANTER_WRONG_CLOCK 6u
 #define CANTER_BUSY 7u
 #define CANTER_NOT_READY 8u
+#define CANTER_WAIT 9u
 #define CANTER_TOOL_OPEN_IT 1u
 #define CANTER_TOOL_CLOSE_IT 2u
+#define CANTER_TOOL_MOVE_IT 3u
+#define CANTER_TOOL_HOME_IT 4u
 #define CANTER_TOOL_UNKNOWN 0u
 #define CANTER_TOOL_OPEN 1u
 #define CANTER_TOOL_CLOSED 2u
 #define CANTER_TOOL_MOVING 3u
 #define CANTER_TOOL_FAILED 4u
+#define CANTER_TOOL_REACHED 5u
+#define CANTER_TOOL_NOT_HOMED 6u
+#define CANTER_TOOL_HAS_POSITION 1u
+#define CANTER_TOOL_HAS_FORCE 2u
+#define CANTER_TOOL_SENSES_OBJECT 4u
+#define CANTER_TOOL_OBJECT 8u
 
 typedef struct {
     uint32_t order;
@@ -51,19 +72,38 @@ typedef struct {
     double position;
     double velocity;
     double force;
+    double tolerance;
 } canter_tool_command;
-_Static_assert(sizeof(canter_tool_command) == 32, "canter_tool_command");
+_Static_assert(sizeof(canter_tool_command) == 40, "canter_tool_command");
 
 typedef struct {
     uint32_t order;
     uint32_t status;
     double position;
     double force;
-    uint64_t reserved;
+    uint32_t flags;
+    uint32_t reserved;
 } canter_tool_feedback;
 _Static_assert(sizeof(canter_tool_feedback) == 32, "canter_tool_feedback");
 
-#define CANTER_SETPOINT_TYPE "canter.Setpoint.1"
+typedef struct {
+    uint8_t name[24];
+    double value;
+} canter_sensor;
+_Static_assert(sizeof(canter_sensor) == 32, "canter_sensor");
+
+typedef struct {
+    uint32_t number;
+    uint32_t reserved;
+    double mass;
+    double centre[3];
+    double inertia[6];
+    double tool_position[3];
+    double tool_rotation[4];
+} canter_payload;
+_Static_assert(sizeof(canter_payload) == 144, "canter_payload");
+
+#define CANTER_SETPOINT_TYPE "canter.Setpoint.2"
 typedef struct {
     uint32_t protocol;
     uint32_t joints;
@@ -87,11 +127,15 @@ typedef struct {
     double effort[16];
     canter_tool_command tools[2];
     uint64_t digital_outputs;
-    uint64_t reserved[10];
+    uint64_t digital_mask;
+    double analogue_outputs[8];
+    uint64_t analogue_mask;
+    canter_payload payload;
+    uint64_t reserved[8];
 } canter_setpoint;
-_Static_assert(sizeof(canter_setpoint) == 768, "canter_setpoint");
+_Static_assert(sizeof(canter_setpoint) == 992, "canter_setpoint");
 
-#define CANTER_STATE_TYPE "canter.State.1"
+#define CANTER_STATE_TYPE "canter.State.2"
 typedef struct {
     uint32_t protocol;
     uint32_t joints;
@@ -105,19 +149,26 @@ typedef struct {
     uint32_t driver_state;
     uint32_t fault;
     uint32_t fault_joint;
-    uint32_t reserved_word;
+    uint32_t fault_code;
     uint64_t missed;
     double position[16];
     double velocity[16];
     double effort[16];
+    double commanded[16];
     canter_tool_feedback tools[2];
     uint64_t digital_inputs;
+    double analogue_inputs[8];
     uint64_t hardware_ns;
-    uint64_t reserved[11];
+    double speed_scaling;
+    uint32_t flags;
+    uint32_t sensor_count;
+    canter_sensor sensors[16];
+    uint8_t text[96];
+    uint64_t reserved[8];
 } canter_state;
-_Static_assert(sizeof(canter_state) == 640, "canter_state");
+_Static_assert(sizeof(canter_state) == 1432, "canter_state");
 
-#define CANTER_HELLO_TYPE "canter.Hello.1"
+#define CANTER_HELLO_TYPE "canter.Hello.2"
 typedef struct {
     uint32_t protocol;
     uint32_t joints;
@@ -132,23 +183,28 @@ typedef struct {
 } canter_hello;
 _Static_assert(sizeof(canter_hello) == 144, "canter_hello");
 
-#define CANTER_HELLO_ACK_TYPE "canter.HelloAck.1"
+#define CANTER_HELLO_ACK_TYPE "canter.HelloAck.2"
 typedef struct {
     uint32_t protocol;
     uint32_t joints;
     uint32_t verdict;
-    uint32_t reserved_word;
+    uint32_t features;
     uint64_t schema;
     uint64_t session;
     uint64_t watchdog_ns;
     double position[16];
+    double commanded[16];
     double lower[16];
     double upper[16];
     double velocity[16];
+    double acceleration[16];
+    double jerk[16];
+    uint64_t periods_ns[2];
+    uint64_t delay_ns;
     uint8_t name[64];
     uint8_t reason[128];
-    uint64_t reserved[3];
+    uint64_t reserved[4];
 } canter_hello_ack;
-_Static_assert(sizeof(canter_hello_ack) == 768, "canter_hello_ack");
+_Static_assert(sizeof(canter_hello_ack) == 1184, "canter_hello_ack");
 
 #endif

@@ -78,7 +78,7 @@ class Physics(Robot):
             return position, velocity
         return [position[i] for i in at], [velocity[i] for i in at]
 
-    def move(self, position, velocity, acceleration, period):
+    def move(self, position, velocity, acceleration, at_ns, period):
         model, data = self.model, self.data
         w = min(self.frequency, 0.4 / period)
         ww, w2 = w * w, 2 * w
@@ -103,9 +103,9 @@ class Physics(Robot):
             self.shown = data.time + 1 / 60
             self.viewer.sync()
 
-    def tool(self, tool, action):
+    def tool(self, tool, order):
         self.gripper = (
-            messages.TOOL_OPEN if action == messages.OPEN else messages.TOOL_CLOSED
+            messages.TOOL_OPEN if order.action == messages.OPEN else messages.TOOL_CLOSED
         )
 
     def tool_status(self, tool):

@@ -31,14 +31,15 @@ class MyRobot(Robot):
         # HERE: read the joint positions and velocities from the hardware.
         return self.position, self.speed
 
-    def move(self, position, velocity, acceleration, period):
+    def move(self, position, velocity, acceleration, at_ns, period):
         # HERE: send the reference to the hardware; use velocity and acceleration as feed-forward.
+        # The joints shall be there at `at_ns`. `begin`, `fault` and others are in `Robot`.
         self.position, self.speed = list(position), list(velocity)
 
-    def tool(self, tool, action):
+    def tool(self, tool, order):
         # HERE: begin to open or close; `tool_status` reports when it is done.
         self.gripper = (
-            messages.TOOL_OPEN if action == messages.OPEN else messages.TOOL_CLOSED
+            messages.TOOL_OPEN if order.action == messages.OPEN else messages.TOOL_CLOSED
         )
 
     def tool_status(self, tool):

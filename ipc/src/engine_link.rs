@@ -17,6 +17,26 @@ const ENGINE: Role = Role {
     receives: "state",
 };
 
+/// Time between two requests to a driver that is getting ready.
+const AGAIN: Duration = Duration::from_millis(20);
+
+/// How long the driver is usually given to get ready: brakes open, a program starts.
+pub const READY: Duration = Duration::from_secs(60);
+
+/// What a driver answers to a request for a session.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Greeted {
+    /// The session is open.
+    Welcome(Box<HelloAck>),
+    /// The arm is getting ready: ask again.
+    Waits {
+        /// The driver's name.
+        driver: String,
+        /// What it waits for.
+        reason: String,
+    },
+}
+
 /// The engine's end: sends setpoints, receives states, opens sessions. There is one for each arm
 /// among all processes. It stays in the thread that opened it.
 #[derive(Debug)]
@@ -70,12 +90,43 @@ impl EngineLink {
         self.end.arm()
     }
 
-    /// Asks the driver for a session and waits up to `timeout`. Not for the cycle.
+    /// Asks the driver for a session and waits up to `timeout` for a driver, and then up to
+    /// `patience` until it is ready; `waits` gets what it waits for, again and again. Not for the
+    /// cycle.
+    ///
+    /// # Errors
+    /// Those of [`Self::ask`], and [`IpcError::NotReady`] with what the driver waited for.
+    pub fn greet(
+        &self,
+        hello: &Hello,
+        [timeout, patience]: [Duration; 2],
+        mut waits: impl FnMut(&str),
+    ) -> Result<HelloAck, IpcError> {
+        let start = Instant::now();
+        loop {
+            match self.ask(hello, timeout)? {
+                Greeted::Welcome(ack) => return Ok(*ack),
+                Greeted::Waits { driver, reason } if start.elapsed() > patience => {
+                    return Err(IpcError::NotReady {
+                        arm: self.arm().to_string(),
+                        driver,
+                        reason,
+                        waited_s: patience.as_secs(),
+                    });
+                }
+                Greeted::Waits { reason, .. } => waits(&reason),
+            }
+            sleep(AGAIN);
+        }
+    }
+
+    /// Asks the driver once for a session and waits up to `timeout` for a driver. Not for the
+    /// cycle.
     ///
     /// # Errors
     /// [`IpcError::NoAnswer`] without a driver, [`IpcError::Refused`] with the driver's reason,
     /// [`IpcError::BadMessage`] when the answer is invalid.
-    pub fn greet(&self, hello: &Hello, timeout: Duration) -> Result<HelloAck, IpcError> {
+    pub fn ask(&self, hello: &Hello, timeout: Duration) -> Result<Greeted, IpcError> {
         let end = Instant::now() + timeout;
         let ack = loop {
             if let Some(ack) = self.greet_once(hello, end)? {
@@ -89,6 +140,12 @@ impl EngineLink {
                 });
             }
         };
+        if ack.verdict == Verdict::Wait as u32 {
+            return Ok(Greeted::Waits {
+                driver: text_of(&ack.name),
+                reason: text_of(&ack.reason),
+            });
+        }
         if ack.verdict != Verdict::Welcome as u32 {
             return Err(IpcError::Refused {
                 arm: self.arm().to_string(),
@@ -101,7 +158,7 @@ impl EngineLink {
             arm: self.arm().to_string(),
             cause,
         })?;
-        Ok(ack)
+        Ok(Greeted::Welcome(Box::new(ack)))
     }
 
     /// Sends one request and waits for its answer; `None` when no driver took it.

@@ -34,8 +34,9 @@ pub enum IpcError {
     },
     /// The other side was built with messages of another type or size.
     #[error(
-        "{service}: the other side uses messages of another layout; \
-         this side speaks protocol {protocol}, build both from the same version"
+        "{service}: the other side uses messages of another layout; this side speaks protocol \
+         {protocol}. An engine or driver of another version runs here: end it, and build both from \
+         the same version"
     )]
     Incompatible {
         /// The service.
@@ -129,6 +130,18 @@ pub enum IpcError {
         /// The arm.
         arm: String,
     },
+    /// The driver was not ready in time.
+    #[error("{arm}: driver {driver:?} was not ready within {waited_s} s: {reason}")]
+    NotReady {
+        /// The arm.
+        arm: String,
+        /// The driver's name.
+        driver: String,
+        /// What it waited for.
+        reason: String,
+        /// How long was waited (s).
+        waited_s: u64,
+    },
     /// The driver refused the handshake.
     #[error("{arm}: driver {driver:?} refused: {reason}")]
     Refused {
@@ -164,7 +177,7 @@ pub enum IpcError {
 #[non_exhaustive]
 pub enum MessageError {
     /// Another protocol version.
-    #[error("protocol {found}, expected {expected}")]
+    #[error("protocol {found}, expected {expected}; build engine and driver from the same version")]
     Protocol {
         /// Our version.
         expected: u32,
@@ -208,6 +221,14 @@ pub enum MessageError {
         least: u64,
         /// The most allowed.
         most: u64,
+    },
+    /// A share is not between 0 and 1.
+    #[error("{field} is {value}, allowed is 0 to 1")]
+    Share {
+        /// The field of the message.
+        field: &'static str,
+        /// Its value.
+        value: f64,
     },
     /// The layout checksum differs.
     #[error("layout checksum {found:#018x}, expected {expected:#018x}")]

@@ -47,8 +47,11 @@ pub enum Verdict {
     WrongClock = 6,
     /// Another engine has a session.
     Busy = 7,
-    /// The driver still moves, or its hardware has a fault.
+    /// The driver still moves, or its arm cannot be moved now; the reason says why.
     NotReady = 8,
+    /// The arm is getting ready, for example its brakes open: ask again; the reason says what it
+    /// waits for.
+    Wait = 9,
 }
 
 impl Verdict {
@@ -64,15 +67,31 @@ impl Verdict {
             6 => Some(Self::WrongClock),
             7 => Some(Self::Busy),
             8 => Some(Self::NotReady),
+            9 => Some(Self::Wait),
             _ => None,
         }
     }
 }
 
+/// Bits of [`HelloAck::features`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverFeatures;
+
+impl DriverFeatures {
+    /// It can be driven by the wall clock.
+    pub const WALL: u32 = 1;
+    /// It can be driven in lock-step.
+    pub const LOCK_STEP: u32 = 2;
+    /// The arm's controller has a clock of its own and reads the references at its own times.
+    pub const OWN_CLOCK: u32 = 4;
+    /// A real arm: tests that harm it or that only a simulation can pass are left out.
+    pub const REAL: u32 = 8;
+}
+
 /// The engine's request for a session.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.Hello.1")]
+#[type_name("canter.Hello.2")]
 pub struct Hello {
     /// Protocol version.
     pub protocol: u32,
@@ -151,7 +170,7 @@ impl Hello {
 /// The driver's answer to a [`Hello`].
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.HelloAck.1")]
+#[type_name("canter.HelloAck.2")]
 pub struct HelloAck {
     /// Protocol version of the driver.
     pub protocol: u32,
@@ -159,28 +178,39 @@ pub struct HelloAck {
     pub joints: u32,
     /// A [`Verdict`] by number.
     pub verdict: u32,
-    /// For later; 0.
-    pub reserved_word: u32,
+    /// Bits of [`DriverFeatures`].
+    pub features: u32,
     /// [`schema_checksum`] of the driver.
     pub schema: u64,
     /// The session; never 0 with a welcome.
     pub session: u64,
     /// The watchdog that the driver will keep (ns).
     pub watchdog_ns: u64,
-    /// Measured joint positions (rad, m): the first setpoint must be exactly there.
+    /// Measured joint positions (rad, m).
     pub position: [f64; MAX_JOINTS],
+    /// Commanded joint positions (rad, m): the first setpoint must be exactly there. They are the
+    /// measured ones where the arm's controller does not tell what it commands.
+    pub commanded: [f64; MAX_JOINTS],
     /// Lower ends of the driver's joint ranges (rad, m).
     pub lower: [f64; MAX_JOINTS],
     /// Upper ends of the driver's joint ranges (rad, m).
     pub upper: [f64; MAX_JOINTS],
     /// Largest joint speeds that the driver follows (rad/s, m/s).
     pub velocity: [f64; MAX_JOINTS],
+    /// Largest joint accelerations that the driver follows (rad/s², m/s²).
+    pub acceleration: [f64; MAX_JOINTS],
+    /// Largest joint jerks that the driver follows (rad/s³, m/s³).
+    pub jerk: [f64; MAX_JOINTS],
+    /// The shortest and the longest period that it can serve (ns).
+    pub periods_ns: [u64; 2],
+    /// How late the arm is behind the setpoints, by the driver's own delay (ns); 0 if none.
+    pub delay_ns: u64,
     /// Name of the driver, UTF-8, filled up with 0.
     pub name: [u8; 64],
-    /// The reason of a refusal, UTF-8, filled up with 0.
+    /// The reason of a refusal or of waiting, UTF-8, filled up with 0.
     pub reason: [u8; 128],
     /// For later; 0.
-    pub reserved: [u64; 3],
+    pub reserved: [u64; 4],
 }
 
 impl HelloAck {
@@ -190,17 +220,22 @@ impl HelloAck {
             protocol: PROTOCOL,
             joints: joints as u32,
             verdict: verdict as u32,
-            reserved_word: 0,
+            features: 0,
             schema: schema_checksum(),
             session: 0,
             watchdog_ns: 0,
             position: [0.0; MAX_JOINTS],
             lower: [0.0; MAX_JOINTS],
             upper: [0.0; MAX_JOINTS],
+            commanded: [0.0; MAX_JOINTS],
             velocity: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+            jerk: [0.0; MAX_JOINTS],
+            periods_ns: [0; 2],
+            delay_ns: 0,
             name: [0; 64],
             reason: bytes_of(reason),
-            reserved: [0; 3],
+            reserved: [0; 4],
         }
     }
 
@@ -219,9 +254,12 @@ impl HelloAck {
         check_range("session", self.session, 1, u64::MAX)?;
         check_range("watchdog_ns", self.watchdog_ns, 1, 10_000_000_000)?;
         check_finite("position", &self.position, joints)?;
+        check_finite("commanded position", &self.commanded, joints)?;
         check_finite("lower end", &self.lower, joints)?;
         check_finite("upper end", &self.upper, joints)?;
-        check_finite("velocity limit", &self.velocity, joints)
+        check_finite("velocity limit", &self.velocity, joints)?;
+        check_finite("acceleration limit", &self.acceleration, joints)?;
+        check_finite("jerk limit", &self.jerk, joints)
     }
 }
 

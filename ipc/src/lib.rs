@@ -28,10 +28,12 @@ mod link_end;
 mod node;
 mod observer;
 mod ownership;
+mod payload;
 mod probe;
 mod repair;
 mod request;
 mod room;
+mod sensor;
 mod setpoint;
 mod state;
 mod status;
@@ -46,27 +48,35 @@ pub use control::{
 };
 pub use domain::{DOMAIN_VARIABLE, Domain};
 pub use driver_link::{DriverLink, Greeting};
-pub use engine_link::EngineLink;
+pub use engine_link::{EngineLink, Greeted, READY};
 pub use error::{IpcError, MessageError};
-pub use hello::{Clock, Hello, HelloAck, Verdict, bytes_of, text_of};
+pub use hello::{Clock, DriverFeatures, Hello, HelloAck, Verdict, bytes_of, text_of};
 pub use node::{NodeCount, count_nodes, look_at_services, remove_dead_nodes};
 pub use observer::Observer;
 pub use ownership::Ownership;
+pub use payload::Payload;
 pub use probe::Probe;
 pub use repair::{Inhabitant, inhabitants_of, repair};
 pub use request::{Answer, Identity, LONGEST_ANSWER, Request, Verb};
 pub use room::{ROOM_NEEDED, room_left};
+pub use sensor::Sensor;
 pub use setpoint::{Setpoint, SetpointFlags};
-pub use state::{DriverState, FaultCode, State};
+pub use state::{DriverState, FaultCode, State, StateFlags};
 pub use status::{StatusReader, StatusWriter};
 pub use ticket::RequestId;
-pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolStatus};
+pub use tool::{ToolAction, ToolCommand, ToolFeedback, ToolFlags, ToolStatus};
 
 /// How many joints fit into a message.
 pub const MAX_JOINTS: usize = 16;
 
 /// How many tools fit into a message: 0 is the gripper, 1 the tool changer.
 pub const MAX_TOOLS: usize = 2;
+
+/// How many sensor values fit into a state.
+pub const MAX_SENSORS: usize = 16;
+
+/// How many analogue inputs and outputs fit into a message.
+pub const MAX_ANALOGUE: usize = 8;
 
 /// The index of the gripper among the tools of a message.
 pub const GRIPPER: usize = 0;
@@ -75,7 +85,7 @@ pub const GRIPPER: usize = 0;
 pub const TOOL_CHANGER: usize = 1;
 
 /// The version of the driver protocol. Both sides must have the same.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 
 /// A checksum of the byte layout of the messages and of the number of fault codes; part of the handshake, so that a
 /// driver built from other headers is refused before it moves.
@@ -87,14 +97,19 @@ pub const fn schema_checksum() -> u64 {
         PROTOCOL as usize,
         MAX_JOINTS,
         MAX_TOOLS,
+        MAX_SENSORS,
+        MAX_ANALOGUE,
         size_of::<Setpoint>(),
         core::mem::offset_of!(Setpoint, position),
         core::mem::offset_of!(Setpoint, tools),
         core::mem::offset_of!(Setpoint, digital_outputs),
+        core::mem::offset_of!(Setpoint, payload),
         size_of::<State>(),
         core::mem::offset_of!(State, position),
         core::mem::offset_of!(State, tools),
         core::mem::offset_of!(State, digital_inputs),
+        core::mem::offset_of!(State, sensors),
+        core::mem::offset_of!(State, text),
         size_of::<Hello>(),
         size_of::<HelloAck>(),
         FaultCode::COUNT,

@@ -2,7 +2,9 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_JOINTS, MAX_TOOLS, MessageError, PROTOCOL, ToolAction, ToolCommand};
+use crate::{
+    MAX_ANALOGUE, MAX_JOINTS, MAX_TOOLS, MessageError, PROTOCOL, Payload, ToolAction, ToolCommand,
+};
 
 /// Bits of [`Setpoint::flags`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +19,8 @@ impl SetpointFlags {
     pub const STOP_REQUEST: u32 = 4;
     /// The engine ends: the session ends without a fault. Only together with [`Self::HOLD`].
     pub const GOODBYE: u32 = 8;
+    /// `effort` is a feed-forward; without it, `effort` has no meaning.
+    pub const EFFORT: u32 = 16;
 }
 
 /// The wanted state of the joints at one time. The engine sends it once per period.
@@ -25,7 +29,7 @@ impl SetpointFlags {
 /// nanoseconds of `CLOCK_MONOTONIC`.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.Setpoint.1")]
+#[type_name("canter.Setpoint.2")]
 pub struct Setpoint {
     /// Protocol version.
     pub protocol: u32,
@@ -39,7 +43,8 @@ pub struct Setpoint {
     pub tick: u64,
     /// When it was sent (ns).
     pub published_ns: u64,
-    /// When the period began in which it was made (ns); the driver runs 0.4 periods later.
+    /// The time of the setpoint (ns): when the arm shall be there, by the engine's plan. It is when
+    /// the period began in which it was made; the driver runs 0.4 periods later.
     pub tick_ns: u64,
     /// Length of a period (ns).
     pub period_ns: u64,
@@ -71,8 +76,16 @@ pub struct Setpoint {
     pub tools: [ToolCommand; MAX_TOOLS],
     /// Digital outputs, one bit each.
     pub digital_outputs: u64,
+    /// Which digital outputs the engine sets; the others stay as they are.
+    pub digital_mask: u64,
+    /// Analogue outputs, in the unit of the arm (V, A).
+    pub analogue_outputs: [f64; MAX_ANALOGUE],
+    /// Which analogue outputs the engine sets, one bit each; the others stay as they are.
+    pub analogue_mask: u64,
+    /// What the arm carries.
+    pub payload: Payload,
     /// For later; 0.
-    pub reserved: [u64; 10],
+    pub reserved: [u64; 8],
 }
 
 impl Default for Setpoint {
@@ -100,7 +113,11 @@ impl Default for Setpoint {
             effort: [0.0; MAX_JOINTS],
             tools: [ToolCommand::default(); MAX_TOOLS],
             digital_outputs: 0,
-            reserved: [0; 10],
+            digital_mask: 0,
+            analogue_outputs: [0.0; MAX_ANALOGUE],
+            analogue_mask: 0,
+            payload: Payload::default(),
+            reserved: [0; 8],
         }
     }
 }
@@ -131,9 +148,16 @@ impl Setpoint {
                     value: tool.action,
                 });
             }
-            check_finite("tool order", &[tool.position, tool.velocity, tool.force], 3)?;
+            let numbers = [tool.position, tool.velocity, tool.force, tool.tolerance];
+            check_finite("tool order", &numbers, 4)?;
         }
-        Ok(())
+        check_finite("analogue output", &self.analogue_outputs, MAX_ANALOGUE)?;
+        let payload = &self.payload;
+        check_finite("payload mass", &[payload.mass], 1)?;
+        check_finite("payload centre", &payload.centre, 3)?;
+        check_finite("payload inertia", &payload.inertia, 6)?;
+        check_finite("tool position", &payload.tool_position, 3)?;
+        check_finite("tool rotation", &payload.tool_rotation, 4)
     }
 }
 

@@ -2,8 +2,11 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::setpoint::{check_finite, check_head};
-use crate::{MAX_JOINTS, MAX_TOOLS, MessageError, PROTOCOL, ToolFeedback, ToolStatus};
+use crate::setpoint::{check_finite, check_head, check_range};
+use crate::{
+    MAX_ANALOGUE, MAX_JOINTS, MAX_SENSORS, MAX_TOOLS, MessageError, PROTOCOL, Sensor, ToolFeedback,
+    ToolStatus, text_of,
+};
 
 /// Where a driver is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,11 +73,13 @@ pub enum FaultCode {
     Stalled = 6,
     /// The driver was told to end.
     Ended = 7,
+    /// The arm cannot be moved now; the text of the state says why.
+    NotReady = 8,
 }
 
 impl FaultCode {
     /// How many there are, [`Self::None`] included.
-    pub(crate) const COUNT: usize = 8;
+    pub(crate) const COUNT: usize = 9;
 
     /// The fault that a number on the wire stands for.
     pub const fn from_number(number: u32) -> Option<Self> {
@@ -87,6 +92,7 @@ impl FaultCode {
             5 => Some(Self::Hardware),
             6 => Some(Self::Stalled),
             7 => Some(Self::Ended),
+            8 => Some(Self::NotReady),
             _ => None,
         }
     }
@@ -102,14 +108,31 @@ impl FaultCode {
             Self::Hardware => "a fault of the hardware",
             Self::Stalled => "the driver itself did not run for longer than the watchdog time",
             Self::Ended => "the driver was told to end",
+            Self::NotReady => "the arm is not ready",
         }
     }
+}
+
+/// Bits of [`State::flags`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StateFlags;
+
+impl StateFlags {
+    /// The arm sends nothing: positions are the last known ones, of `measured_ns`.
+    pub const UNKNOWN: u32 = 1;
+    /// Velocities are not measured.
+    pub const NO_VELOCITY: u32 = 2;
+    /// Efforts are not measured.
+    pub const NO_EFFORT: u32 = 4;
+    /// `commanded` is what the arm's own controller says it commands; without it, it is what the
+    /// driver told the arm.
+    pub const COMMANDED: u32 = 8;
 }
 
 /// The measured state of the joints. The driver sends it once per period, also without a session.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("canter.State.1")]
+#[type_name("canter.State.2")]
 pub struct State {
     /// Protocol version.
     pub protocol: u32,
@@ -119,7 +142,7 @@ pub struct State {
     pub session: u64,
     /// Counts the states of a driver process, from 1.
     pub sequence: u64,
-    /// When the joints were measured (ns of `CLOCK_MONOTONIC`).
+    /// When the joints were measured (ns of `CLOCK_MONOTONIC`); 0 if never.
     pub measured_ns: u64,
     /// When it was sent (ns of `CLOCK_MONOTONIC`).
     pub published_ns: u64,
@@ -135,8 +158,8 @@ pub struct State {
     pub fault: u32,
     /// The joint that the fault is about; `u32::MAX` for none.
     pub fault_joint: u32,
-    /// For later; 0.
-    pub reserved_word: u32,
+    /// The number that the arm's maker gives the fault; 0 if there is none.
+    pub fault_code: u32,
     /// Periods without a new setpoint in this session.
     pub missed: u64,
     /// Joint positions (rad, m).
@@ -145,14 +168,28 @@ pub struct State {
     pub velocity: [f64; MAX_JOINTS],
     /// Joint efforts (N m, N).
     pub effort: [f64; MAX_JOINTS],
+    /// Commanded joint positions (rad, m): what the arm's controller wants now.
+    pub commanded: [f64; MAX_JOINTS],
     /// Gripper and tool changer.
     pub tools: [ToolFeedback; MAX_TOOLS],
     /// Digital inputs, one bit each.
     pub digital_inputs: u64,
+    /// Analogue inputs, in the unit of the arm (V, A).
+    pub analogue_inputs: [f64; MAX_ANALOGUE],
     /// The hardware's own clock (ns); 0 if there is none.
     pub hardware_ns: u64,
+    /// Share of the planned speed that the arm asks for, 0..=1; 1 without a wish.
+    pub speed_scaling: f64,
+    /// Bits of [`StateFlags`].
+    pub flags: u32,
+    /// How many of `sensors` are used.
+    pub sensor_count: u32,
+    /// Named values of sensors.
+    pub sensors: [Sensor; MAX_SENSORS],
+    /// What the fault is, as the arm's maker says it; UTF-8, filled up with 0.
+    pub text: [u8; 96],
     /// For later; 0.
-    pub reserved: [u64; 11],
+    pub reserved: [u64; 8],
 }
 
 impl Default for State {
@@ -170,15 +207,22 @@ impl Default for State {
             driver_state: 0,
             fault: 0,
             fault_joint: u32::MAX,
-            reserved_word: 0,
+            fault_code: 0,
             missed: 0,
             position: [0.0; MAX_JOINTS],
             velocity: [0.0; MAX_JOINTS],
             effort: [0.0; MAX_JOINTS],
+            commanded: [0.0; MAX_JOINTS],
             tools: [ToolFeedback::default(); MAX_TOOLS],
             digital_inputs: 0,
+            analogue_inputs: [0.0; MAX_ANALOGUE],
             hardware_ns: 0,
-            reserved: [0; 11],
+            speed_scaling: 1.0,
+            flags: 0,
+            sensor_count: 0,
+            sensors: [Sensor::default(); MAX_SENSORS],
+            text: [0; 96],
+            reserved: [0; 8],
         }
     }
 }
@@ -215,7 +259,33 @@ impl State {
             }
             check_finite("tool feedback", &[tool.position, tool.force], 2)?;
         }
-        Ok(())
+        check_finite("commanded position", &self.commanded, joints)?;
+        check_finite("analogue input", &self.analogue_inputs, MAX_ANALOGUE)?;
+        if !(0.0..=1.0).contains(&self.speed_scaling) {
+            return Err(MessageError::Share {
+                field: "speed scaling",
+                value: self.speed_scaling,
+            });
+        }
+        check_range(
+            "sensor count",
+            self.sensor_count.into(),
+            0,
+            MAX_SENSORS as u64,
+        )
+    }
+
+    /// The value of the sensor `name`; NaN when the driver does not know it now, `None` when it has
+    /// no such sensor. Does not allocate.
+    pub fn sensor(&self, name: &str) -> Option<f64> {
+        let named = self.sensors.iter().take(self.sensor_count as usize);
+        let mut found = named.filter(|sensor| sensor.is(name));
+        found.next().map(|sensor| sensor.value)
+    }
+
+    /// What the fault is, as the arm's maker says it; empty when the driver says nothing.
+    pub fn fault_text(&self) -> String {
+        text_of(&self.text)
     }
 
     /// The driver state; [`DriverState::Fault`] if the number is unknown.

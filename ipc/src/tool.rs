@@ -10,8 +10,12 @@ pub enum ToolAction {
     None = 0,
     /// Open.
     Open = 1,
-    /// Close.
+    /// Close; with a force, grasp.
     Close = 2,
+    /// Move to the opening of the order.
+    Move = 3,
+    /// Find the ends of the tool's own travel.
+    Home = 4,
 }
 
 impl ToolAction {
@@ -21,6 +25,8 @@ impl ToolAction {
             0 => Some(Self::None),
             1 => Some(Self::Open),
             2 => Some(Self::Close),
+            3 => Some(Self::Move),
+            4 => Some(Self::Home),
             _ => None,
         }
     }
@@ -40,6 +46,10 @@ pub enum ToolStatus {
     Moving = 3,
     /// The last order failed.
     Failed = 4,
+    /// At rest at the opening of the last order, which was [`ToolAction::Move`].
+    Reached = 5,
+    /// Its ends are not known yet: it needs [`ToolAction::Home`].
+    NotHomed = 6,
 }
 
 impl ToolStatus {
@@ -51,6 +61,8 @@ impl ToolStatus {
             2 => Some(Self::Closed),
             3 => Some(Self::Moving),
             4 => Some(Self::Failed),
+            5 => Some(Self::Reached),
+            6 => Some(Self::NotHomed),
             _ => None,
         }
     }
@@ -65,12 +77,29 @@ pub struct ToolCommand {
     pub order: u32,
     /// A [`ToolAction`] by number.
     pub action: u32,
-    /// Wanted opening (m); not used by open and close.
+    /// Wanted opening (m): of a move, and of a close with a tolerance.
     pub position: f64,
     /// Fastest allowed motion (m/s); 0 means the tool's own value.
     pub velocity: f64,
     /// Largest allowed force (N); 0 means the tool's own value.
     pub force: f64,
+    /// How far the opening may be from `position` with an object held (m); 0 means any opening.
+    pub tolerance: f64,
+}
+
+/// Bits of [`ToolFeedback::flags`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ToolFlags;
+
+impl ToolFlags {
+    /// `position` is measured.
+    pub const POSITION: u32 = 1;
+    /// `force` is measured.
+    pub const FORCE: u32 = 2;
+    /// The tool can tell whether it holds an object.
+    pub const SENSES_OBJECT: u32 = 4;
+    /// An object is held.
+    pub const OBJECT: u32 = 8;
 }
 
 /// How one tool is, repeated in every state.
@@ -86,6 +115,8 @@ pub struct ToolFeedback {
     pub position: f64,
     /// Force (N).
     pub force: f64,
+    /// Bits of [`ToolFlags`].
+    pub flags: u32,
     /// For later; 0.
-    pub reserved: u64,
+    pub reserved: u32,
 }

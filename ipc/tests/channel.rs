@@ -83,7 +83,7 @@ fn handshake() {
     let wait = Duration::from_millis(50);
     let hello = Hello::new(6, 1_000_000, 50_000_000, Clock::Wall);
     let engine = EngineLink::open(&arm).unwrap();
-    let alone = engine.greet(&hello, wait).unwrap_err();
+    let alone = engine.greet(&hello, [wait; 2], |_| {}).unwrap_err();
     assert!(
         matches!(alone, IpcError::NoAnswer { role: "driver", .. }),
         "{alone}"
@@ -112,17 +112,19 @@ fn handshake() {
                 thread::sleep(Duration::from_millis(1));
             }
         });
-        let ack = engine.greet(&hello, Duration::from_secs(5)).unwrap();
+        let ack = engine
+            .greet(&hello, [Duration::from_secs(5); 2], |_| {})
+            .unwrap();
         assert_eq!(ack.session, 7);
         let other = Hello {
             protocol: 99,
             ..hello
         };
         let refusal = engine
-            .greet(&other, Duration::from_secs(5))
+            .greet(&other, [Duration::from_secs(5); 2], |_| {})
             .unwrap_err()
             .to_string();
-        assert!(refusal.contains("protocol 99, expected 1"), "{refusal}");
+        assert!(refusal.contains("protocol 99, expected 2"), "{refusal}");
         done.store(true, Ordering::Relaxed);
     });
 }

@@ -2,11 +2,11 @@
 
 use core::mem::{align_of, offset_of, size_of};
 
-use ipc::{Hello, HelloAck, Setpoint, State, ToolCommand, ToolFeedback};
+use ipc::{Hello, HelloAck, Payload, Sensor, Setpoint, State, ToolCommand, ToolFeedback};
 
 #[test]
 fn setpoint() {
-    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (768, 8));
+    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (992, 8));
     let offsets = [
         (offset_of!(Setpoint, protocol), 0),
         (offset_of!(Setpoint, joints), 4),
@@ -28,7 +28,10 @@ fn setpoint() {
         (offset_of!(Setpoint, acceleration), 360),
         (offset_of!(Setpoint, effort), 488),
         (offset_of!(Setpoint, tools), 616),
-        (offset_of!(Setpoint, digital_outputs), 680),
+        (offset_of!(Setpoint, digital_outputs), 696),
+        (offset_of!(Setpoint, digital_mask), 704),
+        (offset_of!(Setpoint, analogue_outputs), 712),
+        (offset_of!(Setpoint, payload), 784),
     ];
     for (found, promised) in offsets {
         assert_eq!(found, promised);
@@ -37,7 +40,7 @@ fn setpoint() {
 
 #[test]
 fn state() {
-    assert_eq!((size_of::<State>(), align_of::<State>()), (640, 8));
+    assert_eq!((size_of::<State>(), align_of::<State>()), (1432, 8));
     let offsets = [
         (offset_of!(State, session), 8),
         (offset_of!(State, sequence), 16),
@@ -53,9 +56,16 @@ fn state() {
         (offset_of!(State, position), 88),
         (offset_of!(State, velocity), 216),
         (offset_of!(State, effort), 344),
-        (offset_of!(State, tools), 472),
-        (offset_of!(State, digital_inputs), 536),
-        (offset_of!(State, hardware_ns), 544),
+        (offset_of!(State, fault_code), 76),
+        (offset_of!(State, commanded), 472),
+        (offset_of!(State, tools), 600),
+        (offset_of!(State, digital_inputs), 664),
+        (offset_of!(State, analogue_inputs), 672),
+        (offset_of!(State, hardware_ns), 736),
+        (offset_of!(State, speed_scaling), 744),
+        (offset_of!(State, flags), 752),
+        (offset_of!(State, sensors), 760),
+        (offset_of!(State, text), 1272),
     ];
     for (found, promised) in offsets {
         assert_eq!(found, promised);
@@ -64,11 +74,13 @@ fn state() {
 
 #[test]
 fn handshake_and_tools() {
-    assert_eq!(size_of::<ToolCommand>(), 32);
+    assert_eq!(size_of::<ToolCommand>(), 40);
     assert_eq!(size_of::<ToolFeedback>(), 32);
     assert_eq!(size_of::<Hello>(), 144);
-    assert_eq!(size_of::<HelloAck>(), 768);
+    assert_eq!(size_of::<Sensor>(), 32);
+    assert_eq!(size_of::<Payload>(), 144);
+    assert_eq!(size_of::<HelloAck>(), 1184);
     assert_eq!(offset_of!(HelloAck, session), 24);
     assert_eq!(offset_of!(HelloAck, position), 40);
-    assert_eq!(offset_of!(HelloAck, name), 552);
+    assert_eq!(offset_of!(HelloAck, name), 960);
 }

@@ -7,6 +7,25 @@ use realtime::{Following, JointLimits};
 use scheduling::RealTimeRequest;
 use thiserror::Error;
 
+/// When a command is done: the measured arm has arrived where the command ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// How far each joint may be from the end (rad, m).
+    pub tolerance: f64,
+    /// After this time the command is done with a warning.
+    pub patience: Duration,
+}
+
+impl Default for Arrival {
+    /// A milliradian, half a second.
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-3,
+            patience: Duration::from_millis(500),
+        }
+    }
+}
+
 /// What the real-time thread needs to know.
 #[derive(Clone, Debug)]
 pub struct ExecutorConfig<const N: usize> {
@@ -26,6 +45,12 @@ pub struct ExecutorConfig<const N: usize> {
     pub patience: Duration,
     /// How long to look for a driver at the start.
     pub connect: Duration,
+    /// How long the driver may take to get ready: brakes open, a program starts.
+    pub get_ready: Duration,
+    /// Gets what the driver waits for, each time that it changes.
+    pub on_wait: fn(&str),
+    /// When a command is done.
+    pub arrival: Arrival,
     /// [`ipc::model_hash`] of the robot; 0 is any.
     pub model: u64,
     /// What the thread asks of the operating system; nothing of it in lock-step.
@@ -53,6 +78,9 @@ impl<const N: usize> ExecutorConfig<N> {
             watchdog: Duration::from_millis(100),
             patience: Duration::from_millis(100),
             connect: Duration::from_secs(3),
+            get_ready: ipc::READY,
+            on_wait: |_| {},
+            arrival: Arrival::default(),
             model: 0,
             real_time: RealTimeRequest::default(),
             wait_for_planner: false,

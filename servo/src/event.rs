@@ -2,8 +2,36 @@
 
 use core::fmt;
 
-use ipc::{FaultCode, MessageError};
+use ipc::{FaultCode, MessageError, bytes_of, text_of};
 use realtime::{Sample, Trip};
+
+/// A short text that can be made in the period: UTF-8, filled up with 0.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct ShortText(pub [u8; 96]);
+
+impl ShortText {
+    /// A text; what is longer than 96 bytes is cut.
+    pub fn new(text: &str) -> Self {
+        Self(bytes_of(text))
+    }
+
+    /// Whether there is nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.0[0] == 0
+    }
+}
+
+impl fmt::Display for ShortText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&text_of(&self.0))
+    }
+}
+
+impl fmt::Debug for ShortText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", text_of(&self.0))
+    }
+}
 
 /// Why the arm was stopped. It latches until [`super::Remote::recover`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +52,15 @@ pub enum Fault {
         code: FaultCode,
         /// Which joint, from 0, if the fault is about one.
         joint: Option<u32>,
+        /// The number that the arm's maker gives the fault; 0 if there is none.
+        number: u32,
+        /// What the arm's maker says of it; may be empty.
+        text: ShortText,
+    },
+    /// The arm sent nothing to its driver for too long.
+    Unmeasured {
+        /// How long (ms).
+        silent_ms: u64,
     },
     /// An invalid state.
     BadState(MessageError),
@@ -40,7 +77,10 @@ pub enum Fault {
         timeout: bool,
     },
     /// A new session could not be opened.
-    NoSession,
+    NoSession {
+        /// Why.
+        reason: ShortText,
+    },
 }
 
 impl fmt::Display for Fault {
@@ -61,11 +101,27 @@ impl fmt::Display for Fault {
             }
             Self::DriverFault {
                 code,
-                joint: Some(joint),
+                joint,
+                number,
+                text,
             } => {
-                write!(f, "driver fault at joint {}: {}", joint + 1, code.reason())
+                f.write_str("driver fault")?;
+                if let Some(joint) = joint {
+                    write!(f, " at joint {}", joint + 1)?;
+                }
+                match text.is_empty() {
+                    true => write!(f, ": {}", code.reason())?,
+                    false if *code == FaultCode::Hardware => write!(f, ": {text}")?,
+                    false => write!(f, ": {}: {text}", code.reason())?,
+                }
+                if *number > 0 {
+                    write!(f, " (number {number})")?;
+                }
+                Ok(())
             }
-            Self::DriverFault { code, joint: None } => write!(f, "driver fault: {}", code.reason()),
+            Self::Unmeasured { silent_ms } => {
+                write!(f, "the arm sent nothing to its driver for {silent_ms} ms")
+            }
             Self::BadState(cause) => write!(f, "invalid state of the driver: {cause}"),
             Self::Stalled { late_ms } => write!(f, "the real-time thread was {late_ms} ms late"),
             Self::Tool { tool, timeout } => {
@@ -81,7 +137,7 @@ impl fmt::Display for Fault {
                     " failed"
                 })
             }
-            Self::NoSession => f.write_str("the driver opened no session"),
+            Self::NoSession { reason } => write!(f, "the driver opened no session: {reason}"),
         }
     }
 }
@@ -96,7 +152,26 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
-    /// A command ended at rest, or a tool did what it should.
+    /// The arm has not arrived at the end of a command within the patience; the command counts as
+    /// finished.
+    NotArrived {
+        /// Index of the command.
+        command: u32,
+        /// The joint that is furthest away, from 0.
+        joint: u32,
+        /// How far it is (rad, m).
+        error: f64,
+        /// The period.
+        tick: u64,
+    },
+    /// The arm asks for less speed, or no longer does.
+    SpeedAsked {
+        /// Share of the planned speed, 0..=1.
+        share: f64,
+        /// The period.
+        tick: u64,
+    },
+    /// A command ended at rest and the measured arm has arrived, or a tool did what it should.
     Finished {
         /// Index of the command.
         command: u32,

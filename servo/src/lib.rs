@@ -30,9 +30,9 @@ mod runner;
 mod segment_sender;
 mod thread;
 
-pub use config::{ExecutorConfig, ExecutorError};
+pub use config::{Arrival, ExecutorConfig, ExecutorError};
 pub use control::Control;
-pub use event::{Event, Fault, Recorded};
+pub use event::{Event, Fault, Recorded, ShortText};
 pub use handle::Executor;
 pub use histogram::Histogram;
 pub use monitor::Monitor;

@@ -30,6 +30,8 @@ pub struct Measured<const N: usize> {
     pub held: bool,
     /// Statuses of gripper and tool changer, as [`ipc::ToolStatus`] numbers.
     pub tools: [u32; 2],
+    /// Share of the planned speed that the arm asks for.
+    pub speed_asked: f64,
 }
 
 /// How many periods there were.
@@ -66,6 +68,7 @@ pub(super) struct Shared<const N: usize> {
     time_scaling: AtomicU64,
     flags: AtomicU32,
     tools: [AtomicU32; 2],
+    speed_asked: AtomicU64,
     pub(super) published: AtomicU64,
     pub(super) skipped: AtomicU64,
     pub(super) unsent: AtomicU64,
@@ -91,6 +94,7 @@ impl<const N: usize> Shared<N> {
             time_scaling: AtomicU64::new(0),
             flags: AtomicU32::new(0),
             tools: [AtomicU32::new(0), AtomicU32::new(0)],
+            speed_asked: AtomicU64::new(1.0_f64.to_bits()),
             published: AtomicU64::new(0),
             skipped: AtomicU64::new(0),
             unsent: AtomicU64::new(0),
@@ -144,6 +148,8 @@ impl<const N: usize> Shared<N> {
         store(&self.setpoint, &now.setpoint);
         self.time_scaling
             .store(now.time_scaling.to_bits(), Ordering::Relaxed);
+        self.speed_asked
+            .store(now.speed_asked.to_bits(), Ordering::Relaxed);
         let flags = [now.resting, now.idle, now.faulted];
         let bits = flags
             .iter()
@@ -183,6 +189,7 @@ impl<const N: usize> Shared<N> {
                     .tools
                     .each_ref()
                     .map(|tool| tool.load(Ordering::Relaxed)),
+                speed_asked: f64::from_bits(self.speed_asked.load(Ordering::Relaxed)),
             };
             core::sync::atomic::fence(Ordering::Acquire);
             if before.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == before {

@@ -1,14 +1,17 @@
 //! One period of the real-time thread, without a clock and without a channel.
 
+mod arrival;
 mod message;
+mod states;
 mod tools;
 
 use core::sync::atomic::Ordering;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
-use ipc::{DriverState, HelloAck, MAX_TOOLS, Setpoint, State, ToolCommand};
+use ipc::{HelloAck, MAX_TOOLS, Setpoint, State, ToolCommand};
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Following, Pushed, Sample, Step, StopCategory, check_following};
+use realtime::{Cycle, Demand, Pushed, Sample, Step, StopCategory};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::config::ExecutorConfig;
@@ -18,6 +21,7 @@ use super::orders::Asked;
 use super::remote::{Remote, Shared};
 use super::segment_sender::{Item, SegmentSender, ToolOrder, Work};
 
+use arrival::{Awaited, WAITING};
 use message::first;
 
 /// Number of planned segments in the cycle's buffer.
@@ -72,7 +76,13 @@ pub struct Runner<const N: usize> {
     sequence: u64,
     state: State,
     quiet: u64,
+    /// Periods since the driver knew where the arm is.
+    blind: u64,
     ready: bool,
+    /// What is reported when the measured arm has arrived, in order.
+    awaited: VecDeque<Awaited<N>>,
+    /// Whether the arm asks for less speed.
+    slowed: bool,
     asked: Asked,
     aborting: Option<StopCategory>,
     leaving: bool,
@@ -108,7 +118,10 @@ impl<const N: usize> Runner<N> {
             sequence: 0,
             state: State::default(),
             quiet: 0,
+            blind: 0,
             ready: false,
+            awaited: VecDeque::with_capacity(WAITING),
+            slowed: false,
             asked: shared.orders.asked(),
             aborting: None,
             leaving: false,
@@ -136,10 +149,10 @@ impl<const N: usize> Runner<N> {
         (runner, sender, Remote { shared }, monitor)
     }
 
-    /// Begins a session at the position that the driver measured; drops the plan and clears a
-    /// fault.
+    /// Begins a session at the position that the arm's controller commands; drops the plan and
+    /// clears a fault.
     pub fn open(&mut self, ack: &HelloAck) {
-        let position = first(&ack.position);
+        let position = first(&ack.commanded);
         self.cycle.reset(position);
         self.published = Sample::rest(position);
         self.session = ack.session;
@@ -148,8 +161,10 @@ impl<const N: usize> Runner<N> {
             position: ack.position,
             ..State::default()
         };
-        self.quiet = 0;
+        (self.quiet, self.blind) = (0, 0);
         self.ready = false;
+        self.slowed = false;
+        self.awaited.clear();
         self.fault = None;
         self.shared.orders.clear();
         self.tool = None;
@@ -211,7 +226,7 @@ impl<const N: usize> Runner<N> {
         }
         let held = self.asked.holds();
         let begun = self.ready || self.fault.is_some();
-        let at_rest = self.cycle.is_resting() && self.tool.is_none();
+        let at_rest = self.cycle.is_resting() && self.tool.is_none() && self.awaited.is_empty();
         let nothing_to_do = if held {
             self.stopped
         } else {
@@ -233,6 +248,8 @@ impl<const N: usize> Runner<N> {
     pub(super) fn latch(&mut self, fault: Fault) {
         if self.fault.is_none() {
             self.fault = Some(fault);
+            // The arm will not arrive.
+            self.awaited.clear();
             self.shared.orders.latch();
             self.epoch = self.shared.new_epoch();
             self.report(Event::Faulted {
@@ -251,6 +268,7 @@ impl<const N: usize> Runner<N> {
         self.obey();
         self.feed();
         self.move_on();
+        self.watch_arrival();
         self.watch_tool();
         self.tell_stopped();
         self.shared.published.fetch_add(1, Ordering::Relaxed);
@@ -259,64 +277,6 @@ impl<const N: usize> Runner<N> {
             .fetch_add(tick.skipped, Ordering::Relaxed);
         self.share_position();
         self.setpoint(tick)
-    }
-
-    /// Looks at what the driver says.
-    fn take_state(&mut self, state: Option<State>, tick: Tick) {
-        let fresh = state
-            .filter(|state| state.session == self.session && state.sequence > self.state.sequence);
-        let Some(state) = fresh else {
-            self.quiet += 1;
-            let silent = self.quiet as f64 * self.period;
-            if silent > self.config.patience.as_secs_f64() {
-                self.latch(Fault::DriverLost {
-                    silent_ms: (silent * 1e3) as u64,
-                });
-            }
-            return;
-        };
-        if let Err(cause) = state.check(N) {
-            self.latch(Fault::BadState(cause));
-            return;
-        }
-        self.quiet = 0;
-        self.state = state;
-        self.shared
-            .driver_missed
-            .store(state.missed, Ordering::Relaxed);
-        if tick.now_ns >= state.published_ns {
-            self.shared
-                .state_age
-                .count(tick.now_ns - state.published_ns);
-        }
-        match state.driver() {
-            DriverState::Stopping | DriverState::Fault => {
-                let joint = (state.fault_joint < N as u32).then_some(state.fault_joint);
-                self.latch(Fault::DriverFault {
-                    code: state.fault_code(),
-                    joint,
-                });
-            }
-            DriverState::Active => self.ready = true,
-            _ => {}
-        }
-        let measured = self.measured();
-        if self.ready
-            && self.fault.is_none()
-            && let Some(trip) = check_following(&self.published, &measured, self.following())
-        {
-            self.latch(Fault::Limit(trip));
-        }
-    }
-
-    /// How far the arm may be from the setpoint: more for a while after a stall, during which the
-    /// driver continued the motion.
-    fn following(&self) -> Following {
-        let allowed = self.config.following;
-        Following {
-            base: allowed.base + self.ahead,
-            ..allowed
-        }
     }
 
     /// Takes what the operator asked for.
@@ -336,6 +296,7 @@ impl<const N: usize> Runner<N> {
         if self.aborting.take().is_some() {
             self.cycle.flush();
             self.tool = None;
+            self.arrive_at_once();
             self.epoch = self.shared.new_epoch();
             self.report(Event::Aborted {
                 aborts: asked.aborts(),
@@ -363,7 +324,11 @@ impl<const N: usize> Runner<N> {
                             }
                         }
                     }
-                    Work::Tool(order) if self.tool.is_none() && self.cycle.is_idle() => {
+                    Work::Tool(order)
+                        if self.tool.is_none()
+                            && self.cycle.is_idle()
+                            && self.awaited.is_empty() =>
+                    {
                         self.start_tool(order)
                     }
                     _ => false,
@@ -386,6 +351,8 @@ impl<const N: usize> Runner<N> {
             (Demand::Run(_), None) if self.leaving || !self.ready => {
                 Demand::Stop(StopCategory::Gentle)
             }
+            // Along the path, so within the limits of the joints.
+            (Demand::Run(share), None) => Demand::Run(share * self.state.speed_scaling),
             (demand, None) => demand,
         }
     }
@@ -422,10 +389,10 @@ impl<const N: usize> Runner<N> {
     /// Reports what a step brought.
     fn tell(&mut self, made: &Step<N>, tick: u64) {
         if let Some(command) = made.finished {
-            self.report(Event::Finished { command, tick });
+            self.await_arrival(command);
         }
         if let Some(command) = made.started {
-            self.report(Event::Started { command, tick });
+            self.report_in_order(Event::Started { command, tick });
         }
         if let Some(trip) = made.trip {
             self.latch(Fault::Limit(trip));
@@ -466,6 +433,7 @@ impl<const N: usize> Runner<N> {
     /// Sends the last sample and the goodbye.
     pub(super) fn end(&mut self) {
         self.record();
+        self.arrive_at_once();
         self.report(Event::Ended { tick: self.tick });
     }
 

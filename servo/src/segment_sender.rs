@@ -21,6 +21,30 @@ pub struct ToolOrder {
     pub action: ToolAction,
     /// How long the tool may take (s).
     pub timeout: f64,
+    /// Wanted opening (m), of a move or of a close with a tolerance.
+    pub position: f64,
+    /// Fastest motion (m/s); 0 is the tool's own.
+    pub velocity: f64,
+    /// Largest force (N); 0 is the tool's own.
+    pub force: f64,
+    /// How far the opening may be from `position` with an object held (m); 0 is any.
+    pub tolerance: f64,
+}
+
+impl ToolOrder {
+    /// An order with the tool's own speed and force, which may take `timeout` (s).
+    pub fn new(command: u32, tool: usize, action: ToolAction, timeout: f64) -> Self {
+        Self {
+            command,
+            tool,
+            action,
+            timeout,
+            position: 0.0,
+            velocity: 0.0,
+            force: 0.0,
+            tolerance: 0.0,
+        }
+    }
 }
 
 /// What goes through the ring.

@@ -6,11 +6,13 @@ use std::sync::mpsc::SyncSender;
 use std::thread;
 use std::time::Instant;
 
-use ipc::{Clock, DriverState, EngineLink, Hello, Setpoint, SetpointFlags, State, text_of};
+use ipc::{
+    Clock, DriverState, EngineLink, Greeted, Hello, Setpoint, SetpointFlags, State, text_of,
+};
 use scheduling::{Granted, now_ns, request_real_time, sleep_until_ns};
 
 use super::config::{ExecutorConfig, ExecutorError};
-use super::event::Fault;
+use super::event::{Fault, ShortText};
 use super::remote::Shared;
 use super::runner::{Runner, Tick};
 
@@ -43,7 +45,14 @@ struct Loop<'a, const N: usize> {
     /// When period 0 began (ns).
     origin: u64,
     leaving: Option<Instant>,
+    /// Since when a driver that gets ready is asked for a new session, and when it is asked again.
+    asking: Option<[Instant; 2]>,
+    /// What the driver waits for.
+    waits: String,
 }
+
+/// Time between two requests for a new session.
+const AGAIN: Duration = Duration::from_millis(100);
 
 /// The thread. First reports whether it starts.
 pub(super) fn main<const N: usize>(
@@ -63,8 +72,10 @@ pub(super) fn main<const N: usize>(
                 tick: 0,
                 origin: 0,
                 leaving: None,
+                asking: None,
+                waits: String::new(),
             };
-            all.greet(config.connect).map(|driver| (all, driver))
+            all.greet().map(|driver| (all, driver))
         });
     let (mut all, driver) = match begun {
         Ok(begun) => begun,
@@ -94,34 +105,67 @@ pub(super) fn main<const N: usize>(
 }
 
 impl<const N: usize> Loop<'_, N> {
-    /// Opens a session; returns the driver's name.
-    fn greet(&mut self, timeout: Duration) -> Result<String, ExecutorError> {
+    fn hello(&self) -> Hello {
         let config = self.config;
         let watchdog = config.watchdog.as_nanos() as u64;
-        let hello = Hello {
+        Hello {
             model: config.model,
             ..Hello::new(N, config.period_ns(), watchdog, config.clock)
-        };
-        let ack = self.link.greet(&hello, timeout)?;
+        }
+    }
+
+    /// Opens the first session; returns the driver's name.
+    fn greet(&mut self) -> Result<String, ExecutorError> {
+        let (hello, patience) = (self.hello(), self.config.get_ready);
+        let (on_wait, mut waits) = (self.config.on_wait, String::new());
+        let times = [self.config.connect, patience];
+        let ack = self.link.greet(&hello, times, |reason| {
+            if reason != waits {
+                reason.clone_into(&mut waits);
+                on_wait(reason);
+            }
+        })?;
         self.runner.open(&ack);
         Ok(text_of(&ack.name))
     }
 
-    /// Opens a new session if the operator asked for one.
+    /// Opens a new session if the operator asked for one. A driver that gets ready is asked again,
+    /// between periods in which nothing moves.
     fn recover(&mut self) {
         if !self.runner.wants_session() {
+            self.asking = None;
             return;
         }
-        if self
-            .greet(self.config.connect.min(Duration::from_secs(1)))
-            .is_ok()
-        {
-            self.runner.recovered();
-        } else {
-            self.runner.fail(Fault::NoSession);
+        let now = Instant::now();
+        let [since, next] = self.asking.unwrap_or([now; 2]);
+        if now < next {
+            return;
+        }
+        let timeout = self.config.connect.min(Duration::from_secs(1));
+        self.asking = None;
+        match self.link.ask(&self.hello(), timeout) {
+            Ok(Greeted::Welcome(ack)) => {
+                self.runner.open(&ack);
+                self.runner.recovered();
+                self.waits.clear();
+            }
+            Ok(Greeted::Waits { reason, .. }) if since.elapsed() < self.config.get_ready => {
+                self.asking = Some([since, Instant::now() + AGAIN]);
+                if reason != self.waits {
+                    (self.config.on_wait)(&reason);
+                    self.waits = reason;
+                }
+            }
+            Ok(Greeted::Waits { reason, .. }) => self.no_session(&reason),
+            Err(error) => self.no_session(&error.to_string()),
         }
         // The handshake took time; the periods start again instead of being late.
         self.origin = now_ns().saturating_sub(self.tick * self.config.period_ns());
+    }
+
+    fn no_session(&mut self, reason: &str) {
+        let reason = ShortText::new(reason);
+        self.runner.fail(Fault::NoSession { reason });
     }
 
     /// Whether the thread should end now: it was asked to before this period, and the arm rests.

@@ -69,8 +69,8 @@ fn a_slow_reader_holds_nobody_up() {
 #[test]
 fn another_protocol_is_refused() {
     for (kind, words) in [
-        ("old-answer", "protocol 7, expected 1"),
-        ("old-refusal", "protocol 1, expected 7"),
+        ("old-answer", "protocol 7, expected 2"),
+        ("old-refusal", "protocol 2, expected 7"),
     ] {
         let scene = Scene::new(kind);
         let _driver = scene.hostile(kind);

@@ -39,12 +39,7 @@ fn run(name: &str, commands: u32) -> Run {
         for index in 0..commands {
             assert!(feed(&mut sender, index));
             if index == 0 {
-                let order = ToolOrder {
-                    command: 1000,
-                    tool: GRIPPER,
-                    action: ToolAction::Close,
-                    timeout: 1.0,
-                };
+                let order = ToolOrder::new(1000, GRIPPER, ToolAction::Close, 1.0);
                 sender.tool(order).unwrap();
             }
         }

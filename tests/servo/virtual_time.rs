@@ -1,5 +1,6 @@
 //! The work of the real-time thread on a virtual clock, with an ideal driver: all times are exact.
 
+mod arms;
 mod orders;
 
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
@@ -20,12 +21,19 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::arriving(1e-3)
+    }
+
+    /// The same with another tolerance of arriving (rad).
+    fn arriving(tolerance: f64) -> Self {
         let mut config = executor_config(system_tests::domain::arm("virtual/arm"), Clock::Wall);
+        config.arrival.tolerance = tolerance;
         config.record = false;
         let (mut runner, sender, remote, monitor) = Runner::new(config);
         let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
         ack.session = 1;
         ack.position[..JOINTS].copy_from_slice(home().as_slice());
+        ack.commanded = ack.position;
         runner.open(&ack);
         let mut state = State {
             joints: JOINTS as u32,

@@ -6,8 +6,8 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use driver_kit::{About, Measured, Reference, Robot};
-use ipc::{ToolAction, ToolFeedback};
+use driver_kit::{About, Command, Measured, Measurement, Reference, Robot};
+use ipc::{ToolCommand, ToolFeedback};
 
 /// How many numbers a witness writes.
 const WORDS: usize = 6;
@@ -157,11 +157,12 @@ impl<R: Robot> Robot for Witness<R> {
         self.about.clone()
     }
 
-    fn measure(&mut self, joints: &mut [Measured]) {
-        self.robot.measure(joints);
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
+        self.robot.measure(joints)
     }
 
-    fn follow(&mut self, joints: &[Reference], period: f64) {
+    fn follow(&mut self, command: &Command<'_>) {
+        let (joints, period) = (command.joints, command.period);
         let found = joints
             .iter()
             .enumerate()
@@ -172,11 +173,11 @@ impl<R: Robot> Robot for Witness<R> {
             self.write();
         }
         self.last.copy_from_slice(joints);
-        self.robot.follow(joints, period);
+        self.robot.follow(command);
     }
 
-    fn act(&mut self, tool: usize, action: ToolAction) {
-        self.robot.act(tool, action);
+    fn act(&mut self, tool: usize, order: &ToolCommand) {
+        self.robot.act(tool, order);
     }
 
     fn tool(&self, tool: usize) -> ToolFeedback {

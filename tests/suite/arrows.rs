@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 19] = [
+const ARROWS: [(&str, &[&str]); 20] = [
     (
         "cli",
         &[
@@ -26,6 +26,7 @@ const ARROWS: [(&str, &[&str]); 19] = [
             "view",
             "scheduling",
             "driver-sim",
+            "driver-franka",
             "driver-conformance",
         ],
     ),
@@ -53,6 +54,7 @@ const ARROWS: [(&str, &[&str]); 19] = [
     ("trajectory", &["realtime", "simd"]),
     ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-franka", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
     ("kinematics", &["simd"]),
@@ -76,7 +78,7 @@ const FENCES: [(&str, &[&str]); 12] = [
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
-    ("rtrb", &["servo"]),
+    ("rtrb", &["servo", "driver-franka"]),
     ("libc", &["ipc", "scheduling"]),
 ];
 

@@ -56,19 +56,22 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
     let link = EngineLink::open(arm)?;
     let joints = link.joints(Duration::from_secs(3))?;
     let hello = Hello::new(joints, PERIOD, WATCHDOG, Clock::Wall);
-    let ack = link.greet(&hello, Duration::from_secs(3))?;
+    let ack = link.greet(&hello, [Duration::from_secs(3), ipc::READY], |_| {})?;
     let mut player = Player::new(link, hello, ack);
     let mut clauses = vec![judge(
         "handshake",
         Ok(format!("session {:#x}", player.ack.session)),
     )];
-    let requests: [(&str, fn(&mut Hello)); 4] = [
+    let requests: [(&str, fn(&mut Hello)); 5] = [
         ("wrong protocol is refused", |hello| hello.protocol += 1),
+        ("protocol 1 is refused", |hello| hello.protocol = 1),
         ("wrong layout is refused", |hello| hello.schema ^= 1),
         ("wrong joint count is refused", |hello| hello.joints += 1),
         ("wrong period is refused", |hello| hello.period_ns = 1),
     ];
     clauses.extend(requests.map(|(name, change)| judge(name, player.refuses(change))));
+    let period = player.refuses_period();
+    clauses.push(judge("a period beyond its longest is refused", period));
     let driver = text_of(&player.ack.name);
     clauses.extend(CLAUSES.map(|(name, clause)| judge(name, player.attempt(clause))));
     Ok(ConformanceReport {

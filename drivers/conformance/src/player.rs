@@ -62,11 +62,28 @@ impl Player {
     pub(crate) fn refuses(&self, change: impl Fn(&mut Hello)) -> Seen {
         let mut hello = self.hello;
         change(&mut hello);
-        match self.link.greet(&hello, Duration::from_secs(2)) {
+        match self.link.ask(&hello, Duration::from_secs(2)) {
             Err(IpcError::Refused { reason, .. }) => Ok(reason),
             Err(other) => Err(other.to_string()),
             Ok(_) => Err("it opened a session".to_owned()),
         }
+    }
+
+    /// Whether it refuses a period that it says it cannot serve.
+    pub(crate) fn refuses_period(&self) -> Seen {
+        let [least, most] = self.ack.periods_ns;
+        if least == 0 || least > most || most > 1_000_000_000 {
+            return Err(format!("it says it serves periods of {least} to {most} ns"));
+        }
+        if most > 500_000_000 {
+            return Ok(format!(
+                "{NOT_TRIED}it serves periods of {least} to {most} ns"
+            ));
+        }
+        self.refuses(|hello| {
+            hello.period_ns = 2 * most;
+            hello.watchdog_ns = 4 * most;
+        })
     }
 
     /// Runs a clause; one that fails is tried again, because a machine that stalls for longer than
@@ -84,8 +101,9 @@ impl Player {
     /// Opens a new session, then runs a clause.
     fn reopen(&mut self, clause: Trial) -> Seen {
         let end = Instant::now() + Duration::from_secs(4);
+        let times = [Duration::from_secs(1), ipc::READY];
         self.ack = loop {
-            match self.link.greet(&self.hello, Duration::from_secs(1)) {
+            match self.link.greet(&self.hello, times, |_| {}) {
                 Ok(ack) => break ack,
                 // It may still be stopping.
                 Err(_) if Instant::now() < end => std::thread::sleep(Duration::from_millis(50)),
@@ -112,7 +130,7 @@ impl Player {
             period_ns: PERIOD,
             watchdog_ns: WATCHDOG,
             valid: u32::MAX >> (32 - self.hello.joints),
-            position: self.ack.position,
+            position: self.ack.commanded,
             ..Setpoint::default()
         };
         for joint in 0..self.joints() {

@@ -1,8 +1,11 @@
 //! A driver for your own robot: fill in the places marked HERE. Start it, then run a program:
 //!     cargo run --release -p driver-kit --example template -- cell/arm
 //!     canter run PROGRAM --robot ur5e --driver external --arm cell/arm
-use driver_kit::{About, DriverError, Measured, Reference, Robot, RunOptions, asked_to_end, run};
-use ipc::{GRIPPER, ToolAction, ToolStatus};
+use driver_kit::{
+    About, Command, DriverError, Measured, Measurement, Reference, Robot, RunOptions, asked_to_end,
+    run,
+};
+use ipc::{GRIPPER, ToolAction, ToolCommand, ToolStatus};
 
 /// Six ideal joints that reach each setpoint at once.
 struct MyRobot([Measured; 6], ToolStatus);
@@ -22,19 +25,24 @@ impl Robot for MyRobot {
         }
     }
 
-    fn measure(&mut self, joints: &mut [Measured]) {
-        // HERE: read the joint positions and velocities from the hardware.
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
+        // HERE: copy the last joint positions and velocities of the hardware; say when they were
+        // measured, or that they are unknown.
         joints.copy_from_slice(&self.0);
+        Measurement::Now
     }
 
-    fn follow(&mut self, joints: &[Reference], _period: f64) {
-        // HERE: send the reference to the hardware; use velocity and acceleration as feed-forward.
-        self.0 = core::array::from_fn(|joint| joints[joint].into());
+    fn follow(&mut self, command: &Command<'_>) {
+        // HERE: send the references to the hardware; use velocity and acceleration as feed-forward.
+        // `command.at_ns` says when the joints shall be there.
+        self.0 = core::array::from_fn(|joint| command.joints[joint].into());
     }
 
-    fn act(&mut self, _tool: usize, action: ToolAction) {
+    // HERE: `begin` switches on and `fault` names faults, where the hardware has them; see `Robot`.
+
+    fn act(&mut self, _tool: usize, order: &ToolCommand) {
         // HERE: begin to open or close; `tool_status` reports when it is done.
-        let open = action == ToolAction::Open;
+        let open = order.action == ToolAction::Open as u32;
         self.1 = [ToolStatus::Closed, ToolStatus::Open][usize::from(open)];
     }
 

@@ -1,10 +1,12 @@
 //! The driver's side of the protocol, without a clock and without a channel.
 
-use ipc::{Clock, DriverState, FaultCode, MAX_TOOLS, Setpoint, SetpointFlags, State, ToolAction};
+use std::collections::VecDeque;
 
-use crate::{About, DriverError, Limiter, Measured, Reference, Robot};
+use ipc::{Clock, DriverState, FaultCode, MAX_TOOLS, Setpoint, SetpointFlags, State};
 
-/// How far the first setpoint of a session may be from the measured position (rad).
+use crate::{About, DriverError, Limiter, Measured, Measurement, Outputs, Reference, Robot};
+
+/// How far the first setpoint of a session may be from the commanded position (rad).
 const FIRST: f64 = 1e-3;
 
 /// Tolerance of a setpoint's position beyond what speed and time allow (rad).
@@ -13,6 +15,12 @@ const ROOM: f64 = 2e-3;
 /// Largest velocity and acceleration of a setpoint, as a multiple of the joint's limit: tolerance
 /// for rounding.
 const MARGIN: f64 = 1.001;
+
+/// How many setpoints wait for their period at most: as many as the channel holds.
+pub(crate) const WAITING: usize = 16;
+
+/// How long a robot that is getting ready waits for the next request of its engine (ns).
+const BEGINNING: u64 = 2_000_000_000;
 
 /// What an engine and the driver agreed on.
 #[derive(Clone, Debug)]
@@ -31,27 +39,45 @@ pub(crate) struct Session {
 pub struct Driver<R> {
     pub(crate) robot: R,
     pub(crate) about: About,
-    limiters: Vec<Limiter>,
+    pub(crate) limiters: Vec<Limiter>,
     pub(crate) state: DriverState,
     pub(crate) fault: FaultCode,
     pub(crate) fault_joint: u32,
+    /// The maker's number and name of the fault.
+    pub(crate) fault_code: u32,
+    pub(crate) fault_text: [u8; 96],
+    /// The arm does not follow any more: the references follow the arm.
+    pub(crate) lost: bool,
+    /// When the robot was asked to get ready; none if it was not, or has ended.
+    pub(crate) begun_ns: Option<u64>,
     pub(crate) session: Option<Session>,
     pub(crate) sessions: u64,
     pub(crate) leaving: bool,
     pub(crate) measured: Vec<Measured>,
+    pub(crate) measurement: Measurement,
+    /// What the arm's controller commands (rad), and whether it says so.
+    pub(crate) commanded: Vec<f64>,
+    pub(crate) says_commanded: bool,
     /// What the robot follows.
     pub(crate) references: Vec<Reference>,
     /// The newest setpoint, extrapolated to the present time.
     pub(crate) targets: Vec<Reference>,
+    /// Feed-forward efforts (N m).
+    pub(crate) efforts: Vec<f64>,
+    /// The time of the last reference (ns).
+    pub(crate) at_ns: u64,
     pub(crate) orders: [u32; MAX_TOOLS],
+    pub(crate) payload: u32,
+    pub(crate) outputs: Outputs,
     pub(crate) last: Setpoint,
-    pub(crate) fresh: bool,
+    /// Setpoints that came since the last period.
+    pub(crate) waiting: VecDeque<Setpoint>,
     pub(crate) received_ns: u64,
     /// When the newest setpoint was sent, by its own time stamp.
     pub(crate) newest_ns: u64,
     /// When the last period was; 0 before the first of a session.
     pub(crate) stepped_ns: u64,
-    sequence: u64,
+    pub(crate) sequence: u64,
     pub(crate) missed: u64,
     missed_ever: u64,
     reported: State,
@@ -66,12 +92,26 @@ impl<R: Robot> Driver<R> {
         let about = robot.about();
         about.check()?;
         let mut measured = vec![Measured::default(); about.joints()];
-        robot.measure(&mut measured);
+        let measurement = robot.measure(&mut measured);
         let at: Vec<Reference> = measured
             .iter()
             .map(|joint| Reference::rest(joint.position))
             .collect();
+        let mut commanded: Vec<f64> = measured.iter().map(|joint| joint.position).collect();
+        let says_commanded = robot.commanded(&mut commanded);
         Ok(Self {
+            measurement,
+            commanded,
+            says_commanded,
+            efforts: vec![0.0; about.joints()],
+            at_ns: 0,
+            payload: 0,
+            outputs: Outputs::default(),
+            fault_code: 0,
+            fault_text: [0; 96],
+            lost: false,
+            begun_ns: None,
+            waiting: VecDeque::with_capacity(WAITING),
             limiters: about.limiters(),
             state: DriverState::Disconnected,
             fault: FaultCode::None,
@@ -83,7 +123,6 @@ impl<R: Robot> Driver<R> {
             targets: at,
             orders: [0; MAX_TOOLS],
             last: Setpoint::default(),
-            fresh: false,
             received_ns: 0,
             newest_ns: 0,
             stepped_ns: 0,
@@ -100,6 +139,11 @@ impl<R: Robot> Driver<R> {
     /// The robot.
     pub fn robot(&self) -> &R {
         &self.robot
+    }
+
+    /// Changes the robot, for tests of drivers.
+    pub fn change_robot(&mut self, change: impl FnOnce(&mut R)) {
+        change(&mut self.robot);
     }
 
     /// Where the driver is in its life.
@@ -212,13 +256,17 @@ impl<R: Robot> Driver<R> {
         if setpoint.flags & SetpointFlags::GOODBYE != 0 {
             self.state = DriverState::Disconnected;
             self.session = None;
+            self.close();
             return;
         }
         self.state = match self.state {
             DriverState::Synced => DriverState::Armed,
             _ => DriverState::Active,
         };
-        self.fresh = true;
+        if self.waiting.len() == WAITING {
+            self.waiting.pop_front();
+        }
+        self.waiting.push_back(*setpoint);
     }
 
     /// Answers a sign of life: in lock-step, a setpoint that repeats the last period. Nothing
@@ -249,7 +297,7 @@ impl<R: Robot> Driver<R> {
             let force = self.about.acceleration[joint] * MARGIN;
             // A late setpoint continues the last one, not the extrapolation meanwhile.
             let before = if first {
-                self.measured[joint].position
+                self.commanded[joint]
             } else {
                 self.last.position[joint]
             };
@@ -268,6 +316,13 @@ impl<R: Robot> Driver<R> {
         self.state = DriverState::Stopping;
     }
 
+    /// The robot need not be ready any more.
+    pub(crate) fn close(&mut self) {
+        if self.begun_ns.take().is_some() {
+            self.robot.end();
+        }
+    }
+
     /// Begins to end the driver: an open session ends with [`FaultCode::Ended`], the arm stops
     /// within its limits, and no new session is opened. Returns whether the arm moves.
     pub fn leave(&mut self) -> bool {
@@ -283,7 +338,7 @@ impl<R: Robot> Driver<R> {
         self.references.iter().all(Reference::rests)
     }
 
-    fn is_following(&self) -> bool {
+    pub(crate) fn is_following(&self) -> bool {
         matches!(self.state, DriverState::Armed | DriverState::Active)
     }
 
@@ -301,37 +356,24 @@ impl<R: Robot> Driver<R> {
     /// One period of `period_ns` that ends at `now_ns`: measures, chooses the reference, has the
     /// robot follow it, and returns the state to send.
     pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
-        let period = period_ns as f64 * 1e-9;
-        self.robot.measure(&mut self.measured);
+        self.measurement = self.robot.measure(&mut self.measured);
+        for (commanded, measured) in self.commanded.iter_mut().zip(&self.measured) {
+            *commanded = measured.position;
+        }
+        self.says_commanded = self.robot.commanded(&mut self.commanded);
         self.watch(now_ns);
         self.stepped_ns = now_ns;
         let state = self.report(now_ns);
         self.reported = state;
-        self.refer(period);
         self.give_orders();
-        self.robot.follow(&self.references, period);
+        self.refer(now_ns, period_ns);
         state
-    }
-
-    /// Passes on the orders to tools that are new.
-    fn give_orders(&mut self) {
-        for (tool, order) in self.last.tools.iter().enumerate() {
-            if order.order == self.orders[tool] {
-                continue;
-            }
-            self.orders[tool] = order.order;
-            match ToolAction::from_number(order.action) {
-                None | Some(ToolAction::None) => {}
-                Some(action) => self.robot.act(tool, action),
-            }
-        }
     }
 
     /// The watchdog, and the end of a stop.
     fn watch(&mut self, now_ns: u64) {
-        if let Some(joint) = self.robot.fault().filter(|_| self.is_following()) {
-            self.stop(FaultCode::Hardware, joint);
-        } else if self.has_stalled(now_ns) {
+        self.watch_robot(now_ns);
+        if self.has_stalled(now_ns) {
             self.stop(FaultCode::Stalled, u32::MAX);
         }
         let Some(session) = &self.session else { return };
@@ -339,7 +381,7 @@ impl<R: Robot> Driver<R> {
         let silence = now_ns.saturating_sub(self.newest_ns);
         match self.state {
             DriverState::Armed | DriverState::Active => {
-                if !self.fresh {
+                if self.waiting.is_empty() {
                     self.missed += 1;
                     self.missed_ever += 1;
                 }
@@ -352,69 +394,26 @@ impl<R: Robot> Driver<R> {
             }
             DriverState::Stopping if self.is_resting() => {
                 self.state = DriverState::Fault;
+                self.close();
             }
             _ => {}
         }
     }
 
-    /// The reference of the joints in this period: the setpoint, its extrapolation, or a stop;
-    /// always within the limits of the joints.
-    fn refer(&mut self, period: f64) {
-        let fresh = std::mem::take(&mut self.fresh);
-        let setpoint = &self.last;
-        let following = self.is_following();
-        let stopping = matches!(
-            self.state,
-            DriverState::Stopping | DriverState::Disconnected
-        );
-        let joints = self.references.iter_mut().zip(&mut self.targets);
-        for (joint, (limiter, (reference, target))) in self.limiters.iter().zip(joints).enumerate()
-        {
-            if following {
-                *target = if fresh {
-                    Reference {
-                        position: setpoint.position[joint],
-                        velocity: setpoint.velocity[joint],
-                        acceleration: setpoint.acceleration[joint],
-                    }
-                } else {
-                    limiter.go_on(target, period)
-                };
-                *reference = limiter.approach(reference, target, period);
-            } else if stopping {
-                *reference = limiter.stop(reference, period);
-            } else {
-                *reference = Reference::rest(reference.position);
+    /// A fault of the robot, and a robot that gets ready for nobody.
+    fn watch_robot(&mut self, now_ns: u64) {
+        let moves = self.state != DriverState::Fault && self.session.is_some();
+        if let Some(fault) = self.robot.fault().filter(|_| moves && !self.lost) {
+            self.lost = true;
+            if self.state != DriverState::Stopping {
+                self.stop(FaultCode::Hardware, fault.joint);
             }
+            (self.fault_code, self.fault_text) = (fault.code, fault.text);
         }
-    }
-
-    fn report(&mut self, now_ns: u64) -> State {
-        self.sequence += 1;
-        let mut state = State {
-            joints: self.joints() as u32,
-            session: self.session.as_ref().map_or(0, |session| session.number),
-            sequence: self.sequence,
-            measured_ns: now_ns,
-            published_ns: now_ns,
-            setpoint_sequence: self.last.sequence,
-            setpoint_published_ns: self.last.published_ns,
-            setpoint_received_ns: self.received_ns,
-            driver_state: self.state as u32,
-            fault: self.fault as u32,
-            fault_joint: self.fault_joint,
-            missed: self.missed,
-            ..State::default()
-        };
-        for (joint, measured) in self.measured.iter().enumerate() {
-            state.position[joint] = measured.position;
-            state.velocity[joint] = measured.velocity;
-            state.effort[joint] = measured.effort;
+        let waits = self.session.is_none() || self.state == DriverState::Fault;
+        let asked = self.begun_ns.filter(|_| waits);
+        if asked.is_some_and(|asked| now_ns.saturating_sub(asked) > BEGINNING) {
+            self.close();
         }
-        for (tool, feedback) in state.tools.iter_mut().enumerate() {
-            *feedback = self.robot.tool(tool);
-            feedback.order = self.orders[tool];
-        }
-        state
     }
 }

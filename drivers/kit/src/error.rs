@@ -42,6 +42,12 @@ pub enum DriverError {
         /// What the operating system said.
         cause: String,
     },
+    /// A thread of the driver cannot be started.
+    #[error("cannot start a thread: {cause}")]
+    Thread {
+        /// What the operating system said.
+        cause: String,
+    },
     /// Signals cannot be received.
     #[error("cannot receive signals: {cause}")]
     Signals {

@@ -13,20 +13,28 @@
 //!
 //! This crate never plans, and knows no kinematics.
 
+mod command;
 mod driver;
 mod error;
 mod greeting;
 mod limiter;
 mod log;
+mod measured;
 mod process;
 mod ramp;
 mod reference;
+mod references;
+mod report;
+mod resampler;
 mod robot;
 
+pub use command::Command;
 pub use driver::Driver;
 pub use error::DriverError;
 use limiter::Limiter;
+pub use measured::{Inputs, Measured, Measurement, Outputs, RobotFault, Sensors};
 pub use process::{DriverReport, RunOptions, asked_to_end, run};
 use ramp::Ramp;
 pub use reference::Reference;
-pub use robot::{About, Measured, Robot};
+pub use resampler::{Resampler, ResamplerOptions};
+pub use robot::{About, Readiness, Robot};

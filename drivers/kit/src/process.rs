@@ -93,9 +93,19 @@ pub fn run<R: Robot>(
 ) -> Result<DriverReport, DriverError> {
     let real_time = options.real_time;
     let link = DriverLink::open(arm)?;
+    // Before the first session: with much memory it takes some tenths of a second.
+    let locked = request_real_time(RealTimeRequest {
+        priority: 0,
+        processor: None,
+        low_latency: false,
+        ..real_time
+    });
     let mut log = Log::open(options.log.as_deref())?;
     let mut driver = Driver::new(robot)?;
-    let mut report = DriverReport::default();
+    let mut report = DriverReport {
+        warning: locked.warning(),
+        ..DriverReport::default()
+    };
     // In lock-step the driver may spin, which a real-time thread must not do.
     let mut granted = None;
     while !stop.load(Ordering::Relaxed) {
@@ -105,7 +115,11 @@ pub fn run<R: Robot>(
             }
             _ => {
                 if driver.clock().is_some() && granted.is_none() {
-                    let given = request_real_time(real_time);
+                    let mut given = request_real_time(RealTimeRequest {
+                        lock_memory: false,
+                        ..real_time
+                    });
+                    given.refused.splice(0..0, locked.refused.iter().cloned());
                     report.warning = given.warning();
                     granted = Some(given);
                 }
@@ -145,6 +159,7 @@ fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Op
             wall_period(link, driver, log);
         }
     }
+    driver.close();
     moves.then(|| {
         format!(
             "told to end while the arm moved: braked to rest within the joint limits in {} ms",

@@ -1,11 +1,13 @@
 //! The interface of a robot.
 
-use ipc::{MAX_JOINTS, ToolAction, ToolFeedback, ToolStatus};
+use ipc::{MAX_JOINTS, Payload, ToolCommand, ToolFeedback, ToolStatus};
 
-use crate::{DriverError, Limiter, Reference};
+use crate::{
+    Command, DriverError, Inputs, Limiter, Measured, Measurement, Outputs, RobotFault, Sensors,
+};
 
 /// Description of a robot. Lists have one value per joint, root first.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct About {
     /// The driver's name.
     pub name: String,
@@ -23,6 +25,37 @@ pub struct About {
     /// Largest jerks (rad/s³), also of the driver's own stop; the reference that follows setpoints
     /// keeps them.
     pub jerk: Vec<f64>,
+    /// Whether it can be driven in lock-step: simulations can, a real arm cannot.
+    pub lock_step: bool,
+    /// The shortest and the longest period that it can serve (ns).
+    pub periods_ns: [u64; 2],
+    /// Whether the arm's controller has a clock of its own and reads the references at its own
+    /// times: then each period has its reference, also those that the driver slept through.
+    pub own_clock: bool,
+    /// Whether it is a real arm or a maker's controller, and not a simulation of ours.
+    pub real: bool,
+    /// How late the arm is behind the setpoints, by the driver's own delay (ns).
+    pub delay_ns: u64,
+}
+
+impl Default for About {
+    /// No joints; every clock and period.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            model: 0,
+            lower: Vec::new(),
+            upper: Vec::new(),
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+            jerk: Vec::new(),
+            lock_step: true,
+            periods_ns: [100_000, 1_000_000_000],
+            own_clock: false,
+            real: false,
+            delay_ns: 0,
+        }
+    }
 }
 
 impl About {
@@ -78,42 +111,54 @@ impl About {
     }
 }
 
-/// How one joint is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
-    /// Position (rad).
-    pub position: f64,
-    /// Velocity (rad/s).
-    pub velocity: f64,
-    /// Effort (N m).
-    pub effort: f64,
-}
-
-impl From<Reference> for Measured {
-    /// A joint that is exactly where it shall be.
-    fn from(reference: Reference) -> Self {
-        Self {
-            position: reference.position,
-            velocity: reference.velocity,
-            effort: 0.0,
-        }
-    }
+/// Whether an arm can be moved now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Readiness {
+    /// It follows from now on.
+    Ready,
+    /// It is getting ready: what it waits for, in a few words. The kit asks again.
+    Wait(String),
+    /// It cannot be moved: the reason, and what the operator must do.
+    NotReady(String),
 }
 
 /// A robot that can be driven. In every period it is measured once, and then gets a reference to
-/// follow.
+/// follow. No function may wait: what takes time is begun here and done in a thread of the robot's
+/// own.
 pub trait Robot {
     /// What the robot is like; asked once.
     fn about(&self) -> About;
 
-    /// The present state of the joints, one entry per joint.
-    fn measure(&mut self, joints: &mut [Measured]);
+    /// An engine wants to move the arm: switch on, open brakes, clear errors. It is the operator's
+    /// word: an engine asks at its start and after `canter recover`. Asked again and again until
+    /// the answer is not [`Readiness::Wait`], and again where a session follows another.
+    fn begin(&mut self) -> Readiness {
+        Readiness::Ready
+    }
 
-    /// Follow this for `period` (s), one entry per joint.
-    fn follow(&mut self, joints: &[Reference], period: f64);
+    /// No engine moves the arm any more: what [`Robot::begin`] began is ended.
+    fn end(&mut self) {}
 
-    /// Begin an action of a tool: [`ipc::GRIPPER`] or [`ipc::TOOL_CHANGER`].
-    fn act(&mut self, _tool: usize, _action: ToolAction) {}
+    /// The last known state of the joints, one entry per joint, and when it was measured.
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement;
+
+    /// What the arm's own controller commands now (rad), one entry per joint; returns whether it
+    /// says so. A motion must begin exactly there.
+    fn commanded(&self, _joints: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Follow this.
+    fn follow(&mut self, command: &Command<'_>);
+
+    /// Share of the planned speed that the arm asks for, 0..=1: the engine slows down along the
+    /// path.
+    fn speed_scaling(&self) -> f64 {
+        1.0
+    }
+
+    /// Begin an order to a tool: [`ipc::GRIPPER`] or [`ipc::TOOL_CHANGER`].
+    fn act(&mut self, _tool: usize, _order: &ToolCommand) {}
 
     /// Status of a tool; by default there is none.
     fn tool_status(&self, _tool: usize) -> ToolStatus {
@@ -128,8 +173,23 @@ pub trait Robot {
         }
     }
 
-    /// A fault of the hardware, with the joint from 0 or `u32::MAX`: the driver stops and latches.
-    fn fault(&self) -> Option<u32> {
+    /// The arm carries something else now.
+    fn carry(&mut self, _payload: &Payload) {}
+
+    /// Set outputs; called when one changes.
+    fn set_outputs(&mut self, _outputs: &Outputs) {}
+
+    /// The present inputs.
+    fn inputs(&self) -> Inputs {
+        Inputs::default()
+    }
+
+    /// The present values of sensors: force, torque, distance.
+    fn sensors(&self, _sensors: &mut Sensors) {}
+
+    /// A fault of the hardware, as long as it lasts: the driver stops and latches, and the
+    /// references follow the measured arm.
+    fn fault(&self) -> Option<RobotFault> {
         None
     }
 }

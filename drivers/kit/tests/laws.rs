@@ -2,7 +2,7 @@
 //! each joint keeps its limits of range, speed, acceleration and jerk in every period.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use driver_kit::{About, Driver, Measured, Reference, Robot};
+use driver_kit::{About, Command, Driver, Measured, Measurement, Reference, Robot};
 use ipc::{Clock, DriverState, FaultCode, Hello, Setpoint, State, Verdict};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -31,12 +31,13 @@ impl Robot for Strict {
         }
     }
 
-    fn measure(&mut self, joints: &mut [Measured]) {
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
         joints[0] = self.0.into();
+        Measurement::Now
     }
 
-    fn follow(&mut self, joints: &[Reference], period: f64) {
-        let (before, now) = (self.0, joints[0]);
+    fn follow(&mut self, command: &Command<'_>) {
+        let (before, now, period) = (self.0, command.joints[0], command.period);
         let change = (now.acceleration - before.acceleration).abs();
         let trapezium = (now.velocity + before.velocity) / 2.0 * period;
         let off = (now.position - before.position - trapezium).abs();

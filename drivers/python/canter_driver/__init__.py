@@ -13,7 +13,7 @@ import time
 from . import messages as m
 from .driver import Driver
 
-__all__ = ["Robot", "run"]
+__all__ = ["READY", "Robot", "not_ready", "run", "wait"]
 
 # How many times lock-step polls for a setpoint before it sleeps between polls, and how long it
 # waits until the engine counts as gone.
@@ -36,20 +36,83 @@ class Robot:
     acceleration = []
     jerk = []
 
+    # Whether it can be driven in lock-step (simulations can, a real arm cannot), the shortest and
+    # longest period that it can serve (s), and whether it is a real arm.
+    lock_step = True
+    periods = 1e-4, 1.0
+    real = False
+
+    def begin(self):
+        """An engine wants to move the arm: switch on, open brakes, clear errors. Asked again and
+        again until the answer is `READY` or `not_ready(reason)`; `wait(reason)` asks for time."""
+        return READY
+
+    def end(self):
+        """No engine moves the arm any more."""
+
     def measure(self):
-        """Returns the present positions and velocities."""
+        """Returns the last known positions and velocities."""
         raise NotImplementedError
 
-    def move(self, position, velocity, acceleration, period):
-        """Follow this for `period` seconds."""
+    def measured_ns(self):
+        """When they were measured (time.monotonic_ns); None: now; 0: the arm sends nothing."""
+        return None
+
+    def commanded(self):
+        """Positions that the arm's own controller commands now, or None if it does not say so."""
+        return None
+
+    def move(self, position, velocity, acceleration, at_ns, period):
+        """Follow this for `period` seconds; the joints shall be there at `at_ns`."""
         raise NotImplementedError
 
-    def tool(self, tool, action):
-        """Begin an action (messages.OPEN or CLOSE) of tool 0 (gripper) or 1 (tool changer)."""
+    def speed_scaling(self):
+        """Share of the planned speed that the arm asks for: the engine slows down along the path."""
+        return 1.0
+
+    def fault(self):
+        """A fault of the hardware, as long as it lasts: joint from 0 or None, the maker's number,
+        and its name. None without a fault."""
+        return None
+
+    def tool(self, tool, order):
+        """Begin an order (`order.action` is messages.OPEN, CLOSE, MOVE or HOME; it has position,
+        velocity, force and tolerance) of tool 0 (gripper) or 1 (tool changer)."""
 
     def tool_status(self, tool):
         """Status of a tool: one of the messages.TOOL_ numbers."""
         return m.TOOL_UNKNOWN
+
+    def tool_feedback(self, tool):
+        """Opening (m), force (N) and flags (messages.TOOL_OBJECT and others) of a tool, or None."""
+        return None
+
+    def carry(self, payload):
+        """The arm carries something else now (messages.Payload)."""
+
+    def set_outputs(self, setpoint):
+        """Set outputs: those of `digital_mask` and `analogue_mask`."""
+
+    def inputs(self):
+        """Digital inputs as bits, and a list of analogue inputs; None without any."""
+        return None
+
+    def sensors(self):
+        """Named values of sensors (at most 16, names of at most 24 bytes); NaN is unknown."""
+        return {}
+
+
+READY = m.WELCOME, ""
+
+
+def wait(reason):
+    """An answer of `Robot.begin`: it is getting ready; what it waits for."""
+    return m.WAIT, reason
+
+
+def not_ready(reason):
+    """An answer of `Robot.begin`: the arm cannot be moved, and what the operator must do."""
+    return m.NOT_READY, reason
 
 
 def run(arm, robot, stop=lambda: False, ready=lambda: None):
@@ -92,6 +155,7 @@ def leave(link, driver):
             time.sleep(1e-3 if driver.resting else 0)
         else:
             wall_period(link, driver)
+    driver.close()
     if moves:
         print(
             "told to end while the arm moved: braked to rest within the joint limits in "

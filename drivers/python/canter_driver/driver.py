@@ -1,5 +1,6 @@
 """The driver's side of the protocol, without a channel: it gets times and returns states."""
 
+import ctypes
 import math
 import time
 
@@ -9,6 +10,9 @@ from .limiter import Limiter
 # How far the first setpoint of a session may be from the measured position, and the tolerance of
 # a setpoint beyond what speed and time allow (rad).
 FIRST, ROOM = 1e-3, 2e-3
+
+# How long a robot that is getting ready waits for the next request of its engine (ns).
+BEGINNING_NS = 2_000_000_000
 
 # Largest velocity and acceleration of a setpoint, as a multiple of the limit.
 MARGIN = 1.001
@@ -21,6 +25,11 @@ class Driver:
         self.robot = robot
         self.joints = len(robot.lower)
         self.state, self.fault, self.fault_joint = m.DISCONNECTED, m.NO_FAULT, 0xFFFFFFFF
+        self.fault_code, self.fault_text = 0, ""
+        # The arm does not follow any more: the references follow the arm.
+        self.lost = False
+        # When the robot was asked to get ready; None if it was not, or has ended.
+        self.begun_ns = None
         self.session, self.hello = 0, None
         self.sequence = self.missed = 0
         self.last = m.Setpoint()
@@ -30,16 +39,29 @@ class Driver:
         self.leaving = False
         limits = robot.lower, robot.upper, robot.velocity, robot.acceleration, robot.jerk
         self.limiters = [Limiter(*values) for values in zip(*limits)]
+        self.at_ns = 0
         self.rest()
-        self.orders = [0] * m.MAX_TOOLS
+        self.forget_orders()
         # The state to send, written in every period.
+        self.sensor_names = []
         self.out = m.State(protocol=m.PROTOCOL, joints=self.joints)
         self.feedback = [self.out.tools[tool] for tool in range(m.MAX_TOOLS)]
 
     def rest(self):
-        """Sets reference and setpoints to rest at the measured position."""
-        position, _ = self.robot.measure()
+        """Sets reference and setpoints to rest where the arm's controller holds it."""
+        position = self.robot.commanded() or self.robot.measure()[0]
         self.reference = self.target = [(at, 0.0, 0.0) for at in position]
+        self.at_ns = 0
+
+    def forget_orders(self):
+        """Every order of a new session is new."""
+        self.orders, self.payload, self.outputs = [0] * m.MAX_TOOLS, 0, None
+
+    def close(self):
+        """The robot need not be ready any more."""
+        if self.begun_ns is not None:
+            self.begun_ns = None
+            self.robot.end()
 
     @property
     def resting(self):
@@ -57,7 +79,8 @@ class Driver:
     def objection(self, hello):
         """Why there can be no session, as verdict and reason."""
         if hello.protocol != m.PROTOCOL:
-            return m.WRONG_PROTOCOL, f"protocol {hello.protocol}, expected {m.PROTOCOL}"
+            found = f"protocol {hello.protocol}, expected {m.PROTOCOL}"
+            return m.WRONG_PROTOCOL, f"{found}; build engine and driver from the same version"
         if hello.schema != m.schema_checksum():
             return m.WRONG_SCHEMA, "another message layout"
         if hello.joints != self.joints:
@@ -66,6 +89,12 @@ class Driver:
             return m.WRONG_PERIOD, f"period {hello.period_ns} ns, watchdog {hello.watchdog_ns} ns"
         if hello.clock not in (m.WALL, m.LOCK_STEP):
             return m.WRONG_CLOCK, f"clock {hello.clock}"
+        if hello.clock == m.LOCK_STEP and not self.robot.lock_step:
+            return m.WRONG_CLOCK, "a real arm has its own time: it cannot be driven in lock-step"
+        least, most = self.robot.periods
+        if not least <= hello.period_ns * 1e-9 <= most:
+            period = f"a period of {hello.period_ns * 1e-6:g} ms"
+            return m.WRONG_PERIOD, f"{period}; this arm needs {least * 1e3:g} to {most * 1e3:g} ms"
         if self.following and self.hello.process != hello.process:
             return m.BUSY, f"driven by process {self.hello.process}"
         if self.leaving:
@@ -74,27 +103,43 @@ class Driver:
             return m.NOT_READY, "the arm still moves"
         return None
 
+    def answer(self, verdict, reason=""):
+        """An answer with what the driver can do and where the arm is."""
+        robot = self.robot
+        ack = m.HelloAck(protocol=m.PROTOCOL, joints=self.joints, schema=m.schema_checksum())
+        ack.verdict = verdict
+        fill(ack.name, robot.name)
+        fill(ack.reason, reason)
+        ack.features = m.HAS_WALL | (m.HAS_LOCK_STEP if robot.lock_step else 0)
+        ack.features |= m.IS_REAL if robot.real else 0
+        ack.periods_ns[:] = [round(period * 1e9) for period in robot.periods]
+        n = self.joints
+        position, _ = robot.measure()
+        ack.position[:n], ack.commanded[:n] = position, [at for at, _, _ in self.reference]
+        ack.lower[:n], ack.upper[:n], ack.velocity[:n] = robot.lower, robot.upper, robot.velocity
+        ack.acceleration[:n], ack.jerk[:n] = robot.acceleration, robot.jerk
+        return ack
+
     def greet(self, hello):
         """Answers a request for a session."""
-        ack = m.HelloAck(protocol=m.PROTOCOL, joints=self.joints, schema=m.schema_checksum())
-        fill(ack.name, self.robot.name)
         objection = self.objection(hello)
         if objection:
-            ack.verdict = objection[0]
-            fill(ack.reason, objection[1])
-            return ack
+            return self.answer(*objection)
+        self.begun_ns = time.monotonic_ns()
+        ready, reason = self.robot.begin()
+        if ready == m.NOT_READY:
+            self.close()
+        if ready != m.WELCOME:
+            return self.answer(ready, reason)
         self.hello = m.Hello.from_buffer_copy(hello)
+        self.rest()
+        ack = self.answer(m.WELCOME)
         self.session = ack.session = time.monotonic_ns() | 1
         ack.watchdog_ns = hello.watchdog_ns
-        position, _ = self.robot.measure()
-        for joint in range(self.joints):
-            ack.position[joint] = position[joint]
-            ack.lower[joint], ack.upper[joint] = self.robot.lower[joint], self.robot.upper[joint]
-            ack.velocity[joint] = self.robot.velocity[joint]
-        self.rest()
+        self.lost, self.fault_code, self.fault_text = False, 0, ""
         self.state, self.fault, self.fault_joint = m.SYNCED, m.NO_FAULT, 0xFFFFFFFF
         self.last, self.fresh, self.missed = m.Setpoint(), False, 0
-        self.orders = [0] * m.MAX_TOOLS
+        self.forget_orders()
         self.heard_ns = now_ns = time.monotonic_ns()
         self.received_ns = self.newest_ns = 0 if self.lock_step else now_ns
         self.stepped_ns = 0
@@ -129,6 +174,7 @@ class Driver:
             self.stop(m.STOP_REQUEST)
         elif flags & m.FLAG_GOODBYE:
             self.state, self.session, self.hello = m.DISCONNECTED, 0, None
+            self.close()
         else:
             self.state = m.ARMED if self.state == m.SYNCED else m.ACTIVE
 
@@ -172,6 +218,7 @@ class Driver:
 
     def step(self, now_ns, period):
         """One period: returns the state to send, then moves the robot."""
+        self.watch_robot(now_ns)
         if self.stalled(now_ns):
             self.stop(m.STALLED)
         # By its time stamp: a setpoint that waited while the driver did not run is not new.
@@ -185,13 +232,26 @@ class Driver:
                 self.stop(m.WATCHDOG)
         elif self.state == m.STOPPING and self.resting:
             self.state = m.FAULT
+            self.close()
         self.stepped_ns = now_ns
         state = self.report(now_ns)
         if self.fresh:
             self.take_orders()
-        self.refer(period)
-        self.robot.move(*map(list, zip(*self.reference)), period)
+        self.refer(now_ns, period)
+        self.robot.move(*map(list, zip(*self.reference)), self.at_ns or now_ns, period)
         return state
+
+    def watch_robot(self, now_ns):
+        """A fault of the robot, and a robot that gets ready for nobody."""
+        fault = self.robot.fault()
+        if fault and self.session and not self.lost and self.state != m.FAULT:
+            self.lost = True
+            joint, self.fault_code, self.fault_text = fault
+            if self.state != m.STOPPING:
+                self.stop(m.HARDWARE, 0xFFFFFFFF if joint is None else joint)
+        waits = not self.session or self.state == m.FAULT
+        if waits and self.begun_ns is not None and now_ns - self.begun_ns > BEGINNING_NS:
+            self.close()
 
     def sign_of_life(self, setpoint):
         """In lock-step, the answer to a setpoint that repeats the last period; or None."""
@@ -205,17 +265,46 @@ class Driver:
         return self.out
 
     def take_orders(self):
-        for tool, order in enumerate(self.last.tools):
+        """Passes on orders to tools, payload and outputs that are new."""
+        last = self.last
+        for tool, order in enumerate(last.tools):
             if order.order != self.orders[tool]:
                 self.orders[tool] = order.order
-                if order.action in (m.OPEN, m.CLOSE):
-                    self.robot.tool(tool, order.action)
+                if order.action != m.NO_ACTION:
+                    self.robot.tool(tool, order)
+        if last.payload.number != self.payload:
+            self.payload = last.payload.number
+            self.robot.carry(last.payload)
+        outputs = last.digital_outputs, last.digital_mask, last.analogue_mask
+        outputs += tuple(last.analogue_outputs)
+        if any((last.digital_mask, last.analogue_mask)) and outputs != self.outputs:
+            self.outputs = outputs
+            self.robot.set_outputs(last)
 
-    def refer(self, period):
+    def label(self, now_ns, period):
+        """The time of this period's reference (ns)."""
+        step = round(period * 1e9)
+        if not self.following and self.state not in (m.STOPPING, m.DISCONNECTED):
+            return 0
+        label = self.at_ns + step if self.at_ns else now_ns
+        if self.fresh and self.following:
+            said = self.last.tick_ns
+            if not self.lock_step:
+                watchdog = self.hello.watchdog_ns
+                said = min(max(said, now_ns - watchdog), now_ns + watchdog)
+            if self.at_ns == 0 or said > self.at_ns + step // 2:
+                label = said
+        return label
+
+    def refer(self, now_ns, period):
         """The reference: the setpoint, its extrapolation, or a stop; always within the limits of the
         joints."""
         limiters = self.limiters
-        if self.following:
+        self.at_ns = self.label(now_ns, period)
+        if self.lost:
+            position = self.robot.commanded() or self.robot.measure()[0]
+            self.reference = [(at, 0.0, 0.0) for at in position]
+        elif self.following:
             if not self.fresh:
                 self.target = [l.go_on(at, period) for l, at in zip(limiters, self.target)]
             pairs = zip(limiters, self.reference, self.target)
@@ -231,20 +320,52 @@ class Driver:
         n, state, last = self.joints, self.out, self.last
         position, velocity = self.robot.measure()
         state.session, state.sequence = self.session, self.sequence
-        state.measured_ns = state.published_ns = now_ns
+        state.published_ns = now_ns
+        measured_ns = self.robot.measured_ns()
+        known = 0 if measured_ns is None else m.STATE_UNKNOWN if measured_ns <= 0 else 0
+        if measured_ns is None or measured_ns > 0:
+            state.measured_ns = measured_ns or now_ns
+        commanded = self.robot.commanded()
+        state.commanded[:n] = commanded or [at for at, _, _ in self.reference]
+        state.flags = known | (m.STATE_COMMANDED if commanded else 0)
         state.setpoint_sequence = last.sequence
         state.setpoint_published_ns = last.published_ns
         state.setpoint_received_ns = self.received_ns
         state.driver_state, state.fault = self.state, self.fault
         state.fault_joint, state.missed = self.fault_joint, self.missed
+        if state.fault_code != self.fault_code or self.fault_text or self.lost:
+            state.fault_code = self.fault_code
+            ctypes.memset(state.text, 0, len(state.text))
+            fill(state.text, self.fault_text)
+        state.speed_scaling = min(max(self.robot.speed_scaling(), 0.0), 1.0)
+        self.sense(state)
         state.position[:n], state.velocity[:n] = position, velocity
         for tool, feedback in enumerate(self.feedback):
             feedback.order = self.orders[tool]
             feedback.status = self.robot.tool_status(tool)
+            more = self.robot.tool_feedback(tool)
+            if more is not None:
+                feedback.position, feedback.force, feedback.flags = more
         return state
+
+    def sense(self, state):
+        """Inputs and named sensor values."""
+        sensors = list(self.robot.sensors().items())[: m.MAX_SENSORS]
+        if [name for name, _ in sensors] != self.sensor_names:
+            self.sensor_names = [name for name, _ in sensors]
+            for place, name in zip(state.sensors, self.sensor_names):
+                ctypes.memset(place.name, 0, len(place.name))
+                fill(place.name, name)
+        state.sensor_count = len(sensors)
+        for place, (_, value) in zip(state.sensors, sensors):
+            place.value = value
+        inputs = self.robot.inputs()
+        if inputs is not None:
+            state.digital_inputs = inputs[0]
+            state.analogue_inputs[: len(inputs[1])] = inputs[1]
 
 
 def fill(field, text):
     """Writes a text into a field of bytes, cut to its length."""
-    data = text.encode()[: len(field)]
+    data = text.encode()[: len(field)].decode(errors="ignore").encode()
     field[: len(data)] = list(data)

@@ -33,7 +33,7 @@ class Strict(Robot):
     def measure(self):
         return [self.now[0]], [self.now[1]]
 
-    def move(self, position, velocity, acceleration, period):
+    def move(self, position, velocity, acceleration, at_ns, period):
         (p, v, a), (q, w, b) = self.now, (position[0], velocity[0], acceleration[0])
         said = f"{self.now} {q, w, b}"
         assert abs(q) <= UPPER + 1e-6, said

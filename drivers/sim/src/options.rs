@@ -16,6 +16,8 @@ pub struct ToolOptions {
     pub open: bool,
     /// Opening when open (m).
     pub width: f64,
+    /// Width of an object between the fingers (m).
+    pub object: Option<f64>,
 }
 
 impl Default for ToolOptions {
@@ -25,6 +27,7 @@ impl Default for ToolOptions {
             closing: 0.2,
             open: true,
             width: 0.08,
+            object: None,
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use driver_kit::{About, DriverError, Measured, Reference, Robot};
-use ipc::{ToolAction, ToolFeedback};
+use driver_kit::{About, Command, DriverError, Measured, Measurement, Reference, Robot};
+use ipc::{ToolCommand, ToolFeedback};
 
 use crate::Options;
 use crate::noise::Noise;
@@ -52,10 +52,11 @@ impl Robot for Simulated {
             velocity: options.velocity.clone(),
             acceleration: options.acceleration.clone(),
             jerk: options.jerk.clone(),
+            ..About::default()
         }
     }
 
-    fn measure(&mut self, joints: &mut [Measured]) {
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
         let pending = self.pending.take();
         for (joint, servo) in joints.iter_mut().zip(&mut self.servos) {
             if let Some(period) = pending {
@@ -69,9 +70,11 @@ impl Robot for Simulated {
             joint.position = servo.position + noise;
             joint.velocity = servo.velocity;
         }
+        Measurement::Now
     }
 
-    fn follow(&mut self, joints: &[Reference], period: f64) {
+    fn follow(&mut self, command: &Command<'_>) {
+        let (joints, period) = (command.joints, command.period);
         let control = [
             self.options.frequency.min(0.4 / period),
             self.options.damping,
@@ -95,9 +98,9 @@ impl Robot for Simulated {
         self.tools.iter_mut().for_each(|tool| tool.move_on(period));
     }
 
-    fn act(&mut self, tool: usize, action: ToolAction) {
+    fn act(&mut self, tool: usize, order: &ToolCommand) {
         if let Some(tool) = self.tools.get_mut(tool) {
-            tool.act(action);
+            tool.act(order);
         }
     }
 

@@ -17,7 +17,8 @@ pub(super) fn handshake(arm: &Arm, rate_hz: f64) -> (Check, Option<HelloAck>) {
     let greeted = EngineLink::open(arm).and_then(|link| {
         let joints = link.joints(Duration::from_secs(2))?;
         let hello = Hello::new(joints, period, 100_000_000.max(period), Clock::Wall);
-        link.greet(&hello, Duration::from_secs(2))
+        let times = [Duration::from_secs(2), ipc::READY];
+        link.greet(&hello, times, |_| {})
     });
     match greeted {
         Ok(ack) => {

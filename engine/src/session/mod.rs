@@ -52,6 +52,8 @@ pub struct SessionConfig {
     pub capacity: usize,
     /// How long to look for a driver.
     pub connect: Duration,
+    /// Gets what a driver that is getting ready waits for.
+    pub on_wait: fn(&str),
 }
 
 impl SessionConfig {
@@ -68,6 +70,7 @@ impl SessionConfig {
             default_length: LengthUnit::default(),
             capacity: 4096,
             connect: Duration::from_secs(5),
+            on_wait: |_| {},
         }
     }
 }

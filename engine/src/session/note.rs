@@ -75,6 +75,20 @@ pub enum Note {
         /// How many commands were dropped.
         dropped: usize,
     },
+    /// The arm was not where a command ends in time; the command counts as done.
+    NotArrived {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// The joint that is furthest away, from 1.
+        joint: u32,
+        /// How far it is (rad, m).
+        error: f64,
+    },
+    /// The arm asks for less speed, or no longer does; the motion keeps its path.
+    SpeedAsked {
+        /// Share of the planned speed, 0..=1.
+        share: f64,
+    },
     /// A fault; the arm is stopped until the operator recovers.
     Faulted {
         /// Who is to blame.
@@ -102,6 +116,16 @@ impl fmt::Display for Note {
             } => write!(f, "line {line}: {name} refused: {}", error.message),
             Self::Message { text } => write!(f, "message: {text}"),
             Self::Ended { reason } => write!(f, "the program ended with reason {reason}"),
+            Self::NotArrived { id, joint, error } => write!(
+                f,
+                "warning: command {id}: joint {joint} is {error:.4} from its end and does not arrive"
+            ),
+            Self::SpeedAsked { share } if *share > 0.98 => {
+                f.write_str("the arm asks for full speed again")
+            }
+            Self::SpeedAsked { share } => {
+                write!(f, "the arm asks for {:.0} % of the speed", share * 100.0)
+            }
             Self::Stopped => f.write_str("stopped"),
             Self::Aborted { dropped } => write!(f, "aborted, {dropped} commands dropped"),
             Self::Faulted { reason, .. } => write!(f, "fault: {reason}"),

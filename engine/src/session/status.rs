@@ -30,6 +30,8 @@ pub struct Status {
     pub fault: Option<String>,
     /// Share of the planned speed, now.
     pub time_scaling: f64,
+    /// Share of the planned speed that the arm itself asks for; 1 without a wish.
+    pub speed_asked: f64,
     /// Measured joint positions, rad or m.
     pub joints: Vec<f64>,
     /// Joint positions of the last setpoint, rad or m.

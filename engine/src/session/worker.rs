@@ -126,6 +126,7 @@ fn start<'a, const N: usize>(
     wanted.wait_for_planner = config.clock == Clock::LockStep;
     wanted.record = config.record;
     wanted.connect = config.connect;
+    wanted.on_wait = config.on_wait;
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
     let (executor, sender, monitor) = Executor::start(wanted)?;
     let remote = executor.remote();
@@ -366,6 +367,7 @@ impl<const N: usize> Worker<'_, N> {
             status.idle &= now.idle;
             status.held |= now.held;
             status.time_scaling = now.time_scaling;
+            status.speed_asked = now.speed_asked;
             status.joints = now.position.as_slice().to_vec();
             status.setpoint = now.setpoint.as_slice().to_vec();
             let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
@@ -387,10 +389,5 @@ fn tool_order(command: u32, action: ToolAction, nominal: f64) -> ToolOrder {
         ToolAction::OpenToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Open),
         ToolAction::CloseToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Close),
     };
-    ToolOrder {
-        command,
-        tool,
-        action,
-        timeout: nominal + TOOL_PATIENCE,
-    }
+    ToolOrder::new(command, tool, action, nominal + TOOL_PATIENCE)
 }

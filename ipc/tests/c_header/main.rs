@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use ipc::{
-    DriverState, FaultCode, MAX_JOINTS, MAX_TOOLS, PROTOCOL, SetpointFlags, ToolAction, ToolStatus,
-    Verdict,
+    DriverFeatures, DriverState, FaultCode, MAX_ANALOGUE, MAX_JOINTS, MAX_SENSORS, MAX_TOOLS,
+    PROTOCOL, SetpointFlags, StateFlags, ToolAction, ToolFlags, ToolStatus, Verdict,
 };
 
 mod messages;
@@ -24,10 +24,21 @@ fn constants() -> Vec<(&'static str, u64)> {
         ("CANTER_SCHEMA_CHECKSUM", ipc::schema_checksum()),
         ("CANTER_MAX_JOINTS", MAX_JOINTS as u64),
         ("CANTER_MAX_TOOLS", MAX_TOOLS as u64),
+        ("CANTER_MAX_SENSORS", MAX_SENSORS as u64),
+        ("CANTER_MAX_ANALOGUE", MAX_ANALOGUE as u64),
         number("CANTER_FLAG_HOLD", SetpointFlags::HOLD),
         number("CANTER_FLAG_STOPPING", SetpointFlags::STOPPING),
         number("CANTER_FLAG_STOP_REQUEST", SetpointFlags::STOP_REQUEST),
         number("CANTER_FLAG_GOODBYE", SetpointFlags::GOODBYE),
+        number("CANTER_FLAG_EFFORT", SetpointFlags::EFFORT),
+        number("CANTER_STATE_UNKNOWN", StateFlags::UNKNOWN),
+        number("CANTER_STATE_NO_VELOCITY", StateFlags::NO_VELOCITY),
+        number("CANTER_STATE_NO_EFFORT", StateFlags::NO_EFFORT),
+        number("CANTER_STATE_COMMANDED", StateFlags::COMMANDED),
+        number("CANTER_HAS_WALL", DriverFeatures::WALL),
+        number("CANTER_HAS_LOCK_STEP", DriverFeatures::LOCK_STEP),
+        number("CANTER_HAS_OWN_CLOCK", DriverFeatures::OWN_CLOCK),
+        number("CANTER_IS_REAL", DriverFeatures::REAL),
         number("CANTER_DISCONNECTED", DriverState::Disconnected as u32),
         number("CANTER_SYNCED", DriverState::Synced as u32),
         number("CANTER_ARMED", DriverState::Armed as u32),
@@ -42,6 +53,7 @@ fn constants() -> Vec<(&'static str, u64)> {
         number("CANTER_FAULT_HARDWARE", FaultCode::Hardware as u32),
         number("CANTER_FAULT_STALLED", FaultCode::Stalled as u32),
         number("CANTER_FAULT_ENDED", FaultCode::Ended as u32),
+        number("CANTER_FAULT_NOT_READY", FaultCode::NotReady as u32),
         number("CANTER_WELCOME", Verdict::Welcome as u32),
         number("CANTER_WRONG_PROTOCOL", Verdict::WrongProtocol as u32),
         number("CANTER_WRONG_SCHEMA", Verdict::WrongSchema as u32),
@@ -51,13 +63,22 @@ fn constants() -> Vec<(&'static str, u64)> {
         number("CANTER_WRONG_CLOCK", Verdict::WrongClock as u32),
         number("CANTER_BUSY", Verdict::Busy as u32),
         number("CANTER_NOT_READY", Verdict::NotReady as u32),
+        number("CANTER_WAIT", Verdict::Wait as u32),
         number("CANTER_TOOL_OPEN_IT", ToolAction::Open as u32),
         number("CANTER_TOOL_CLOSE_IT", ToolAction::Close as u32),
+        number("CANTER_TOOL_MOVE_IT", ToolAction::Move as u32),
+        number("CANTER_TOOL_HOME_IT", ToolAction::Home as u32),
         number("CANTER_TOOL_UNKNOWN", ToolStatus::Unknown as u32),
         number("CANTER_TOOL_OPEN", ToolStatus::Open as u32),
         number("CANTER_TOOL_CLOSED", ToolStatus::Closed as u32),
         number("CANTER_TOOL_MOVING", ToolStatus::Moving as u32),
         number("CANTER_TOOL_FAILED", ToolStatus::Failed as u32),
+        number("CANTER_TOOL_REACHED", ToolStatus::Reached as u32),
+        number("CANTER_TOOL_NOT_HOMED", ToolStatus::NotHomed as u32),
+        number("CANTER_TOOL_HAS_POSITION", ToolFlags::POSITION),
+        number("CANTER_TOOL_HAS_FORCE", ToolFlags::FORCE),
+        number("CANTER_TOOL_SENSES_OBJECT", ToolFlags::SENSES_OBJECT),
+        number("CANTER_TOOL_OBJECT", ToolFlags::OBJECT),
     ]
 }
 
@@ -210,7 +231,7 @@ print(place, domain.prefix(place))";
 #[test]
 fn python_agrees() {
     const PROGRAM: &str = "import messages as m
-for name in 'ToolCommand ToolFeedback Setpoint State Hello HelloAck'.split():
+for name in 'ToolCommand ToolFeedback Sensor Payload Setpoint State Hello HelloAck'.split():
     message = getattr(m, name)
     for field, _ in message._fields_:
         place = getattr(message, field)

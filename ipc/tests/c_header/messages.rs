@@ -2,7 +2,7 @@
 
 use core::mem::offset_of;
 
-use ipc::{Hello, HelloAck, Setpoint, State, ToolCommand, ToolFeedback};
+use ipc::{Hello, HelloAck, Payload, Sensor, Setpoint, State, ToolCommand, ToolFeedback};
 
 /// A type of a message field in C: the type's name, and the length of an array.
 trait InC {
@@ -42,6 +42,18 @@ impl InC for ToolCommand {
 impl InC for ToolFeedback {
     fn in_c() -> (&'static str, String) {
         ("canter_tool_feedback", String::new())
+    }
+}
+
+impl InC for Sensor {
+    fn in_c() -> (&'static str, String) {
+        ("canter_sensor", String::new())
+    }
+}
+
+impl InC for Payload {
+    fn in_c() -> (&'static str, String) {
+        ("canter_payload", String::new())
     }
 }
 
@@ -94,196 +106,102 @@ impl Message {
     }
 }
 
+/// A message with these fields. A macro, because a field's offset needs its name.
+macro_rules! message {
+    ($kind:ty, $name:literal, $wire:literal, $($field:ident)*) => {
+        Message::new::<$kind>($name, $wire, vec![$(field(
+            stringify!($field),
+            offset_of!($kind, $field),
+            |message: &$kind| &message.$field,
+        )),*])
+    };
+}
+
 fn tool_command() -> Message {
-    type M = ToolCommand;
-    Message::new::<M>(
+    message!(
+        ToolCommand,
         "canter_tool_command",
         "",
-        vec![
-            field("order", offset_of!(M, order), |m: &M| &m.order),
-            field("action", offset_of!(M, action), |m: &M| &m.action),
-            field("position", offset_of!(M, position), |m: &M| &m.position),
-            field("velocity", offset_of!(M, velocity), |m: &M| &m.velocity),
-            field("force", offset_of!(M, force), |m: &M| &m.force),
-        ],
+            order action position velocity force tolerance
     )
 }
 
 fn tool_feedback() -> Message {
-    type M = ToolFeedback;
-    Message::new::<M>(
+    message!(
+        ToolFeedback,
         "canter_tool_feedback",
         "",
-        vec![
-            field("order", offset_of!(M, order), |m: &M| &m.order),
-            field("status", offset_of!(M, status), |m: &M| &m.status),
-            field("position", offset_of!(M, position), |m: &M| &m.position),
-            field("force", offset_of!(M, force), |m: &M| &m.force),
-            field("reserved", offset_of!(M, reserved), |m: &M| &m.reserved),
-        ],
+            order status position force flags reserved
+    )
+}
+
+fn sensor() -> Message {
+    message!(
+        Sensor,
+        "canter_sensor",
+        "",
+            name value
+    )
+}
+
+fn payload() -> Message {
+    message!(
+        Payload,
+        "canter_payload",
+        "",
+            number reserved mass centre inertia tool_position tool_rotation
     )
 }
 
 fn setpoint() -> Message {
-    type M = Setpoint;
-    Message::new::<M>(
+    message!(
+        Setpoint,
         "canter_setpoint",
-        "canter.Setpoint.1",
-        vec![
-            field("protocol", offset_of!(M, protocol), |m: &M| &m.protocol),
-            field("joints", offset_of!(M, joints), |m: &M| &m.joints),
-            field("session", offset_of!(M, session), |m: &M| &m.session),
-            field("sequence", offset_of!(M, sequence), |m: &M| &m.sequence),
-            field("tick", offset_of!(M, tick), |m: &M| &m.tick),
-            field("published_ns", offset_of!(M, published_ns), |m: &M| {
-                &m.published_ns
-            }),
-            field("tick_ns", offset_of!(M, tick_ns), |m: &M| &m.tick_ns),
-            field("period_ns", offset_of!(M, period_ns), |m: &M| &m.period_ns),
-            field("watchdog_ns", offset_of!(M, watchdog_ns), |m: &M| {
-                &m.watchdog_ns
-            }),
-            field("state_sequence", offset_of!(M, state_sequence), |m: &M| {
-                &m.state_sequence
-            }),
-            field("command", offset_of!(M, command), |m: &M| &m.command),
-            field("flags", offset_of!(M, flags), |m: &M| &m.flags),
-            field("valid", offset_of!(M, valid), |m: &M| &m.valid),
-            field("reserved_word", offset_of!(M, reserved_word), |m: &M| {
-                &m.reserved_word
-            }),
-            field("path_time", offset_of!(M, path_time), |m: &M| &m.path_time),
-            field("time_scaling", offset_of!(M, time_scaling), |m: &M| {
-                &m.time_scaling
-            }),
-            field("position", offset_of!(M, position), |m: &M| &m.position),
-            field("velocity", offset_of!(M, velocity), |m: &M| &m.velocity),
-            field("acceleration", offset_of!(M, acceleration), |m: &M| {
-                &m.acceleration
-            }),
-            field("effort", offset_of!(M, effort), |m: &M| &m.effort),
-            field("tools", offset_of!(M, tools), |m: &M| &m.tools),
-            field(
-                "digital_outputs",
-                offset_of!(M, digital_outputs),
-                |m: &M| &m.digital_outputs,
-            ),
-            field("reserved", offset_of!(M, reserved), |m: &M| &m.reserved),
-        ],
+        "canter.Setpoint.2",
+            protocol joints session sequence tick published_ns tick_ns period_ns watchdog_ns
+            state_sequence command flags valid reserved_word path_time time_scaling position
+            velocity acceleration effort tools digital_outputs digital_mask analogue_outputs
+            analogue_mask payload reserved
     )
 }
 
 fn state() -> Message {
-    type M = State;
-    Message::new::<M>(
+    message!(
+        State,
         "canter_state",
-        "canter.State.1",
-        vec![
-            field("protocol", offset_of!(M, protocol), |m: &M| &m.protocol),
-            field("joints", offset_of!(M, joints), |m: &M| &m.joints),
-            field("session", offset_of!(M, session), |m: &M| &m.session),
-            field("sequence", offset_of!(M, sequence), |m: &M| &m.sequence),
-            field("measured_ns", offset_of!(M, measured_ns), |m: &M| {
-                &m.measured_ns
-            }),
-            field("published_ns", offset_of!(M, published_ns), |m: &M| {
-                &m.published_ns
-            }),
-            field(
-                "setpoint_sequence",
-                offset_of!(M, setpoint_sequence),
-                |m: &M| &m.setpoint_sequence,
-            ),
-            field(
-                "setpoint_published_ns",
-                offset_of!(M, setpoint_published_ns),
-                |m: &M| &m.setpoint_published_ns,
-            ),
-            field(
-                "setpoint_received_ns",
-                offset_of!(M, setpoint_received_ns),
-                |m: &M| &m.setpoint_received_ns,
-            ),
-            field("driver_state", offset_of!(M, driver_state), |m: &M| {
-                &m.driver_state
-            }),
-            field("fault", offset_of!(M, fault), |m: &M| &m.fault),
-            field("fault_joint", offset_of!(M, fault_joint), |m: &M| {
-                &m.fault_joint
-            }),
-            field("reserved_word", offset_of!(M, reserved_word), |m: &M| {
-                &m.reserved_word
-            }),
-            field("missed", offset_of!(M, missed), |m: &M| &m.missed),
-            field("position", offset_of!(M, position), |m: &M| &m.position),
-            field("velocity", offset_of!(M, velocity), |m: &M| &m.velocity),
-            field("effort", offset_of!(M, effort), |m: &M| &m.effort),
-            field("tools", offset_of!(M, tools), |m: &M| &m.tools),
-            field("digital_inputs", offset_of!(M, digital_inputs), |m: &M| {
-                &m.digital_inputs
-            }),
-            field("hardware_ns", offset_of!(M, hardware_ns), |m: &M| {
-                &m.hardware_ns
-            }),
-            field("reserved", offset_of!(M, reserved), |m: &M| &m.reserved),
-        ],
+        "canter.State.2",
+            protocol joints session sequence measured_ns published_ns setpoint_sequence
+            setpoint_published_ns setpoint_received_ns driver_state fault fault_joint
+            fault_code missed position velocity effort commanded tools digital_inputs
+            analogue_inputs hardware_ns speed_scaling flags sensor_count sensors text reserved
     )
 }
 
 fn hello() -> Message {
-    type M = Hello;
-    Message::new::<M>(
+    message!(
+        Hello,
         "canter_hello",
-        "canter.Hello.1",
-        vec![
-            field("protocol", offset_of!(M, protocol), |m: &M| &m.protocol),
-            field("joints", offset_of!(M, joints), |m: &M| &m.joints),
-            field("schema", offset_of!(M, schema), |m: &M| &m.schema),
-            field("model", offset_of!(M, model), |m: &M| &m.model),
-            field("period_ns", offset_of!(M, period_ns), |m: &M| &m.period_ns),
-            field("watchdog_ns", offset_of!(M, watchdog_ns), |m: &M| {
-                &m.watchdog_ns
-            }),
-            field("clock", offset_of!(M, clock), |m: &M| &m.clock),
-            field("process", offset_of!(M, process), |m: &M| &m.process),
-            field("name", offset_of!(M, name), |m: &M| &m.name),
-            field("reserved", offset_of!(M, reserved), |m: &M| &m.reserved),
-        ],
+        "canter.Hello.2",
+            protocol joints schema model period_ns watchdog_ns clock process name reserved
     )
 }
 
 fn hello_ack() -> Message {
-    type M = HelloAck;
-    Message::new::<M>(
+    message!(
+        HelloAck,
         "canter_hello_ack",
-        "canter.HelloAck.1",
-        vec![
-            field("protocol", offset_of!(M, protocol), |m: &M| &m.protocol),
-            field("joints", offset_of!(M, joints), |m: &M| &m.joints),
-            field("verdict", offset_of!(M, verdict), |m: &M| &m.verdict),
-            field("reserved_word", offset_of!(M, reserved_word), |m: &M| {
-                &m.reserved_word
-            }),
-            field("schema", offset_of!(M, schema), |m: &M| &m.schema),
-            field("session", offset_of!(M, session), |m: &M| &m.session),
-            field("watchdog_ns", offset_of!(M, watchdog_ns), |m: &M| {
-                &m.watchdog_ns
-            }),
-            field("position", offset_of!(M, position), |m: &M| &m.position),
-            field("lower", offset_of!(M, lower), |m: &M| &m.lower),
-            field("upper", offset_of!(M, upper), |m: &M| &m.upper),
-            field("velocity", offset_of!(M, velocity), |m: &M| &m.velocity),
-            field("name", offset_of!(M, name), |m: &M| &m.name),
-            field("reason", offset_of!(M, reason), |m: &M| &m.reason),
-            field("reserved", offset_of!(M, reserved), |m: &M| &m.reserved),
-        ],
+        "canter.HelloAck.2",
+            protocol joints verdict features schema session watchdog_ns position commanded
+            lower upper velocity acceleration jerk periods_ns delay_ns name reason reserved
     )
 }
 
-pub(crate) fn messages() -> [Message; 6] {
+pub(crate) fn messages() -> [Message; 8] {
     [
         tool_command(),
         tool_feedback(),
+        sensor(),
+        payload(),
         setpoint(),
         state(),
         hello(),

@@ -16,7 +16,10 @@ impl<const N: usize> Runner<N> {
         } else {
             self.cycle.time_scaling()
         };
-        let idle = self.cycle.is_idle() && self.items.is_empty() && self.tool.is_none();
+        let idle = self.cycle.is_idle()
+            && self.items.is_empty()
+            && self.tool.is_none()
+            && self.awaited.is_empty();
         self.shared.write(&Measured {
             position: self.measured(),
             velocity: first(&self.state.velocity),
@@ -27,6 +30,7 @@ impl<const N: usize> Runner<N> {
             faulted: self.fault.is_some(),
             held: false,
             tools: self.state.tools.map(|tool| tool.status),
+            speed_asked: self.state.speed_scaling,
         });
         self.shared.orders.tell(&Progress {
             order: self.asked.order(),

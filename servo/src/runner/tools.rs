@@ -24,6 +24,10 @@ impl<const N: usize> Runner<N> {
         self.orders += 1;
         command.order = self.orders;
         command.action = order.action as u32;
+        command.position = order.position;
+        command.velocity = order.velocity;
+        command.force = order.force;
+        command.tolerance = order.tolerance;
         let left = (order.timeout.max(0.0) / self.period) as u64;
         self.tool = Some(Working {
             order,
@@ -47,7 +51,7 @@ impl<const N: usize> Runner<N> {
         let status = ToolStatus::from_number(feedback.status).unwrap_or(ToolStatus::Failed);
         let answered = feedback.order == working.number;
         match status {
-            ToolStatus::Open | ToolStatus::Closed if answered => {
+            ToolStatus::Open | ToolStatus::Closed | ToolStatus::Reached if answered => {
                 self.tool = None;
                 let command = working.order.command;
                 self.report(Event::Finished {
@@ -55,7 +59,7 @@ impl<const N: usize> Runner<N> {
                     tick: self.tick,
                 });
             }
-            ToolStatus::Failed | ToolStatus::Unknown if answered => {
+            ToolStatus::Failed | ToolStatus::Unknown | ToolStatus::NotHomed if answered => {
                 self.latch(Fault::Tool {
                     tool,
                     timeout: false,

@@ -150,7 +150,7 @@ fn old(mut ack: ipc::HelloAck, kind: &str) -> ipc::HelloAck {
     match kind {
         "old-answer" => ack.protocol = 7,
         "old-refusal" => {
-            let reason = "protocol 1, expected 7";
+            let reason = "protocol 2, expected 7";
             let verdict = ipc::Verdict::WrongProtocol;
             return ipc::HelloAck::refusal(JOINTS, verdict, reason);
         }

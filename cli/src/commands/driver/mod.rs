@@ -1,5 +1,6 @@
 //! Drivers: one file per kind of driver, and the test of any driver.
 
+mod franka;
 mod mujoco;
 mod sim;
 mod test;
@@ -11,9 +12,12 @@ use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use driver_sim::{DriverError, DriverReport};
+use ipc::IpcError;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::output;
 
 /// How long a driver continues when the process that started it has ended: enough for its watchdog
 /// to stop the arm.
@@ -33,6 +37,7 @@ pub(crate) struct Driver {
 enum What {
     Sim(sim::Sim),
     Mujoco(mujoco::Mujoco),
+    Franka(franka::Franka),
     Test(test::Test),
 }
 
@@ -42,6 +47,7 @@ impl Driver {
         match &self.what {
             What::Sim(sim) => sim.run(),
             What::Mujoco(mujoco) => mujoco.run(),
+            What::Franka(franka) => franka.run(),
             What::Test(test) => test.run(),
         }
     }
@@ -65,4 +71,29 @@ fn end_with_input(stop: Arc<AtomicBool>) {
         }
         stop.store(true, Ordering::Relaxed);
     });
+}
+
+/// Tells what a run of a driver came to; `counts` tells its periods too.
+fn tell(report: &DriverReport, counts: bool) {
+    if let Some(warning) = &report.warning {
+        tracing::warn!("{warning}");
+    }
+    if let Some(braked) = &report.braked {
+        output::note(braked);
+    }
+    if counts {
+        output::note(&format!(
+            "{} periods in {} sessions, {} without a new setpoint",
+            report.periods, report.sessions, report.missed
+        ));
+    }
+}
+
+fn failure(error: DriverError) -> Failure {
+    let exit = match &error {
+        DriverError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
+        DriverError::Ipc(_) => Exit::NoPeer,
+        _ => Exit::Usage,
+    };
+    Failure::new(exit, error)
 }

@@ -7,10 +7,10 @@ use driver_sim::Options;
 use ipc::{Arm, DriverLink, IpcError};
 use planner::robot::Robot;
 
+use super::failure;
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::output;
 use crate::robot::RobotOption;
 
 /// How long another driver may still hold the arm, and the time between two tries.
@@ -59,18 +59,7 @@ impl Sim {
             writeln!(io::stdout(), "ready")?;
         }
         let report = driver_sim::run(self.options(&robot, arm), &stop).map_err(failure)?;
-        if let Some(warning) = &report.warning {
-            tracing::warn!("{warning}");
-        }
-        if let Some(braked) = &report.braked {
-            output::note(braked);
-        }
-        if !self.until_end_of_input {
-            output::note(&format!(
-                "{} periods in {} sessions, {} without a new setpoint",
-                report.periods, report.sessions, report.missed
-            ));
-        }
+        super::tell(&report, !self.until_end_of_input);
         Ok(Exit::Done)
     }
 
@@ -105,13 +94,4 @@ fn wait_for_arm(arm: &Arm) -> Result<(), Failure> {
             Err(error) => return Err(failure(error.into())),
         }
     }
-}
-
-fn failure(error: driver_sim::DriverError) -> Failure {
-    let exit = match &error {
-        driver_sim::DriverError::Ipc(IpcError::BadArmName { .. }) => Exit::Usage,
-        driver_sim::DriverError::Ipc(_) => Exit::NoPeer,
-        _ => Exit::Usage,
-    };
-    Failure::new(exit, error)
 }

@@ -17,7 +17,10 @@ impl Player {
             clock: Clock::LockStep as u32,
             ..self.hello
         };
-        match self.link.greet(&hello, Duration::from_secs(2)) {
+        match self
+            .link
+            .greet(&hello, [Duration::from_secs(2), ipc::READY], |_| {})
+        {
             Ok(ack) => self.ack = ack,
             Err(IpcError::Refused { reason, .. }) => {
                 return Ok(format!("{NOT_TRIED}no lock-step: {reason}"));

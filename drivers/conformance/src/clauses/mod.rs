@@ -12,10 +12,16 @@ use crate::player::{Player, Trial};
 type Named<F> = (&'static str, F);
 
 /// The clauses in the order they are tried.
-pub(crate) const CLAUSES: [Named<Trial>; 15] = [
+pub(crate) const CLAUSES: [Named<Trial>; 18] = [
     ("states come at the rate", Player::rate),
     ("a setpoint of another session is ignored", Player::foreign),
     ("becomes active by holding", Player::holds),
+    ("says when it measured", Player::measured),
+    ("says what is commanded", Player::commanded),
+    (
+        "a start elsewhere is not followed and latches",
+        Player::starts_elsewhere,
+    ),
     ("follows a motion", Player::follows),
     ("the gripper answers", Player::gripper),
     ("silence trips the watchdog and latches", Player::silence),

@@ -3,7 +3,8 @@
 use core::time::Duration;
 use std::time::Instant;
 
-use ipc::{DriverState, GRIPPER, ToolAction, ToolStatus};
+use ipc::{DriverState, GRIPPER, StateFlags, ToolAction, ToolStatus};
+use scheduling::now_ns;
 
 use crate::player::{NOT_TRIED, PERIOD, Player, Seen};
 
@@ -41,6 +42,57 @@ impl Player {
             return Err(format!("it moved by {:.4} rad", self.moved()));
         }
         self.expect(&[DriverState::Active], "")
+    }
+
+    /// The joints were measured a moment ago, or the state says that they are unknown.
+    pub(super) fn measured(&mut self) -> Seen {
+        const MOMENT: u64 = 50_000_000;
+        self.hold(100);
+        self.heard()?;
+        if self.state.flags & StateFlags::UNKNOWN != 0 {
+            return Err("it does not know where the arm is".to_owned());
+        }
+        let (now, at) = (now_ns(), self.state.measured_ns);
+        let age = now.abs_diff(at) / 1000;
+        if age > MOMENT / 1000 || at > self.state.published_ns {
+            return Err(format!(
+                "measured {age} us ago, by its own word at {at} of {now} ns"
+            ));
+        }
+        Ok(format!("measured {age} us ago"))
+    }
+
+    /// At rest, commanded and measured joints agree.
+    pub(super) fn commanded(&mut self) -> Seen {
+        self.hold(100);
+        self.heard()?;
+        let state = &self.state;
+        let pairs = state.commanded.iter().zip(&state.position);
+        let apart = pairs
+            .take(self.joints())
+            .map(|(commanded, measured)| (commanded - measured).abs());
+        let worst = apart.fold(0.0, f64::max);
+        let who = if state.flags & StateFlags::COMMANDED != 0 {
+            "by the arm's controller"
+        } else {
+            "by the driver"
+        };
+        let seen = format!("{worst:.5} rad from the measured joints, {who}");
+        if worst < 0.05 { Ok(seen) } else { Err(seen) }
+    }
+
+    /// The first setpoint of a session must be where the arm is commanded.
+    pub(super) fn starts_elsewhere(&mut self) -> Seen {
+        for _ in 0..50 {
+            let setpoint = self.setpoint([0.02, 0.0, 0.0]);
+            self.period(Some(setpoint));
+        }
+        self.heard()?;
+        let reason = format!("{}; ", self.state.fault_code().reason());
+        if self.moved() > 0.005 {
+            return Err(format!("{reason}it moved by {:.4} rad", self.moved()));
+        }
+        self.expect(&[DriverState::Stopping, DriverState::Fault], &reason)
     }
 
     pub(super) fn follows(&mut self) -> Seen {

@@ -50,6 +50,17 @@ impl<const N: usize> Worker<'_, N> {
                 }
                 self.report_done();
             }
+            Event::NotArrived {
+                command,
+                joint,
+                error,
+                ..
+            } => self.say(Note::NotArrived {
+                id: command,
+                joint: joint + 1,
+                error,
+            }),
+            Event::SpeedAsked { share, .. } => self.say(Note::SpeedAsked { share }),
             Event::Stopped { .. } => self.say(Note::Stopped),
             Event::Aborted { aborts, .. } => {
                 let asked = aborts.wrapping_sub(self.epoch);

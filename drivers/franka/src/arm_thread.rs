@@ -1,0 +1,269 @@
+//! The thread that owns the arm's controller: reads states, sends commands, recovers.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
+use std::time::Duration;
+
+use driver_kit::{Reference, Resampler, RobotFault};
+use franka::{
+    ActiveMotionGenerator, Errors, FrankaError, JointPositions, MoveControllerMode, RealtimeConfig,
+    Robot, RobotMode, RobotOptions, RobotState, motion_finished,
+};
+use ipc::{Payload, bytes_of};
+use rtrb::{Consumer, Producer};
+use scheduling::{RealTimeRequest, now_ns, request_real_time};
+
+use crate::snapshot::{Phase, Row, Snapshot, Wish};
+use crate::{FrankaOptions, JOINTS};
+
+/// Time between two tries to connect, and the length of a look at whether the driver ends.
+const AGAIN: Duration = Duration::from_millis(500);
+const LOOK: Duration = Duration::from_millis(10);
+
+/// The controller commands something else than it was told from this difference on (rad): it lost
+/// commands and went on by itself. Its states are single precision.
+const ELSEWHERE: f64 = 3e-6;
+
+/// How many commands may be on their way: an older state of the controller is no other command.
+const ON_THE_WAY: usize = 12;
+
+/// The controller goes on by itself when the driver slept for longer than this (s), or when so many
+/// states in a row show a command that was not sent.
+const SLEPT: f64 = 2.5e-3;
+const STRANGE: u32 = 6;
+
+/// How long a motion that shall end may take to come to rest (periods).
+const PATIENCE: u32 = 2000;
+
+/// Everything that the thread owns.
+pub(crate) struct ArmThread {
+    pub(crate) options: FrankaOptions,
+    pub(crate) resampler: Resampler,
+    pub(crate) rows: Consumer<Row>,
+    pub(crate) wishes: Consumer<Wish>,
+    pub(crate) snapshots: Producer<Snapshot>,
+    pub(crate) snapshot: Snapshot,
+    pub(crate) payload: Option<Payload>,
+    pub(crate) stop: Arc<AtomicBool>,
+}
+
+/// A motion that runs.
+type Control<'a> = ActiveMotionGenerator<'a, JointPositions>;
+
+impl ArmThread {
+    /// Until the driver ends: connects, serves, connects again.
+    pub(crate) fn run(mut self) {
+        // What is refused is told by the kit's own thread.
+        let _granted = request_real_time(RealTimeRequest {
+            priority: self.options.priority,
+            lock_memory: false,
+            low_latency: false,
+            ..RealTimeRequest::default()
+        });
+        while !self.ends() {
+            let options = RobotOptions::new(RealtimeConfig::Ignore).with_log_size(0);
+            let lost = match Robot::with_options(&self.options.address, options) {
+                Ok(robot) => self.serve(&robot),
+                Err(error) => error.to_string(),
+            };
+            self.lose(&lost);
+            let mut waited = Duration::ZERO;
+            while waited < AGAIN && !self.ends() {
+                sleep(LOOK);
+                waited += LOOK;
+            }
+        }
+    }
+
+    fn ends(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// The connection is lost: during a motion that is a fault.
+    fn lose(&mut self, reason: &str) {
+        self.snapshot.reason = bytes_of(reason);
+        if self.snapshot.phase == Phase::Moving {
+            let text = format!("the connection is lost: {reason}");
+            self.snapshot.fault = Some(RobotFault::new(None, 0, &text));
+        }
+        self.snapshot.phase = Phase::Disconnected;
+        // Nothing that was wished before counts after it.
+        while self.wishes.pop().is_ok() {}
+        self.tell();
+    }
+
+    fn tell(&mut self) {
+        // A full ring has a kit that does not run; the newest states will come.
+        let _ = self.snapshots.push(self.snapshot);
+    }
+
+    /// Reads states until the connection is lost; returns why.
+    fn serve(&mut self, robot: &Robot) -> String {
+        self.snapshot.phase = match self.snapshot.fault {
+            Some(_) => Phase::Faulted,
+            None => Phase::Idle,
+        };
+        while !self.ends() {
+            match robot.read_once() {
+                Ok(state) => self.snapshot.take(&state, now_ns()),
+                Err(error) => return error.to_string(),
+            }
+            self.tell();
+            while self.rows.pop().is_ok() {}
+            match self.wishes.pop() {
+                Ok(Wish::Begin) => {
+                    if let Err(lost) = self.session(robot) {
+                        return lost;
+                    }
+                }
+                Ok(Wish::Carry(payload)) => self.payload = Some(payload),
+                Ok(Wish::End) | Err(_) => {}
+            }
+        }
+        "the driver ends".to_owned()
+    }
+
+    /// A motion from its start to its end.
+    ///
+    /// # Errors
+    /// The text of a lost connection.
+    fn session(&mut self, robot: &Robot) -> Result<(), String> {
+        self.snapshot.phase = Phase::Starting;
+        self.snapshot.fault = None;
+        self.snapshot.reason = [0; 96];
+        self.tell();
+        let ended = self.prepare(robot).and_then(|()| {
+            let mut control =
+                robot.start_joint_position_control(MoveControllerMode::JointImpedance)?;
+            self.follow(&mut control)
+        });
+        match ended {
+            Ok(()) => self.snapshot.phase = Phase::Idle,
+            Err(FrankaError::Network(text)) => return Err(text),
+            Err(error) => {
+                self.snapshot.fault = Some(fault(&error));
+                self.snapshot.phase = Phase::Faulted;
+            }
+        }
+        self.tell();
+        Ok(())
+    }
+
+    /// Recovers from an error, and tells the controller what it must know before the motion.
+    fn prepare(&mut self, robot: &Robot) -> Result<(), FrankaError> {
+        if self.snapshot.mode == RobotMode::Reflex {
+            robot.automatic_error_recovery()?;
+        }
+        if let Some(thresholds) = self.options.collision {
+            let (torque, force) = (thresholds.torque, thresholds.force);
+            robot.set_collision_behavior_simple(torque, torque, force, force)?;
+        }
+        if let Some(impedance) = self.options.impedance {
+            robot.set_joint_impedance(impedance)?;
+        }
+        if let Some(payload) = self.payload.take() {
+            let [xx, yy, zz, xy, xz, yz] = payload.inertia;
+            let inertia = [xx, xy, xz, xy, yy, yz, xz, yz, zz];
+            robot.set_load(payload.mass, payload.centre, inertia)?;
+        }
+        Ok(())
+    }
+
+    /// Answers each state of the controller with a command, until the motion shall end.
+    fn follow(&mut self, control: &mut Control<'_>) -> Result<(), FrankaError> {
+        let mut sent = Sent::default();
+        let mut ending = 0_u32;
+        loop {
+            let (state, passed) = control.read_once()?;
+            let advance = passed.as_secs_f64();
+            if sent.is_empty() {
+                self.resampler.begin(&state.q_d);
+            } else if sent.has_gone_on(&state, advance) {
+                self.rejoin(&state);
+            }
+            while let Ok(row) = self.rows.pop() {
+                self.resampler.push(row.at_ns, &row.joints);
+            }
+            self.snapshot.phase = Phase::Moving;
+            self.snapshot.take(&state, now_ns());
+            self.tell();
+            let command = self.resampler.next(advance);
+            let q: [f64; JOINTS] =
+                core::array::from_fn(|joint| command.get(joint).map_or(0.0, |c| c.position));
+            sent.push(q);
+            self.snapshot.delay = self.resampler.delay();
+            if matches!(self.wishes.pop(), Ok(Wish::End)) || self.ends() {
+                ending = ending.max(1);
+            }
+            ending += u32::from(ending > 0);
+            let positions = JointPositions::new(q);
+            if ending > 0 && (self.resampler.is_resting() || ending > PATIENCE) {
+                return control.write_once(&motion_finished(positions), None);
+            }
+            control.write_once(&positions, None)?;
+        }
+    }
+
+    /// After lost commands the controller has gone on by itself: the next command starts there.
+    fn rejoin(&mut self, state: &RobotState) {
+        let commanded: [Reference; JOINTS] = core::array::from_fn(|joint| Reference {
+            position: state.q_d[joint],
+            velocity: state.dq_d[joint],
+            acceleration: state.ddq_d[joint],
+        });
+        self.resampler.rejoin(&commanded);
+    }
+}
+
+/// The last commands that were sent.
+#[derive(Default)]
+struct Sent {
+    commands: [[f64; JOINTS]; ON_THE_WAY],
+    count: usize,
+    strange: u32,
+}
+
+impl Sent {
+    fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    fn push(&mut self, command: [f64; JOINTS]) {
+        self.commands[self.count % ON_THE_WAY] = command;
+        self.count += 1;
+    }
+
+    /// Whether the controller commands something that was not sent, and not only for a moment;
+    /// `passed` is the time since the last state (s).
+    fn has_gone_on(&mut self, state: &RobotState, passed: f64) -> bool {
+        let far = |told: &[f64; JOINTS]| {
+            let pairs = state.q_d.iter().zip(told);
+            pairs
+                .map(|(is, told)| (is - told).abs())
+                .fold(0.0, f64::max)
+        };
+        let known = self.commands.iter().take(self.count);
+        let known = known.into_iter().any(|told| far(told) <= ELSEWHERE);
+        self.strange = if known { 0 } else { self.strange + 1 };
+        if known || (passed < SLEPT && self.strange < STRANGE) {
+            return false;
+        }
+        self.strange = 0;
+        true
+    }
+}
+
+/// A motion's error in the maker's words.
+fn fault(error: &FrankaError) -> RobotFault {
+    let FrankaError::Control(exception) = error else {
+        return RobotFault::new(None, 0, &error.to_string());
+    };
+    let errors: &Errors = &exception.last_motion_errors;
+    let names = errors.names();
+    let first = errors.0.iter().position(|set| *set);
+    match first {
+        Some(index) => RobotFault::new(None, index as u32 + 1, &names.join(", ")),
+        None => RobotFault::new(None, 0, exception.message.lines().next().unwrap_or("")),
+    }
+}

@@ -1,0 +1,74 @@
+//! The state that a driver sends.
+
+use ipc::{Clock, State, StateFlags};
+
+use crate::{Driver, Measurement, Robot, Sensors};
+
+impl<R: Robot> Driver<R> {
+    /// The state at `now_ns`, with the next sequence number.
+    pub(crate) fn report(&mut self, now_ns: u64) -> State {
+        self.sequence += 1;
+        let mut state = State {
+            joints: self.joints() as u32,
+            session: self.session.as_ref().map_or(0, |session| session.number),
+            sequence: self.sequence,
+            published_ns: now_ns,
+            setpoint_sequence: self.last.sequence,
+            setpoint_published_ns: self.last.published_ns,
+            setpoint_received_ns: self.received_ns,
+            driver_state: self.state as u32,
+            fault: self.fault as u32,
+            fault_joint: self.fault_joint,
+            fault_code: self.fault_code,
+            text: self.fault_text,
+            missed: self.missed,
+            ..State::default()
+        };
+        self.report_joints(&mut state, now_ns);
+        for (tool, feedback) in state.tools.iter_mut().enumerate() {
+            *feedback = self.robot.tool(tool);
+            feedback.order = self.orders[tool];
+        }
+        let inputs = self.robot.inputs();
+        (state.digital_inputs, state.analogue_inputs) = (inputs.digital, inputs.analogue);
+        let mut sensors = Sensors::default();
+        self.robot.sensors(&mut sensors);
+        (state.sensors, state.sensor_count) = sensors.all();
+        let share = self.robot.speed_scaling();
+        // A share that is not a number asks for no motion.
+        state.speed_scaling = if share.is_nan() {
+            0.0
+        } else {
+            share.clamp(0.0, 1.0)
+        };
+        state
+    }
+
+    fn report_joints(&self, state: &mut State, now_ns: u64) {
+        for (joint, measured) in self.measured.iter().enumerate() {
+            state.position[joint] = measured.position;
+            state.velocity[joint] = measured.velocity;
+            state.effort[joint] = measured.effort;
+            state.commanded[joint] = if self.says_commanded {
+                self.commanded[joint]
+            } else {
+                self.references[joint].position
+            };
+        }
+        if self.says_commanded {
+            state.flags |= StateFlags::COMMANDED;
+        }
+        let virtual_time = self.clock() == Some(Clock::LockStep);
+        match self.measurement {
+            Measurement::Now => state.measured_ns = now_ns,
+            Measurement::At { hardware_ns, .. } if virtual_time => {
+                (state.measured_ns, state.hardware_ns) = (now_ns, hardware_ns);
+            }
+            Measurement::At {
+                measured_ns,
+                hardware_ns,
+            } => (state.measured_ns, state.hardware_ns) = (measured_ns, hardware_ns),
+            Measurement::Unknown => state.flags |= StateFlags::UNKNOWN,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What the driver says in a period: states, faults, the speed that the arm asks for.
+
+use core::sync::atomic::Ordering;
+
+use ipc::{DriverState, State, StateFlags};
+use realtime::{Following, check_following};
+
+use super::{Runner, Tick};
+use crate::event::{Event, Fault, ShortText};
+
+/// The arm asks for less speed below the first share; above the second it no longer does.
+const LESS_SPEED: f64 = 0.98;
+const FULL_SPEED: f64 = 0.995;
+
+impl<const N: usize> Runner<N> {
+    /// Looks at what the driver says.
+    pub(super) fn take_state(&mut self, state: Option<State>, tick: Tick) {
+        let fresh = state
+            .filter(|state| state.session == self.session && state.sequence > self.state.sequence);
+        let Some(state) = fresh else {
+            self.quiet += 1;
+            let silent = self.quiet as f64 * self.period;
+            if silent > self.config.patience.as_secs_f64() {
+                self.latch(Fault::DriverLost {
+                    silent_ms: (silent * 1e3) as u64,
+                });
+            }
+            return;
+        };
+        if let Err(cause) = state.check(N) {
+            self.latch(Fault::BadState(cause));
+            return;
+        }
+        self.quiet = 0;
+        self.state = state;
+        self.shared
+            .driver_missed
+            .store(state.missed, Ordering::Relaxed);
+        if tick.now_ns >= state.published_ns {
+            self.shared
+                .state_age
+                .count(tick.now_ns - state.published_ns);
+        }
+        match state.driver() {
+            DriverState::Stopping | DriverState::Fault => {
+                let joint = (state.fault_joint < N as u32).then_some(state.fault_joint);
+                self.latch(Fault::DriverFault {
+                    code: state.fault_code(),
+                    joint,
+                    number: state.fault_code,
+                    text: ShortText(state.text),
+                });
+            }
+            DriverState::Active => self.ready = true,
+            _ => {}
+        }
+        self.watch_speed();
+        if self.is_blind() {
+            return;
+        }
+        let measured = self.measured();
+        if self.ready
+            && self.fault.is_none()
+            && let Some(trip) = check_following(&self.published, &measured, self.following())
+        {
+            self.latch(Fault::Limit(trip));
+        }
+    }
+
+    /// Whether the driver does not know where the arm is; for too long it is a fault.
+    fn is_blind(&mut self) -> bool {
+        if self.state.flags & StateFlags::UNKNOWN == 0 {
+            self.blind = 0;
+            return false;
+        }
+        self.blind += 1;
+        let silent = self.blind as f64 * self.period;
+        if silent > self.config.patience.as_secs_f64() {
+            self.latch(Fault::Unmeasured {
+                silent_ms: (silent * 1e3) as u64,
+            });
+        }
+        true
+    }
+
+    /// Reports that the arm begins or ends to ask for less speed.
+    fn watch_speed(&mut self) {
+        let share = self.state.speed_scaling;
+        let slowed = share < if self.slowed { FULL_SPEED } else { LESS_SPEED };
+        if slowed != self.slowed {
+            self.slowed = slowed;
+            self.report(Event::SpeedAsked {
+                share,
+                tick: self.tick,
+            });
+        }
+    }
+
+    /// How far the arm may be from the setpoint: more for a while after a stall, during which the
+    /// driver continued the motion.
+    fn following(&self) -> Following {
+        let allowed = self.config.following;
+        Following {
+            base: allowed.base + self.ahead,
+            ..allowed
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The driver of Franka arms against franka-sim, with the limits and the rules for lost packets of
+//! its maker enforced.
+
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::canter::{Ran, canter, command};
+
+/// Why there is no controller, or nothing if there is one.
+pub(crate) fn missing() -> Option<String> {
+    let ran = Command::new(python())
+        .args(["-c", "import franka_sim, mujoco"])
+        .stderr(Stdio::null())
+        .status();
+    match ran {
+        Ok(status) if status.success() => None,
+        Ok(_) => Some(format!("{} has no franka-sim==1.1.7", python())),
+        Err(error) => Some(format!("no {}: {error}", python())),
+    }
+}
+
+/// The Python that has the controller.
+fn python() -> String {
+    std::env::var("CANTER_FRANKA_PYTHON").unwrap_or("python3".to_owned())
+}
+
+/// The controller of an arm, as a process group.
+struct Controller {
+    child: Child,
+    port: u16,
+    folder: tempfile::TempDir,
+}
+
+impl Controller {
+    /// Starts it on a port of its own and waits until it listens.
+    fn start() -> Self {
+        let port = TcpListener::bind("127.0.0.1:0")
+            .unwrap()
+            .local_addr()
+            .unwrap()
+            .port();
+        let folder = tempfile::tempdir().unwrap();
+        let child = Self::spawn(port, folder.path());
+        Self {
+            child,
+            port,
+            folder,
+        }
+    }
+
+    fn spawn(port: u16, folder: &std::path::Path) -> Child {
+        let serve = system_tests::repository::root().join("drivers/franka/tests/serve.py");
+        let log = std::fs::File::create(folder.join("log")).unwrap();
+        // With priority where that is allowed: the simulation must keep its millisecond.
+        let priority = Command::new("chrt").args(["-f", "60", "true"]).status();
+        let mut spawned = match priority {
+            Ok(status) if status.success() => {
+                let mut command = Command::new("chrt");
+                command.args(["-f", "60"]).arg(python());
+                command
+            }
+            _ => Command::new(python()),
+        };
+        let mut child = spawned
+            .arg(serve)
+            .arg(port.to_string())
+            .arg(folder)
+            .arg("0.04")
+            .stdout(Stdio::piped())
+            .stderr(log)
+            .process_group(0)
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        assert_eq!(line, "ready\n", "the controller did not start");
+        child
+    }
+
+    fn kill(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    fn restart(&mut self) {
+        self.kill();
+        self.child = Self::spawn(self.port, self.folder.path());
+    }
+
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default()
+    }
+}
+
+impl Drop for Controller {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// The driver, ended when dropped.
+struct Driver(Child);
+
+impl Driver {
+    fn start(arm: &str, port: u16) -> Self {
+        let address = format!("127.0.0.1:{port}");
+        let words = [
+            "driver",
+            "franka",
+            "--robot",
+            "fr3",
+            "--arm",
+            arm,
+            "--address",
+        ];
+        let child = command(words.iter().copied().chain([&address[..]]))
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        Self(child)
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// An arm name that no other test uses.
+fn arm() -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    format!(
+        "franka{}/{}",
+        std::process::id(),
+        COUNT.fetch_add(1, Ordering::Relaxed)
+    )
+}
+
+fn run(arm: &str) -> Ran {
+    let program = "examples/pick_and_place.canon";
+    canter([
+        "run", program, "--robot", "fr3", "--driver", "external", "--arm", arm,
+    ])
+}
+
+/// How many runs the environment asks for; two without.
+fn runs() -> usize {
+    let text = std::env::var("CANTER_FRANKA_RUNS").unwrap_or_default();
+    text.parse().unwrap_or(2)
+}
+
+/// The example with the gripper and an object of 40 mm: no reflex.
+pub(crate) fn pick_and_place() {
+    let controller = Controller::start();
+    let arm = arm();
+    let _driver = Driver::start(&arm, controller.port);
+    for number in 0..runs() {
+        let ran = run(&arm);
+        assert_eq!(ran.code, 0, "run {number}: {ran:?}\n{}", controller.log());
+    }
+    let log = controller.log();
+    assert!(!log.contains("violation"), "{log}");
+}
+
+/// Driver and controller are killed in motion: the engine names what happened, and the next run works
+/// without a restart of anything that lives.
+pub(crate) fn kills_and_restarts() {
+    let mut controller = Controller::start();
+    let arm = arm();
+    let driver = Driver::start(&arm, controller.port);
+    // The controller is killed: the driver lives, and connects again.
+    let run_of = || {
+        let program = "examples/pick_and_place.canon";
+        let words = [
+            "run", program, "--robot", "fr3", "--driver", "external", "--arm", &arm,
+        ];
+        command(words)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let ran = run_of();
+    wait_for_motion(&arm);
+    controller.kill();
+    let ran = ran.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert_eq!(ran.status.code(), Some(7), "{said}");
+    let named = said.contains("the connection is lost") || said.contains("sent nothing");
+    assert!(named, "{said}");
+    controller.restart();
+    let ran = run(&arm);
+    assert_eq!(
+        ran.code,
+        0,
+        "after the controller was killed: {ran:?}\n{}",
+        controller.log()
+    );
+    // The driver is killed: the controller lives.
+    let ran = run_of();
+    wait_for_motion(&arm);
+    drop(driver);
+    let ran = ran.wait_with_output().unwrap();
+    assert_eq!(ran.status.code(), Some(7));
+    let _driver = Driver::start(&arm, controller.port);
+    let ran = run(&arm);
+    assert_eq!(
+        ran.code,
+        0,
+        "after the driver was killed: {ran:?}\n{}",
+        controller.log()
+    );
+}
+
+/// `canter driver test` on it: nothing fails; what only a simulation can do is skipped.
+pub(crate) fn the_driver_conforms() {
+    let controller = Controller::start();
+    let arm = arm();
+    let _driver = Driver::start(&arm, controller.port);
+    let ran = canter(["driver", "test", "--arm", &arm]);
+    assert_eq!(ran.code, 0, "{}\n{}", ran.stdout, controller.log());
+}
+
+/// Waits until a joint moves with more than 0.05 rad/s.
+fn wait_for_motion(arm: &str) {
+    let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(60) {
+        match observer.next_state() {
+            Some(state) if state.velocity.iter().any(|speed| speed.abs() > 0.05) => return,
+            Some(_) => {}
+            None => std::thread::sleep(Duration::from_millis(1)),
+        }
+    }
+    panic!("{arm} does not move");
+}
