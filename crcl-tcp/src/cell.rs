@@ -67,7 +67,19 @@ impl Largest {
     /// targets, and clients ask for more than an arm can do.
     pub(crate) fn cap(&self, command: Command) -> Command {
         use Command as C;
+        let capped = |value: &mut Option<f64>, most: f64| {
+            *value = value.map(|value| value.min(most));
+        };
         match command {
+            C::MoveThroughWaypoints { mut waypoints } => {
+                for waypoint in &mut waypoints {
+                    capped(&mut waypoint.speed, self.speed);
+                    capped(&mut waypoint.acceleration, self.acceleration);
+                    capped(&mut waypoint.rot_speed, self.rot_speed);
+                    capped(&mut waypoint.rot_accel, self.rot_accel);
+                }
+                C::MoveThroughWaypoints { waypoints }
+            }
             C::SetAbsoluteSpeed { value } => C::SetAbsoluteSpeed {
                 value: value.min(self.speed),
             },

@@ -398,6 +398,9 @@ fn kind(command: &XmlCommand) -> Kind {
 fn target(commands: &[Command]) -> Option<[f64; 3]> {
     match commands.iter().rev().find(|command| command.is_move())? {
         Command::MoveScrew { .. } => None,
+        Command::MoveThroughWaypoints { waypoints } => {
+            waypoints.last().map(|waypoint| waypoint.pose.point())
+        }
         last => last.poses().last().map(Pose::point),
     }
 }

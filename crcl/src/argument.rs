@@ -2,6 +2,7 @@
 
 use crate::joint::JointTarget;
 use crate::pose::Pose;
+use crate::pose_and_set::PoseAndSet;
 use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{self, ValueError};
@@ -48,6 +49,8 @@ pub enum ArgumentKind {
     Joints,
     /// A turn with an advance.
     Screw,
+    /// A list of poses with settings of their own.
+    Waypoints,
 }
 
 impl ArgumentKind {
@@ -71,6 +74,7 @@ impl ArgumentKind {
             Self::Poses => "a list of poses",
             Self::Joints => "a list of joints",
             Self::Screw => "a screw",
+            Self::Waypoints => "a list of poses with settings",
         }
     }
 
@@ -89,6 +93,9 @@ impl ArgumentKind {
             Self::Pose => "{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}",
             Self::Poses => "{{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}}, 1",
             Self::Joints => "{{1, 90}, {3, -45, 30}}",
+            Self::Waypoints => {
+                "{{{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}, {\"speed\", 50}, {\"tolerance\", 2}}}"
+            }
             Self::Screw => "{{-5, 720, -20}, {400, 0, 300}}",
         }
     }
@@ -130,6 +137,7 @@ pub(crate) enum Value {
     Poses(Vec<Pose>),
     Joints(Vec<JointTarget>),
     Screw(Screw),
+    Waypoints(Vec<PoseAndSet>),
 }
 
 impl Value {
@@ -181,6 +189,13 @@ impl Value {
     pub(crate) fn pose(self) -> Option<Pose> {
         if let Self::Pose(pose) = self {
             Some(pose)
+        } else {
+            None
+        }
+    }
+    pub(crate) fn waypoints(self) -> Option<Vec<PoseAndSet>> {
+        if let Self::Waypoints(waypoints) = self {
+            Some(waypoints)
         } else {
             None
         }

@@ -59,6 +59,8 @@ codes! {
     NO_POSES = "crcl::no-poses";
     /// A list of joints that is empty, or has a joint twice or none of that number.
     JOINTS = "crcl::joints";
+    /// A setting of a pose that does not exist, or comes twice.
+    POSE_SETTING = "crcl::pose-setting";
     /// A screw with too many or too few parts.
     SCREW = "crcl::screw-shape";
     /// A pose, point or axis with too many or too few parts.

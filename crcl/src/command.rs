@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::argument::Value;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
+use crate::pose_and_set::PoseAndSet;
 use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 
@@ -62,6 +63,12 @@ pub enum Command {
         /// One target for each joint that moves.
         #[schemars(length(min = 1))]
         joints: Vec<JointTarget>,
+    },
+    /// Extension: MoveSmoothlyTo with settings for single poses.
+    MoveThroughWaypoints {
+        /// The poses with their settings, in order.
+        #[schemars(length(min = 1))]
+        waypoints: Vec<PoseAndSet>,
     },
     /// Extension: turn and advance in step.
     MoveScrew {
@@ -181,7 +188,7 @@ impl Command {
         self.parts().0
     }
 
-    /// The poses of a move, in order; empty for every other command.
+    /// The poses of a move, in order; empty for every other command, and for poses with settings.
     pub fn poses(&self) -> &[Pose] {
         match self {
             Self::MoveTo { pose } | Self::MoveStraightTo { pose } => std::slice::from_ref(pose),
@@ -216,6 +223,9 @@ impl Command {
             }
             Self::SaveSettings => ("SaveSettings", Value::None),
             Self::RestoreSettings => ("RestoreSettings", Value::None),
+            Self::MoveThroughWaypoints { waypoints } => {
+                ("MoveThroughWaypoints", Value::Waypoints(waypoints.clone()))
+            }
             Self::MoveScrew { screw } => ("MoveScrew", Value::Screw(*screw)),
             Self::OpenGripper => ("OpenGripper", Value::None),
             Self::CloseGripper => ("CloseGripper", Value::None),

@@ -2,6 +2,7 @@
 
 use crate::argument::{Argument, ArgumentKind, Value};
 use crate::command::Command;
+use crate::pose_and_set::PoseAndSet;
 use crate::value::{self, ValueError};
 
 /// Whether a command is of the standard language.
@@ -176,6 +177,13 @@ pub static COMMANDS: &[CommandInfo] = {
             None,
         ),
         extension(
+            with("MoveThroughWaypoints", "waypoints", Kind::Waypoints, |v| {
+                v.waypoints()
+                    .map(|waypoints| C::MoveThroughWaypoints { waypoints })
+            }),
+            Some("MoveSmoothlyTo"),
+        ),
+        extension(
             with("MoveScrew", "screw", Kind::Screw, |v| {
                 v.screw().map(|screw| C::MoveScrew { screw })
             }),
@@ -266,6 +274,7 @@ impl Command {
             ArgumentKind::Poses,
             ArgumentKind::Joints,
             ArgumentKind::Screw,
+            ArgumentKind::Waypoints,
         ];
         self.info()
             .and_then(|info| info.argument)
@@ -294,6 +303,7 @@ impl Command {
                 value::not_negative(ArgumentKind::Reason.noun(), reason as f64).map(drop)
             }
             (_, Value::Screw(screw)) => screw.check(),
+            (_, Value::Waypoints(waypoints)) => check_waypoints(&waypoints),
             (Some(ArgumentKind::Joints), Value::Joints(joints)) => value::check_targets(&joints),
             (Some(ArgumentKind::Poses), Value::Poses(poses)) if poses.is_empty() => {
                 Err(ValueError::NoPoses)
@@ -308,4 +318,18 @@ impl Command {
             },
         }
     }
+}
+
+/// At least one pose, and nothing wrong with any of them or its settings.
+fn check_waypoints(waypoints: &[PoseAndSet]) -> Result<(), ValueError> {
+    if waypoints.is_empty() {
+        return Err(ValueError::NoPoses);
+    }
+    for waypoint in waypoints {
+        waypoint.check_settings()?;
+        if let Some((_, error)) = waypoint.pose.faults().into_iter().next() {
+            return Err(error);
+        }
+    }
+    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Turns the calls of a text into commands: names, numbers of arguments, types, ranges.
 
 mod screw;
+mod waypoints;
 
 use std::ops::Range;
 
@@ -139,6 +140,7 @@ impl Meaning<'_, '_> {
             ArgumentKind::Poses => self.poses(node).map(Value::Poses),
             ArgumentKind::Joints => self.joints(node).map(Value::Joints),
             ArgumentKind::Screw => self.screw(node).map(Value::Screw),
+            ArgumentKind::Waypoints => self.waypoints(node).map(Value::Waypoints),
             _ => self.quantity(kind, node),
         }
     }

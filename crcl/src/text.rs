@@ -8,6 +8,7 @@ use crate::joint::JointTarget;
 use crate::meaning::Meaning;
 use crate::parser::Parser;
 use crate::pose::Pose;
+use crate::pose_and_set::PoseAndSet;
 use crate::program::{Located, Program, ReadOptions, Reading};
 use crate::screw::Screw;
 use crate::source::Walker;
@@ -124,6 +125,7 @@ pub fn write_command(command: &Command) -> String {
         Value::Poses(poses) => list(&poses),
         Value::Joints(joints) => joint_list(&joints),
         Value::Screw(screw) => screw_parts(&screw),
+        Value::Waypoints(waypoints) => waypoint_list(&waypoints),
     };
     format!("{name} ({argument})")
 }
@@ -140,6 +142,19 @@ fn joint_list(joints: &[JointTarget]) -> String {
     };
     let all: Vec<_> = joints.iter().map(one).collect();
     format!("{{{}}}", all.join(", "))
+}
+
+fn waypoint_list(waypoints: &[PoseAndSet]) -> String {
+    let one = |waypoint: &PoseAndSet| {
+        let settings = PoseAndSet::NAMES.into_iter().zip(waypoint.values());
+        let told = settings.filter_map(|(name, value)| {
+            value.map(|value| format!("{{{}, {}}}", quote(name), number(value)))
+        });
+        let parts: Vec<_> = [pose(&waypoint.pose)].into_iter().chain(told).collect();
+        format!("{{{}}}", parts.join(", "))
+    };
+    let all: Vec<_> = waypoints.iter().map(one).collect();
+    format!("{{{}}}", all.join(",\n    "))
 }
 
 fn screw_parts(screw: &Screw) -> String {

@@ -6,8 +6,8 @@ use crcl::xml::{
     Instruction, JointStatus, PoseStatus, ProgramPlace, Status, XmlCommand,
 };
 use crcl::{
-    AngleUnit, Command, LengthUnit, Pose, Program, ReadOptions, Reading, Screw, Source, code, json,
-    text,
+    AngleUnit, Command, LengthUnit, Pose, PoseAndSet, Program, ReadOptions, Reading, Screw, Source,
+    code, json, text,
 };
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -420,6 +420,20 @@ fn screw() -> impl Strategy<Value = Screw> {
     )
 }
 
+fn waypoint() -> impl Strategy<Value = PoseAndSet> {
+    let size = || prop::option::of(0.0..1e6_f64);
+    let sizes = [size(), size(), size(), size(), size()];
+    (pose(), sizes, any::<bool>()).prop_map(|(pose, [a, b, c, d, e], relative)| PoseAndSet {
+        speed: a,
+        relative_acceleration: (relative && b.is_some()).then_some(12.5),
+        acceleration: b.filter(|_| !relative),
+        rot_speed: c,
+        tolerance: d,
+        angle_tolerance: e,
+        ..PoseAndSet::from(pose)
+    })
+}
+
 /// Commands that text, JSON and XML can all say.
 fn shared_command() -> impl Strategy<Value = Command> {
     let size = || 0.0..1e6_f64;
@@ -447,6 +461,11 @@ fn shared_command() -> impl Strategy<Value = Command> {
             },
         ]),
         screw().prop_map(|screw| Command::MoveScrew { screw }),
+        prop::collection::vec(waypoint(), 2..5)
+            .prop_filter("settings", |all| all
+                .iter()
+                .any(|each| each.speed.is_some()))
+            .prop_map(|waypoints| Command::MoveThroughWaypoints { waypoints }),
         size().prop_map(|value| Command::SetAbsoluteSpeed { value }),
         size().prop_map(|value| Command::SetAbsoluteAcceleration { value }),
         (0..=10_000_u32).prop_map(|n| Command::SetRelativeSpeed {

@@ -9,9 +9,9 @@ use trajectory::JointLimits;
 
 use crate::command_error::{CommandError, ErrorClass};
 use crate::modal::Modal;
-use crate::motion::{PlannedMove, Planner};
+use crate::motion::{MotionError, PlannedMove, Planner};
 use crate::robot::{Robot, RobotError, vector};
-use crate::task::Task;
+use crate::task::{Move, Task};
 
 /// A command that has left the queue: its task and, for a move, its trajectory.
 #[derive(Clone, Debug)]
@@ -168,70 +168,65 @@ impl<const N: usize> Controller<N> {
     pub fn step(&mut self, command: &crcl::Command) -> Result<Step<N>, CommandError> {
         let flange = self.workstation_from_flange.forward(&self.joints);
         let task = self.modal.resolve(command, &flange)?;
-        let step = match task {
+        let (planner, start) = (&self.planner, &self.joints);
+        match task {
             Task::Move(motion) => {
-                self.plans += 1;
-                let planned = self.planner.plan(&motion, &self.joints).map_err(|error| {
-                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
-                })?;
-                self.joints = planned.end;
-                let ticks = self.ticks(planned.trajectory.duration());
-                Step {
-                    task: Task::Move(motion),
-                    planned: Some(planned),
-                    ticks,
-                }
+                let planned = planner.plan(&motion, start);
+                self.moved(motion, planned)
             }
             Task::Joints(motion) => {
-                self.plans += 1;
-                let planned = self.planner.actuate(&motion, &self.joints);
-                let planned = planned.map_err(|error| {
-                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
-                })?;
-                self.joints = planned.end;
-                let ticks = self.ticks(planned.trajectory.duration());
-                Step {
-                    task: Task::Move(motion.of_point(self.pose())),
-                    planned: Some(planned),
-                    ticks,
-                }
+                let planned = planner.actuate(&motion, start);
+                let mut joints = *start;
+                motion.apply(joints.as_mut_slice());
+                let end = self.chain().forward(&joints);
+                self.moved(motion.of_point(end), planned)
+            }
+            Task::Legs(legs) => {
+                let planned = planner.legs(&legs, start);
+                self.moved(legs.motion, planned)
             }
             Task::Screw(motion) => {
-                self.plans += 1;
-                let from = self.pose();
-                let planned = self.planner.screw(&motion, &self.joints);
-                let planned = planned.map_err(|error| {
-                    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
-                })?;
-                self.joints = planned.end;
-                let ticks = self.ticks(planned.trajectory.duration());
-                Step {
-                    task: Task::Move(motion.of_point(&from)),
-                    planned: Some(planned),
-                    ticks,
-                }
+                let planned = planner.screw(&motion, start);
+                self.moved(motion.of_point(&self.pose()), planned)
             }
-            Task::Dwell { seconds } => Step {
+            Task::Dwell { seconds } => Ok(Step {
                 ticks: self.ticks(seconds),
                 planned: None,
                 task,
-            },
+            }),
             Task::Tool(action) => {
                 let time = self.modal.tooling().nominal_time(action);
                 self.change_tool();
-                Step {
+                Ok(Step {
                     ticks: self.ticks(time),
                     planned: None,
                     task,
-                }
+                })
             }
-            _ => Step {
+            _ => Ok(Step {
                 ticks: 0,
                 planned: None,
                 task,
-            },
-        };
-        Ok(step)
+            }),
+        }
+    }
+
+    /// The step of a motion that was planned; the joints are then where it ends.
+    fn moved(
+        &mut self,
+        motion: Move,
+        planned: Result<PlannedMove<N>, MotionError>,
+    ) -> Result<Step<N>, CommandError> {
+        self.plans += 1;
+        let planned = planned.map_err(|error| {
+            CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
+        })?;
+        self.joints = planned.end;
+        Ok(Step {
+            ticks: self.ticks(planned.trajectory.duration()),
+            task: Task::Move(motion),
+            planned: Some(planned),
+        })
     }
 
     /// The task of a command in the present modes; nothing is planned and nothing changes.

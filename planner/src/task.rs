@@ -31,6 +31,8 @@ pub enum Task {
     Joints(JointMove),
     /// Turn and advance in step.
     Screw(ScrewMove),
+    /// Move near poses with limits of their own.
+    Legs(LegsMove),
     /// Open or close the gripper, or the tool changer.
     Tool(ToolAction),
     /// Stop on the path, as soon as the limits allow.
@@ -106,6 +108,39 @@ impl JointMove {
             poses: vec![workstation_from_tool],
             tolerance: 0.0,
             limits: self.limits,
+        }
+    }
+}
+
+/// A smooth move whose legs have limits of their own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LegsMove {
+    /// The move, with the widest limits of all legs.
+    pub motion: Move,
+    /// Limits of the controlled point on the way to each pose.
+    pub limits: Vec<ToolLimits>,
+}
+
+impl LegsMove {
+    /// A smooth move through `poses` within `tolerance` (m), with limits on the way to each.
+    #[must_use]
+    pub fn new(poses: Vec<Isometry3<f64>>, tolerance: f64, limits: Vec<ToolLimits>) -> Self {
+        let widest = limits.iter().copied().reduce(|a, b| ToolLimits {
+            speed: a.speed.max(b.speed),
+            acceleration: a.acceleration.max(b.acceleration),
+            jerk: a.jerk.max(b.jerk),
+            angular_speed: a.angular_speed.max(b.angular_speed),
+            angular_acceleration: a.angular_acceleration.max(b.angular_acceleration),
+            angular_jerk: a.angular_jerk.max(b.angular_jerk),
+        });
+        Self {
+            motion: Move {
+                shape: Shape::Smooth,
+                poses,
+                tolerance,
+                limits: widest.unwrap_or(ToolLimits::UNLIMITED),
+            },
+            limits,
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::fields::Field;
 use crate::finding::Finding;
 use crate::joint::JointTarget;
 use crate::pose::{Pose, PosePart};
+use crate::pose_and_set::PoseAndSet;
 use crate::screw::Screw;
 use crate::units::{AngleUnit, CoordinateFrame, LengthUnit};
 use crate::value::{ValueError, check_targets};
@@ -30,6 +31,7 @@ impl<'a> Reader<'a, '_> {
             ArgumentKind::Poses => self.poses(raw).map(Value::Poses),
             ArgumentKind::Joints => self.joints(raw).map(Value::Joints),
             ArgumentKind::Screw => self.screw(raw).map(Value::Screw),
+            ArgumentKind::Waypoints => self.waypoints(raw).map(Value::Waypoints),
             _ => self.quantity(kind, raw),
         }
     }
@@ -106,6 +108,38 @@ impl<'a> Reader<'a, '_> {
             self.findings.push(finding.found(describe(joint)));
         }
         target.filter(|_| known)
+    }
+
+    fn waypoints(&mut self, raw: &'a RawValue) -> Option<Vec<PoseAndSet>> {
+        let items = self.items("the poses", raw)?;
+        if items.is_empty() {
+            self.findings
+                .push(value_finding(&ValueError::NoPoses, self.span(raw)));
+            return None;
+        }
+        let read: Vec<_> = items.into_iter().map(|item| self.waypoint(item)).collect();
+        read.into_iter().collect()
+    }
+
+    fn waypoint(&mut self, raw: &'a RawValue) -> Option<PoseAndSet> {
+        let noun = "a pose with settings";
+        let fields = self.fields(noun, raw)?;
+        let names: Vec<_> = ["pose"].into_iter().chain(PoseAndSet::NAMES).collect();
+        let known = self.known(noun, &fields, &names);
+        let pose = self.wanted(noun, raw, &fields, "pose")?;
+        let mut waypoint = PoseAndSet::from(self.pose(pose)?);
+        for name in PoseAndSet::NAMES {
+            if let Some(field) = find(&fields, name) {
+                let number = self.number("a setting of a pose", field)?;
+                if let Some(place) = waypoint.value_mut(name) {
+                    *place = Some(number);
+                }
+            }
+        }
+        if let Err(error) = waypoint.check_settings() {
+            self.findings.push(value_finding(&error, self.span(raw)));
+        }
+        Some(waypoint).filter(|_| known)
     }
 
     fn screw(&mut self, raw: &'a RawValue) -> Option<Screw> {

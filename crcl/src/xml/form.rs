@@ -2,9 +2,11 @@
 
 use super::command::{ActuateJoint, JointDetails, MoveScrew, StopCondition, XmlCommand};
 use super::data::{PoseTolerance, Quantity, Waypoint};
+use super::own_settings::settings_of;
 use crate::command::Command;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
+use crate::pose_and_set::PoseAndSet;
 use crate::units::AngleUnit;
 
 /// The command in XML, with the `Name` that carries what XML has no element for. `angle` is the
@@ -41,24 +43,21 @@ pub(super) fn form(
         }),
         Command::MoveSmoothlyTo { poses } | Command::MoveThroughTo { poses } => {
             let waypoints = poses.iter().map(|pose| waypoint(pose, angle));
-            let waypoints = waypoints.collect::<Result<Vec<_>, _>>()?;
-            match *waypoints.as_slice() {
-                [] => Err("a move in XML goes through at least one pose".to_owned()),
-                // The schema wants two waypoints; through no other pose the way is a straight line.
-                [end] => plain(XmlCommand::MoveTo {
-                    straight: true,
-                    end,
-                }),
-                _ => plain(XmlCommand::MoveThroughTo {
-                    straight: false,
-                    waypoints,
-                }),
-            }
+            through(waypoints.collect::<Result<_, _>>()?)
         }
         Command::ActuateJoints { joints } => plain(XmlCommand::ActuateJoints {
             joints: joints.iter().map(actuate_joint).collect(),
             tolerances: Vec::new(),
         }),
+        Command::MoveThroughWaypoints { waypoints } => {
+            let own = |each: &PoseAndSet| -> Result<Waypoint, String> {
+                Ok(Waypoint {
+                    settings: settings_of(each),
+                    ..waypoint(&each.pose, angle)?
+                })
+            };
+            through(waypoints.iter().map(own).collect::<Result<_, _>>()?)
+        }
         Command::MoveScrew { screw } => plain(XmlCommand::MoveScrew(MoveScrew {
             start: match &screw.start {
                 Some(pose) => Some(waypoint(pose, angle)?),
@@ -80,6 +79,23 @@ pub(super) fn form(
         Command::SetCoordinateFrame { .. } => Err("XML has no coordinate frames".to_owned()),
         setting => plain(form_of_setting(setting)?),
     }
+}
+
+/// A move through waypoints.
+fn through(waypoints: Vec<Waypoint>) -> Result<(Option<String>, XmlCommand), String> {
+    let command = match *waypoints.as_slice() {
+        [] => return Err("a move in XML goes through at least one pose".to_owned()),
+        // The schema wants two waypoints; through no other pose the way is a straight line.
+        [end] => XmlCommand::MoveTo {
+            straight: true,
+            end,
+        },
+        _ => XmlCommand::MoveThroughTo {
+            straight: false,
+            waypoints,
+        },
+    };
+    Ok((None, command))
 }
 
 fn form_of_setting(command: &Command) -> Result<XmlCommand, String> {

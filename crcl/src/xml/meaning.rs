@@ -4,7 +4,7 @@ use super::command::{
     ActuateJoint, Instruction, JointDetails, MoveScrew, StopCondition, XmlCommand,
 };
 use super::data::Quantity;
-use super::own_settings::{end_tolerance, own_settings, percent};
+use super::own_settings::{end_tolerance, own_settings, percent, through};
 use super::refusal::{Refusal, refusal};
 use crate::command::Command;
 use crate::joint::JointTarget;
@@ -96,14 +96,11 @@ fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
             } else {
                 Command::MoveTo { pose }
             };
-            own_settings(std::slice::from_ref(end), command).map(Meaning::Commands)
+            Ok(Meaning::Commands(own_settings(end, command)))
         }
         // The way is made of straight lines in either case.
-        XmlCommand::MoveThroughTo { waypoints, .. } => {
-            let poses = waypoints.iter().map(|waypoint| waypoint.pose).collect();
-            own_settings(waypoints, Command::MoveSmoothlyTo { poses }).map(Meaning::Commands)
-        }
-        XmlCommand::MoveScrew(screw) => move_screw(screw),
+        XmlCommand::MoveThroughTo { waypoints, .. } => one(through(waypoints)),
+        XmlCommand::MoveScrew(screw) => Ok(move_screw(screw)),
         XmlCommand::ActuateJoints { joints, .. } => {
             let targets = joints
                 .iter()
@@ -117,7 +114,7 @@ fn motion(command: &XmlCommand) -> Result<Meaning, Refusal> {
 }
 
 /// A start with settings of its own becomes a move of its own: they hold on the way there only.
-fn move_screw(xml: &MoveScrew) -> Result<Meaning, Refusal> {
+fn move_screw(xml: &MoveScrew) -> Meaning {
     let own = xml.start.filter(|start| start.settings.is_some());
     let screw = Screw {
         advance: xml.advance,
@@ -129,12 +126,12 @@ fn move_screw(xml: &MoveScrew) -> Result<Meaning, Refusal> {
     let mut commands = match &own {
         Some(start) => {
             let pose = start.pose;
-            own_settings(std::slice::from_ref(start), Command::MoveTo { pose })?
+            own_settings(start, Command::MoveTo { pose })
         }
         None => Vec::new(),
     };
     commands.push(Command::MoveScrew { screw });
-    Ok(Meaning::Commands(commands))
+    Meaning::Commands(commands)
 }
 
 fn target(joint: &ActuateJoint, occurrence: usize) -> Result<JointTarget, Refusal> {

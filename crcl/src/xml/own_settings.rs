@@ -1,128 +1,89 @@
 //! Poses that bring their own speeds, accelerations and tolerances.
-//!
-//! They hold for one move. A move through several poses is made within the smallest speed and
-//! acceleration and the narrowest tolerance that any of them asks for, which is within those of all.
 
 use super::data::{PoseSettings, PoseTolerance, Quantity, Waypoint};
-use super::refusal::{Refusal, refusal};
 use crate::command::Command;
+use crate::pose_and_set::PoseAndSet;
 
-/// The move with the settings of its poses around it.
-pub(super) fn own_settings(
-    waypoints: &[Waypoint],
-    command: Command,
-) -> Result<Vec<Command>, Refusal> {
-    if waypoints.iter().all(|waypoint| waypoint.settings.is_none()) {
-        return Ok(vec![command]);
-    }
+/// A move to one pose, with the settings of the pose around it.
+pub(super) fn own_settings(waypoint: &Waypoint, command: Command) -> Vec<Command> {
+    let Some(own) = &waypoint.settings else {
+        return vec![command];
+    };
+    let speeds = pose_and_set(waypoint);
+    let without = PoseAndSet {
+        tolerance: None,
+        angle_tolerance: None,
+        ..speeds
+    };
     let mut commands = vec![Command::SaveSettings];
-    commands.extend(speeds(waypoints)?);
-    if let Some((last, others)) = waypoints.split_last() {
-        commands.extend(intermediate_tolerances(others)?);
-        commands.extend(end_tolerances(last));
-    }
+    commands.extend(without.settings());
+    commands.extend(own.tolerance.iter().flat_map(end_tolerance));
     commands.push(command);
     commands.push(Command::RestoreSettings);
-    Ok(commands)
+    commands
 }
 
-fn speeds(waypoints: &[Waypoint]) -> Result<Vec<Command>, Refusal> {
-    let mut commands = Vec::new();
-    if let Some(speed) = smallest(waypoints, "TransSpeed", |own| own.trans_speed)? {
-        commands.push(match speed {
-            Quantity::Absolute(value) => Command::SetAbsoluteSpeed { value },
-            Quantity::Relative(share) => Command::SetRelativeSpeed {
-                percent: percent(share),
-            },
-        });
+/// A move near all poses but the last.
+pub(super) fn through(waypoints: &[Waypoint]) -> Command {
+    if waypoints.iter().all(|waypoint| waypoint.settings.is_none()) {
+        let poses = waypoints.iter().map(|waypoint| waypoint.pose).collect();
+        return Command::MoveSmoothlyTo { poses };
     }
-    if let Some(speed) = smallest(waypoints, "RotSpeed", |own| own.rot_speed)? {
-        commands.push(match speed {
-            Quantity::Absolute(value) => Command::SetAbsoluteRotSpeed { value },
-            Quantity::Relative(share) => Command::SetRelativeRotSpeed {
-                percent: percent(share),
-            },
-        });
+    Command::MoveThroughWaypoints {
+        waypoints: waypoints.iter().map(pose_and_set).collect(),
     }
-    if let Some(accel) = smallest(waypoints, "TransAccel", |own| own.trans_accel)? {
-        commands.push(match accel {
-            Quantity::Absolute(value) => Command::SetAbsoluteAcceleration { value },
-            Quantity::Relative(share) => Command::SetRelativeAcceleration {
-                percent: percent(share),
-            },
-        });
-    }
-    if let Some(accel) = smallest(waypoints, "RotAccel", |own| own.rot_accel)? {
-        commands.push(match accel {
-            Quantity::Absolute(value) => Command::SetAbsoluteRotAccel { value },
-            Quantity::Relative(share) => Command::SetRelativeRotAccel {
-                percent: percent(share),
-            },
-        });
-    }
-    Ok(commands)
 }
 
-/// The smallest of a quantity that all poses have, or none has.
-fn smallest(
-    waypoints: &[Waypoint],
-    element: &'static str,
-    of: impl Fn(&PoseSettings) -> Option<Quantity>,
-) -> Result<Option<Quantity>, Refusal> {
-    let own = |waypoint: &Waypoint| waypoint.settings.as_ref().and_then(&of);
-    let given: Vec<_> = waypoints.iter().filter_map(own).collect();
-    let Some(first) = given.first().copied() else {
-        return Ok(None);
+fn pose_and_set(waypoint: &Waypoint) -> PoseAndSet {
+    let mut found = PoseAndSet::from(waypoint.pose);
+    let own = waypoint.settings.unwrap_or_default();
+    let absolute = |quantity: Option<Quantity>| match quantity {
+        Some(Quantity::Absolute(value)) => Some(value),
+        _ => None,
     };
-    if given.len() < waypoints.len() {
-        return Err(mixed(element));
-    }
-    let least = given
-        .into_iter()
-        .try_fold(first, |least, other| match (least, other) {
-            (Quantity::Absolute(a), Quantity::Absolute(b)) => Some(Quantity::Absolute(a.min(b))),
-            (Quantity::Relative(a), Quantity::Relative(b)) => Some(Quantity::Relative(a.min(b))),
-            _ => None,
-        });
-    let message = format!("`{element}` of one move partly absolute and partly relative");
-    least.map(Some).ok_or_else(|| refusal(element, message))
+    let relative = |quantity: Option<Quantity>| match quantity {
+        Some(Quantity::Relative(share)) => Some(percent(share)),
+        _ => None,
+    };
+    found.speed = absolute(own.trans_speed);
+    found.relative_speed = relative(own.trans_speed);
+    found.acceleration = absolute(own.trans_accel);
+    found.relative_acceleration = relative(own.trans_accel);
+    found.rot_speed = absolute(own.rot_speed);
+    found.relative_rot_speed = relative(own.rot_speed);
+    found.rot_accel = absolute(own.rot_accel);
+    found.relative_rot_accel = relative(own.rot_accel);
+    found.tolerance = own.tolerance.and_then(|tolerance| tolerance.ball());
+    found.angle_tolerance = own.tolerance.and_then(|tolerance| tolerance.angle());
+    found
 }
 
-/// The narrowest tolerances of the poses that are passed, where all have one.
-fn intermediate_tolerances(others: &[Waypoint]) -> Result<Vec<Command>, Refusal> {
-    let tolerances = others.iter().map(|waypoint| {
-        let own = waypoint.settings.as_ref()?;
-        own.tolerance
-    });
-    let given: Vec<_> = tolerances.flatten().collect();
-    if given.is_empty() {
-        return Ok(Vec::new());
-    }
-    if given.len() < others.len() {
-        return Err(mixed("Tolerance"));
-    }
-    let ball = given.iter().filter_map(|each| each.ball()).reduce(f64::min);
-    let angle = given
-        .iter()
-        .filter_map(|each| each.angle())
-        .reduce(f64::min);
-    let ball = ball.map(|tolerance| Command::SetIntermediatePointTolerance { tolerance });
-    let angle = angle.map(|tolerance| Command::SetIntermediateAngleTolerance { tolerance });
-    Ok(ball.into_iter().chain(angle).collect())
-}
-
-fn end_tolerances(last: &Waypoint) -> Vec<Command> {
-    let tolerance = last.settings.as_ref().and_then(|own| own.tolerance);
-    tolerance.map_or_else(Vec::new, |tolerance| end_tolerance(&tolerance))
-}
-
-fn mixed(element: &'static str) -> Refusal {
-    let message =
-        format!("some poses of one move with `{element}` of their own and others without");
-    Refusal {
-        help: Some("give it to every pose of the move, or to none"),
-        ..refusal(element, message)
-    }
+/// The same in XML.
+pub(super) fn settings_of(waypoint: &PoseAndSet) -> Option<PoseSettings> {
+    let quantity = |absolute: Option<f64>, relative: Option<f64>| {
+        let share = relative.map(|percent| Quantity::Relative(percent / 100.0));
+        share.or(absolute.map(Quantity::Absolute))
+    };
+    let PoseAndSet {
+        tolerance: ball,
+        angle_tolerance: angle,
+        ..
+    } = *waypoint;
+    let told = waypoint.values().iter().any(Option::is_some);
+    told.then(|| PoseSettings {
+        coordinated: true,
+        trans_speed: quantity(waypoint.speed, waypoint.relative_speed),
+        rot_speed: quantity(waypoint.rot_speed, waypoint.relative_rot_speed),
+        trans_accel: quantity(waypoint.acceleration, waypoint.relative_acceleration),
+        rot_accel: quantity(waypoint.rot_accel, waypoint.relative_rot_accel),
+        tolerance: (ball.is_some() || angle.is_some()).then_some(PoseTolerance {
+            x: ball,
+            y: ball,
+            z: ball,
+            x_axis: angle,
+            z_axis: angle,
+        }),
+    })
 }
 
 /// A box becomes the ball inside it; what is free stays as it was set before, which is nearer.

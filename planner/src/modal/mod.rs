@@ -1,16 +1,17 @@
 //! Applies the modes of the language (settings, units, the state between InitCanon and EndCanon):
 //! each command becomes a self-contained [`Task`] in SI units.
 
+mod moves;
 mod pose;
 mod settings;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 pub use pose::isometry;
 pub use settings::Settings;
 
 use crate::command_error::CommandError;
-use crate::task::{JointGoal, JointMove, Move, ScrewMove, Shape, Task, ToolAction};
+use crate::task::{Shape, Task, ToolAction};
 use crate::tooling::Tooling;
 use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit, Pose};
 use trajectory::ToolLimits;
@@ -156,6 +157,9 @@ impl Modal {
             }
             Command::ActuateJoints { joints } => self.joints(joints),
             Command::MoveScrew { screw } => self.screw(screw, workstation_from_flange),
+            Command::MoveThroughWaypoints { waypoints } => {
+                self.legs(waypoints, workstation_from_flange)
+            }
             Command::SaveSettings => self.save_settings(),
             Command::RestoreSettings => match self.saved.pop() {
                 Some(settings) => {
@@ -180,61 +184,6 @@ impl Modal {
         }
         self.saved.push(self.settings.clone());
         Ok(Task::Setting)
-    }
-
-    fn joints(&self, targets: &[crcl::JointTarget]) -> Result<Task, CommandError> {
-        self.settings.tool_limits(&self.maxima)?;
-        let goal = |target: &crcl::JointTarget| {
-            let index = usize::try_from(target.joint - 1).unwrap_or(usize::MAX);
-            let Some(slides) = self.sliding.get(index) else {
-                let count = self.sliding.len();
-                let message = format!("the robot has joints 1 to {count}, not {}", target.joint);
-                return Err(CommandError::range(message));
-            };
-            let unit = if *slides {
-                self.length.metres()
-            } else {
-                self.angle.radians()
-            };
-            let told = |value: f64| (value > 0.0).then_some(value * unit);
-            Ok(JointGoal {
-                joint: index,
-                position: target.position * unit,
-                speed: told(target.speed),
-                acceleration: told(target.acceleration),
-            })
-        };
-        let share = |value: f64, most: f64| (value / most).min(1.0);
-        Ok(Task::Joints(JointMove {
-            goals: targets.iter().map(goal).collect::<Result<_, _>>()?,
-            shares: (
-                share(self.settings.speed, self.maxima.speed),
-                share(self.settings.acceleration, self.maxima.acceleration),
-            ),
-            limits: self.maxima,
-        }))
-    }
-
-    fn screw(
-        &self,
-        screw: &crcl::Screw,
-        workstation_from_flange: &Isometry3<f64>,
-    ) -> Result<Task, CommandError> {
-        let frame = self.workstation_from_frame(workstation_from_flange);
-        let start = screw.start.as_ref().map(|pose| {
-            let frame_from_tool = isometry(pose, self.length, self.angle)?;
-            Ok::<_, CommandError>(frame * frame_from_tool)
-        });
-        let metres = self.length.metres();
-        let point = |point: [f64; 3]| frame * Point3::from(point.map(|value| value * metres));
-        Ok(Task::Screw(ScrewMove {
-            start: start.transpose()?,
-            axis_point: screw.axis_point.map(point),
-            free: screw.free * metres,
-            advance: screw.advance * metres,
-            turn: screw.turn * self.angle.radians(),
-            limits: self.settings.tool_limits(&self.maxima)?,
-        }))
     }
 
     fn check_sequence(&self, command: &Command) -> Result<(), CommandError> {
@@ -268,32 +217,6 @@ impl Modal {
     ) -> Result<Task, CommandError> {
         self.tooling.apply(action, workstation_from_flange)?;
         Ok(Task::Tool(action))
-    }
-
-    fn motion(
-        &self,
-        shape: Shape,
-        poses: &[crcl::Pose],
-        workstation_from_flange: &Isometry3<f64>,
-    ) -> Result<Task, CommandError> {
-        let limits = self.settings.tool_limits(&self.maxima)?;
-        let workstation_from_frame = self.workstation_from_frame(workstation_from_flange);
-        let poses = poses
-            .iter()
-            .enumerate()
-            .map(|(index, pose)| {
-                isometry(pose, self.length, self.angle)
-                    .map(|frame_from_tool| workstation_from_frame * frame_from_tool)
-                    .map_err(|error| numbered(error, index, poses.len()))
-            })
-            .collect::<Result<_, _>>()?;
-        let tolerance = self.settings.intermediate_ball();
-        Ok(Task::Move(Move {
-            shape,
-            poses,
-            tolerance,
-            limits,
-        }))
     }
 
     fn workstation_from_frame(&self, workstation_from_flange: &Isometry3<f64>) -> Isometry3<f64> {
@@ -334,13 +257,6 @@ impl Modal {
         }
         Ok(Task::Setting)
     }
-}
-
-fn numbered(mut error: CommandError, index: usize, count: usize) -> CommandError {
-    if count > 1 {
-        error.message = format!("pose {} of {count}: {}", index + 1, error.message);
-    }
-    error
 }
 
 #[cfg(test)]

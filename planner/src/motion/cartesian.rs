@@ -133,7 +133,7 @@ impl<const N: usize> Planner<N> {
 
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine
     /// enough that a quintic between its points stays on the curve.
-    fn followed(
+    pub(super) fn followed(
         &self,
         curve: &dyn ToolCurve,
         still_ends: bool,
@@ -185,7 +185,12 @@ impl<const N: usize> Planner<N> {
     /// Why the path is blocked. If the pose ahead is out of reach by more than the tolerance, that
     /// is the reason: no other path would help.
     #[cold]
-    fn blamed(&self, blocked: MotionError, motion: &Move, start: &SVector<f64, N>) -> MotionError {
+    pub(super) fn blamed(
+        &self,
+        blocked: MotionError,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> MotionError {
         let MotionError::Blocked { pose, .. } = &blocked else {
             return blocked;
         };
@@ -258,7 +263,7 @@ fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<f64>) -> Dr
 }
 
 /// Whether all poses are where the first is, within 1e-9 m and rad.
-fn is_still(poses: &[Isometry3<f64>]) -> bool {
+pub(super) fn is_still(poses: &[Isometry3<f64>]) -> bool {
     poses.iter().all(|pose| {
         let gap = poses[0].inv_mul(pose);
         gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9
@@ -266,7 +271,7 @@ fn is_still(poses: &[Isometry3<f64>]) -> bool {
 }
 
 /// The time at which a monotonic time law reaches `u`, s.
-fn moment(law: &Trajectory<1>, u: f64) -> f64 {
+pub(super) fn moment(law: &Trajectory<1>, u: f64) -> f64 {
     let pieces = law.pieces();
     let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
     let Some(piece) = pieces.get(next.saturating_sub(1)) else {
@@ -314,7 +319,8 @@ fn piece<const N: usize>(from: &FollowPoint<N>, to: &FollowPoint<N>) -> Piece<N>
     Piece::hermite(to.u - from.u, &sample(from), &sample(to))
 }
 
-fn joint_path<'a, const N: usize>(
+/// The followed points as a path of the joints.
+pub(super) fn joint_path<'a, const N: usize>(
     curve: &'a dyn ToolCurve,
     points: &[FollowPoint<N>],
 ) -> Result<HermitePath<N, &'a dyn ToolCurve>, MotionError> {

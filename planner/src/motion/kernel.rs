@@ -13,7 +13,7 @@ use trajectory::ToolLimits;
 
 use super::jog::Direction;
 use super::{MotionError, PlannedMove, Planner};
-use crate::task::{JointMove, Move, ScrewMove};
+use crate::task::{JointMove, LegsMove, Move, ScrewMove};
 use crate::with_dof;
 
 type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
@@ -25,6 +25,7 @@ pub(super) struct Kernel<const N: usize> {
     pub plan: fn(&Planner<N>, &Move, &SVector<f64, N>) -> Planned<N>,
     pub jog: fn(&Planner<N>, &Direction<N>, &SVector<f64, N>, &ToolLimits) -> Planned<N>,
     pub actuate: fn(&Planner<N>, &JointMove, &SVector<f64, N>) -> Planned<N>,
+    pub legs: fn(&Planner<N>, &LegsMove, &SVector<f64, N>) -> Planned<N>,
     pub screw: fn(&Planner<N>, &ScrewMove, &SVector<f64, N>) -> Planned<N>,
     pub postures: fn(&Planner<N>, &Isometry3<f64>, &SVector<f64, N>) -> Vec<SVector<f64, N>>,
 }
@@ -54,6 +55,7 @@ fn table(dof: usize) -> &'static dyn Any {
             plan: Planner::plan_move,
             jog: Planner::plan_jog,
             actuate: Planner::plan_joints,
+            legs: Planner::plan_legs,
             screw: Planner::plan_screw,
             postures: Planner::find_postures,
         };

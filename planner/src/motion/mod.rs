@@ -16,6 +16,7 @@ mod jog;
 mod joined;
 mod kernel;
 mod least;
+mod legs;
 mod motion_error;
 mod reach;
 mod screw;
@@ -37,7 +38,7 @@ use certificate::Arm;
 use draft::Draft;
 use kernel::Kernel;
 
-use crate::task::{JointMove, Move, ScrewMove, Shape};
+use crate::task::{JointMove, LegsMove, Move, ScrewMove, Shape};
 
 /// Joint ratios may exceed 1 by rounding only.
 const ROUNDING: f64 = 1e-9;
@@ -155,6 +156,18 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         (self.kernel.actuate)(self, motion, start)
+    }
+
+    /// Plans a smooth move from `start`, at rest, whose legs have limits of their own.
+    ///
+    /// # Errors
+    /// [`MotionError`] when any part of the move cannot be made.
+    pub fn legs(
+        &self,
+        motion: &LegsMove,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.legs)(self, motion, start)
     }
 
     /// Plans a screw from `start`, at rest: all its parts, at rest between them.

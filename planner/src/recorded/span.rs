@@ -147,6 +147,7 @@ fn of_point(
             let from = recording.arm.flange(joints) * flange_from_tool;
             Task::Move(motion.of_point(&from))
         }
+        Task::Legs(legs) => Task::Move(legs.motion),
         task => task,
     }
 }
