@@ -203,14 +203,19 @@ fn commands(stream: &str) -> Vec<(String, i64, String)> {
     found
 }
 
-/// The last state that the recorded server gave each command.
+/// What the recorded client was told of each command: the first state that ends its waiting. The
+/// simulator of 2017 sometimes says Working under the same number afterwards.
 fn verdicts(stream: &str) -> BTreeMap<i64, String> {
     let statuses = stream.split_inclusive("</CRCLStatus>");
     let statuses = statuses.filter(|text| text.contains("</CRCLStatus>"));
-    statuses
-        .map(|text| Answer(text.to_owned()))
-        .map(|answer| (answer.id(), answer.state().to_owned()))
-        .collect()
+    let mut found = BTreeMap::new();
+    for answer in statuses.map(|text| Answer(text.to_owned())) {
+        if matches!(answer.state(), "CRCL_Done" | "CRCL_Error") {
+            let state = answer.state().to_owned();
+            found.entry(answer.id()).or_insert(state);
+        }
+    }
+    found
 }
 
 /// What the simulator said was done and Canter refuses with a sentence: the simulator of 2017 said
