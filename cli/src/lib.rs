@@ -41,6 +41,7 @@ mod simulation;
 mod table;
 mod view_process;
 mod viewing;
+mod world_boxes;
 mod world_file;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

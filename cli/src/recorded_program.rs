@@ -34,6 +34,22 @@ impl RecordedFile {
         Ok(Self { name, content })
     }
 
+    /// Refuses a file that is not as it was written: what it says proves nothing.
+    ///
+    /// # Errors
+    /// [`Exit::Unreadable`] with the checksum that does not fit.
+    pub(crate) fn check_whole(&self) -> Result<(), Failure> {
+        let Some(cause) = self.content.cut.as_ref().filter(|_| self.content.damaged) else {
+            return Ok(());
+        };
+        let cause = anyhow!(
+            "{}: the file was changed after it was written ({cause}); canter record --recover saves \
+             what stands before that place",
+            self.name
+        );
+        Err(Failure::new(Exit::Unreadable, cause))
+    }
+
     /// The robot by the recording's own files.
     ///
     /// # Errors

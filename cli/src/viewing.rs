@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use view::{Server, ServerOptions, Source};
+use view::{ReadWorld, Server, ServerOptions, Source};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -18,13 +18,14 @@ const PORT: u16 = 8230;
 /// How often to look whether it shall end.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Serves a view until Ctrl-C, or until `ended` says so.
+/// Serves a view until Ctrl-C, or until `ended` says so; with a world, what stands in the workstation
+/// is shown as well.
 ///
 /// # Errors
 /// The port is taken, or the source cannot be read.
 pub(crate) fn serve(
     printer: &Printer,
-    source: Source,
+    (source, world): (Source, Option<ReadWorld>),
     port: Option<u16>,
     ended: impl Fn() -> bool,
 ) -> Result<Exit, Failure> {
@@ -34,11 +35,18 @@ pub(crate) fn serve(
     }
     let moves = matches!(source, Source::Arm(_));
     let server = Server::start(source, ServerOptions { port: chosen(port) })?;
+    if let Some(read) = world {
+        server.show_world(read)?;
+    }
     printer.note(&format!("canter: {}", server.hand_address()));
     if moves {
         printer.note(&format!(
             "canter: to watch only: {}",
             server.watch_address()
+        ));
+        printer.note(&format!(
+            "canter: for Foxglove, Lichtblick and PlotJuggler: {}",
+            server.viewer_address()
         ));
     }
     while !stop.load(Ordering::Relaxed) && !ended() {

@@ -297,11 +297,15 @@ impl<D> Host<D> {
                     }
                     answer
                 }
-                Verb::Jog {
-                    space,
-                    speeds,
-                    timeout_ms,
-                } => jog(session, &space, speeds, timeout_ms),
+                jog @ Verb::Jog { .. } => self::jog(session, jog),
+                Verb::SingleStep { on } => {
+                    session.set_single_step(on);
+                    Answer::accept(Value::Null)
+                }
+                Verb::Next => match session.step_on() {
+                    Ok(()) => Answer::accept(Value::Null),
+                    Err(error) => Answer::refuse(error.to_string()),
+                },
                 _ => Answer::refuse("this engine cannot do that"),
             }
         })
@@ -386,22 +390,34 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
 }
 
 /// Jogs for as long as the client sends requests.
-fn jog(session: &Session, space: &str, speeds: Vec<f64>, timeout_ms: u64) -> Answer {
-    let space = match space {
+fn jog(session: &Session, verb: Verb) -> Answer {
+    let Verb::Jog {
+        space,
+        speeds,
+        timeout_ms,
+        distance,
+        goal,
+    } = verb
+    else {
+        return Answer::refuse("this is no jog");
+    };
+    let space = match space.as_str() {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
         "workstation" => JogSpace::Workstation,
+        "goal" => JogSpace::Goal,
         other => {
             return Answer::refuse(format!(
-                "a jog is in joint, tool or workstation space, not {other:?}"
+                "a jog is in joint, tool or workstation space or towards a goal, not {other:?}"
             ));
         }
     };
-    let timeout = Duration::from_millis(timeout_ms);
     match session.jog(Jog {
         space,
         speeds,
-        timeout,
+        timeout: Duration::from_millis(timeout_ms),
+        distance,
+        goal,
     }) {
         Ok(()) => Answer::accept(Value::Null),
         Err(error) => Answer::refuse(error.to_string()),

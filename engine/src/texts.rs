@@ -81,6 +81,8 @@ pub fn length_word(unit: LengthUnit) -> &'static str {
 pub(crate) struct Texts {
     urdf: String,
     robot: String,
+    /// Where the robot's files are; empty for one that comes with Canter.
+    folder: String,
     program: Option<GivenProgram>,
     /// How many programs were given.
     count: u64,
@@ -91,6 +93,10 @@ impl Texts {
         Self {
             urdf: robot.urdf.clone(),
             robot: robot.toml.clone(),
+            folder: robot
+                .folder
+                .as_ref()
+                .map_or_else(String::new, |folder| folder.display().to_string()),
             program: None,
             count: 0,
         }
@@ -121,12 +127,15 @@ impl Texts {
         let text = match of {
             "urdf" => &self.urdf,
             "robot" => &self.robot,
+            "folder" => &self.folder,
             "program" => match &self.program {
                 Some(program) => &program.text,
                 None => return Answer::refuse("no program was given"),
             },
             other => {
-                return Answer::refuse(format!("a text is urdf, robot or program, not {other:?}"));
+                return Answer::refuse(format!(
+                    "a text is urdf, robot, folder or program, not {other:?}"
+                ));
             }
         };
         let Some(rest) = text.get(from..) else {

@@ -25,14 +25,28 @@ pub enum Verb {
     },
     /// Jog; the arm stops when no further request comes in time.
     Jog {
-        /// `joint`, `tool` or `workstation`.
+        /// `joint`, `tool`, `workstation` or `goal`.
         space: String,
         /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
-        /// tool frame or in the workstation; all 0 stops.
+        /// tool frame or in the workstation; one for all joints towards a goal; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,
+        /// How far at most: m of the tool, or rad or m of the joint that moves most; the jog then
+        /// ends by itself. Without it as far as the arm can go.
+        #[serde(default)]
+        distance: Option<f64>,
+        /// Where a jog in space `goal` ends: one position per joint (rad, m).
+        #[serde(default)]
+        goal: Vec<f64>,
     },
+    /// Execute commands one by one, or all again.
+    SingleStep {
+        /// Whether each command waits for [`Verb::Next`].
+        on: bool,
+    },
+    /// Let the next command begin that waits for it.
+    Next,
     /// Report.
     Status,
     /// What has happened.
@@ -42,7 +56,7 @@ pub enum Verb {
     },
     /// A text of the engine, in parts: the robot's files, or the last program.
     Text {
-        /// `urdf`, `robot` (robot.toml) or `program`.
+        /// `urdf`, `robot` (robot.toml), `folder` (where the robot's files are) or `program`.
         of: String,
         /// Where the part begins (bytes): 0, then the `next` of the answer before.
         from: usize,
@@ -56,7 +70,11 @@ impl Verb {
     /// this; and it is withdrawn when the client gives up waiting.
     pub fn commands(&self) -> bool {
         match self {
-            Self::Submit { .. } | Self::Jog { .. } | Self::Shutdown => true,
+            Self::Submit { .. }
+            | Self::Jog { .. }
+            | Self::SingleStep { .. }
+            | Self::Next
+            | Self::Shutdown => true,
             Self::Status | Self::Notes { .. } | Self::Text { .. } => false,
         }
     }

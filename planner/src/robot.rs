@@ -7,15 +7,17 @@
 mod error;
 mod file;
 mod import;
+mod meshes;
 mod shipped;
 
 pub use error::RobotError;
 pub use import::import;
+pub use meshes::{mesh_file, mesh_names};
 pub use shipped::list;
 
 use kinematics::{Chain, Model, UrdfError};
 use nalgebra::{Isometry3, SVector};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::end_effector::{EndEffector, Gripper, ToolChanger};
 use crate::tooling::{Holder, Tooling};
@@ -115,6 +117,8 @@ pub struct Robot {
     pub name: String,
     /// One line for people.
     pub description: String,
+    /// The folder it was loaded from; none for one that comes with Canter.
+    pub folder: Option<PathBuf>,
     /// Text of the URDF, for viewers and drivers.
     pub urdf: String,
     /// Text of robot.toml, for recordings and viewers.
@@ -216,20 +220,19 @@ fn text_of(path: &Path) -> Result<String, RobotError> {
 fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
     let read = |file: &str| text_of(&folder.join(file));
     let (toml, urdf) = (read("robot.toml")?, read("robot.urdf")?);
-    let name = folder.canonicalize().ok();
-    let name = name
-        .as_deref()
-        .unwrap_or(folder)
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
-    file::Files {
+    let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = whole.file_name().unwrap_or_default().to_string_lossy();
+    let robot = file::Files {
         name: &name,
         place: folder,
         urdf: &urdf,
         toml: &toml,
     }
-    .read()
+    .read()?;
+    Ok(Robot {
+        folder: Some(whole),
+        ..robot
+    })
 }
 
 impl Robot {

@@ -9,6 +9,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
 
 use crate::error::{created, unwritable};
+use crate::live::live_messages;
 use crate::topic::{self, TOPICS};
 use crate::{Head, Periods, RecorderError, Sample, message};
 
@@ -154,20 +155,15 @@ impl McapFile {
 
     /// Writes a period, and 100 times a second what is for viewers.
     pub(crate) fn sample(&mut self, head: &Head, sample: &Sample) -> Result<(), RecorderError> {
-        let (time, joints) = (head.time_of(sample.tick), head.joints.len());
-        let setpoint = message::setpoint(time, sample, joints);
-        self.put(topic::SETPOINT_TOPIC, time, &setpoint)?;
-        let state = message::state(time, sample, joints);
-        self.put(topic::STATE_TOPIC, time, &state)?;
-        if time < self.slow_ns {
-            return Ok(());
+        let time = head.time_of(sample.tick);
+        let slow = time >= self.slow_ns;
+        if slow {
+            self.slow_ns = time + SLOW_NS;
         }
-        self.slow_ns = time + SLOW_NS;
-        let joints = message::joint_state(time, sample, head);
-        self.put(topic::JOINTS_TOPIC, time, &joints)?;
-        let transforms = message::transforms(time, sample, head);
-        self.put(topic::TF_TOPIC, time, &transforms)?;
-        self.put(topic::TOOL_TOPIC, time, &message::tool(time, sample))
+        for (topic, data) in live_messages(head, sample, slow) {
+            self.put(topic, time, &data)?;
+        }
+        Ok(())
     }
 
     /// Ends the chunk: what was written so far can be read after a kill.

@@ -16,6 +16,7 @@ mod cdr;
 mod error;
 mod file;
 mod head;
+mod live;
 mod message;
 mod read;
 mod recording;
@@ -28,6 +29,7 @@ mod writer;
 
 pub use error::RecorderError;
 pub use head::{FORM, Head};
+pub use live::{LiveChannel, live_channels, live_messages, live_text};
 pub use read::{Recorded, RecordedNote, read};
 pub use recording::{Recording, Summary};
 pub use recover::{Recovered, recover};

@@ -42,6 +42,9 @@ pub struct Recorded {
     pub messages: u64,
     /// Why the file ends before its end, if it does: it was cut off by a kill.
     pub cut: Option<String>,
+    /// Whether the file was finished and is not as it was written: a checksum does not fit. What
+    /// stands before the first such place is here, and [`Recorded::cut`] has the reason.
+    pub damaged: bool,
 }
 
 /// Parts of a recording while it is read.
@@ -71,9 +74,9 @@ pub fn read(path: &Path) -> Result<Recorded, RecorderError> {
         return Err(unreadable(path, cause));
     }
     let bytes = fs::read(path).map_err(|cause| unreadable(path, cause))?;
-    let (parts, cut) = parse(&bytes).map_err(|cause| foreign(path, cause))?;
+    let (parts, end) = parse(&bytes).map_err(|cause| foreign(path, cause))?;
     let Some(head) = parts.head else {
-        let found = match cut {
+        let found = match end.cut {
             Some(cause) => format!("a file without head ({cause})"),
             None => format!("a file of {} messages without head", parts.messages),
         };
@@ -91,8 +94,15 @@ pub fn read(path: &Path) -> Result<Recorded, RecorderError> {
         certificates: parts.certificates,
         periods: parts.periods,
         messages: parts.messages,
-        cut,
+        cut: end.cut,
+        damaged: end.damaged,
     })
+}
+
+/// Where a file ends.
+struct End {
+    cut: Option<String>,
+    damaged: bool,
 }
 
 fn foreign(path: &Path, found: String) -> RecorderError {
@@ -102,22 +112,28 @@ fn foreign(path: &Path, found: String) -> RecorderError {
     }
 }
 
-/// The messages up to the end or the first broken chunk, and why it ended there. The checksum of a
-/// chunk is looked at before the first message of it is taken.
-fn parse(bytes: &[u8]) -> Result<(Parts, Option<String>), String> {
+/// The messages up to the end or the first broken chunk, and how it ended. The checksum of a chunk is
+/// looked at before the first message of it is taken, and those of the whole file at its end.
+fn parse(bytes: &[u8]) -> Result<(Parts, End), String> {
     let whole = bytes.ends_with(mcap::MAGIC) && bytes.len() > mcap::MAGIC.len();
     if !bytes.starts_with(mcap::MAGIC) {
         return Err("another kind of file".to_owned());
     }
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true);
+        .with_prevalidate_chunk_crcs(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true);
     let mut reader = LinearReader::new_with_options(options);
-    let mut parts = Parts::default();
+    let (mut parts, mut finished) = (Parts::default(), false);
     let mut rest = bytes;
+    let broken = |cause: String| End {
+        cut: Some(cause),
+        damaged: whole,
+    };
     while let Some(event) = reader.next_event() {
         match event {
-            Err(cause) => return Ok((parts, Some(cause.to_string()))),
+            Err(cause) => return Ok((parts, broken(cause.to_string()))),
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 let (now, later) = rest.split_at(wanted.min(rest.len()));
                 reader.insert(now.len()).copy_from_slice(now);
@@ -125,14 +141,19 @@ fn parse(bytes: &[u8]) -> Result<(Parts, Option<String>), String> {
                 rest = later;
             }
             Ok(LinearReadEvent::Record { opcode, data }) => match parse_record(opcode, data) {
-                Err(cause) => return Ok((parts, Some(cause.to_string()))),
-                Ok(Record::DataEnd(_)) => break,
+                Err(cause) => return Ok((parts, broken(cause.to_string()))),
+                Ok(Record::DataEnd(_)) => finished = true,
+                // What stands behind the messages repeats what is known.
+                Ok(_) if finished => {}
                 Ok(record) => parts.read(record)?,
             },
         }
     }
-    let cut = (!whole).then(|| "the file has no end".to_owned());
-    Ok((parts, cut))
+    let end = End {
+        cut: (!whole).then(|| "the file has no end".to_owned()),
+        damaged: finished && !whole,
+    };
+    Ok((parts, end))
 }
 
 impl Parts {

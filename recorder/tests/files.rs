@@ -225,3 +225,47 @@ fn a_missing_folder_is_told() {
     let error = Writer::create(&missing, head(), Rotation::NEVER).unwrap_err();
     assert!(error.to_string().contains("cannot write"), "{error}");
 }
+
+/// A deterministic sequence of numbers.
+struct Dice(u64);
+
+impl Dice {
+    /// The next number below `most`.
+    ///
+    /// # Source
+    /// G. Marsaglia, Xorshift RNGs, Journal of Statistical Software 8(14), 2003.
+    fn below(&mut self, most: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % most as u64) as usize
+    }
+}
+
+/// One changed byte, wherever it stands, is found: the file is refused, or said to be damaged.
+#[test]
+fn one_changed_byte_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, 1500);
+    let whole = read(&path).unwrap();
+    assert!(whole.cut.is_none() && !whole.damaged);
+    let bytes = fs::read(&path).unwrap();
+    let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
+    let changed = folder.path().join("changed.mcap");
+    // Random places, and every byte of the last 300: the end of the file has its own records.
+    let places = (0..1000)
+        .map(|_| dice.below(bytes.len()))
+        .collect::<Vec<_>>();
+    for place in places.into_iter().chain(bytes.len() - 300..bytes.len()) {
+        let mut copy = bytes.clone();
+        copy[place] ^= 1 << dice.0 % 8;
+        fs::write(&changed, &copy).unwrap();
+        if let Ok(found) = read(&changed) {
+            assert!(found.damaged, "byte {place} of {}", bytes.len());
+            assert!(found.cut.is_some());
+            // What is given all the same is what was written.
+            assert_eq!(found.samples, whole.samples[..found.samples.len()]);
+        }
+    }
+}

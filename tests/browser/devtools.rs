@@ -89,10 +89,7 @@ impl Browser {
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             tab.call(domain, json!({}));
         }
-        tab.call(
-            "Emulation.setDeviceMetricsOverride",
-            json!({"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": false}),
-        );
+        tab.resize(size);
         tab.call("Page.navigate", json!({"url": address}));
         tab
     }
@@ -222,6 +219,25 @@ impl Tab {
         let params = json!({"type": kind, "x": place[0], "y": place[1], "button": "left",
             "buttons": pressed, "clickCount": 1});
         self.call("Input.dispatchMouseEvent", params);
+    }
+
+    /// Chooses a file in an element for files.
+    pub(crate) fn choose(&mut self, selector: &str, file: &Path) {
+        let root = self.call("DOM.getDocument", json!({}))["root"]["nodeId"].clone();
+        let found = self.call(
+            "DOM.querySelector",
+            json!({"nodeId": root, "selector": selector}),
+        );
+        let params = json!({"nodeId": found["nodeId"], "files": [file]});
+        self.call("DOM.setFileInputFiles", params);
+    }
+
+    /// Another size of the tab (pixels).
+    pub(crate) fn resize(&mut self, [width, height]: [u32; 2]) {
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false}),
+        );
     }
 
     /// Presses or releases the space bar.

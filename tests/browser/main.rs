@@ -8,10 +8,16 @@
 
 #[path = "../suite/canter.rs"]
 mod canter;
+mod crowd;
 mod devtools;
+mod jogs;
 mod pages;
+mod relay;
 mod scene;
+mod shapes;
 mod strangers;
+mod viewers;
+mod watcher;
 
 use libtest_mimic::{Arguments, Trial};
 
@@ -24,11 +30,22 @@ macro_rules! trials {
 fn main() {
     let alone: Vec<(&str, fn())> = trials! {
         strangers::strangers_are_refused
+        viewers::viewers_of_other_programs_look_on
+        crowd::ten_pages_at_once
+    };
+    // Minutes: --run-ignored (nextest) or --ignored runs it.
+    let long: Vec<(&str, fn())> = trials! {
+        crowd::ten_pages_for_ten_minutes
     };
     let seen: Vec<(&str, fn())> = trials! {
         pages::the_arm_stands_where_the_engine_says
         pages::a_program_is_led_from_the_page
-        pages::a_jog_ends_with_every_doubt
+        pages::a_program_goes_step_by_step
+        pages::the_past_is_looked_at
+        jogs::a_jog_ends_with_every_doubt
+        jogs::steps_and_taught_poses
+        jogs::a_gamepad_needs_its_enabling_button
+        shapes::meshes_of_an_imported_robot_are_drawn
         pages::two_pages_fight_for_the_hand
         pages::a_page_of_another_origin_gets_nothing
         pages::a_recording_is_shown
@@ -48,6 +65,7 @@ fn main() {
         .with_ignored_flag(ignored)
     };
     let mut trials: Vec<Trial> = alone.into_iter().map(|found| trial(found, false)).collect();
+    trials.extend(long.into_iter().map(|found| trial(found, true)));
     trials.extend(seen.into_iter().map(|found| trial(found, missing)));
     libtest_mimic::run(&arguments, trials).exit();
 }

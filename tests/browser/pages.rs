@@ -2,7 +2,7 @@
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::canter::canter;
 use crate::devtools::{Browser, Tab};
@@ -10,14 +10,14 @@ use crate::scene::{Peer, Scene};
 use system_tests::repository::root;
 use system_tests::signal;
 
-const SIZE: [u32; 2] = [1400, 860];
+pub(crate) const SIZE: [u32; 2] = [1400, 860];
 
 /// Waits until the page has the robot and periods come.
-fn ready(tab: &mut Tab) {
+pub(crate) fn ready(tab: &mut Tab) {
     tab.wait("window.__view && __view.robot && __view.samples.count > 50");
 }
 
-fn take_hand(tab: &mut Tab) {
+pub(crate) fn take_hand(tab: &mut Tab) {
     tab.click("#hand");
     tab.wait("__view.pendant.has");
 }
@@ -69,52 +69,47 @@ pub(crate) fn the_arm_stands_where_the_engine_says() {
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
 }
 
-/// Load, plan, preview, run, override, pause, resume, stop, fault, recover: all from the page.
+/// Load, plan, preview, run, override, pause, resume, stop, fault, recover: all from the page. The
+/// pictures of the documentation are taken on the way.
 pub(crate) fn a_program_is_led_from_the_page() {
-    let scene = Scene::start("program");
+    let scene = Scene::start("cell/arm");
     let browser = Browser::start();
     let mut tab = browser.open(&scene.hand, SIZE);
     ready(&mut tab);
     take_hand(&mut tab);
-    let text = std::fs::read_to_string(root().join("examples/pick_and_place.canon")).unwrap();
-    let set = |tab: &mut Tab, text: &str| {
-        let text = serde_json::to_string(text).unwrap();
-        tab.eval(&format!(
-            "__view.program.set('page.canon', {text}); __view.program.edited = true; 0"
-        ));
-    };
     // A fault of the program has its place on the page, and moves nothing.
-    set(
-        &mut tab,
-        "InitCanon()\nSetRelativeSpeed(50)\nMoveTo({{9000, 0, 0}, {0,0,-1}, {1,0,0}})\nEndCanon(0)\n",
-    );
-    tab.click("#plan");
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = folder.path().join("wrong.canon");
+    let text = "InitCanon()\nSetRelativeSpeed(50)\nMoveTo({{9000, 0, 0}, {0,0,-1}, {1,0,0}})\nEndCanon(0)\n";
+    std::fs::write(&wrong, text).unwrap();
+    tab.choose("#file", &wrong);
     tab.wait("document.querySelector('#findings button')?.textContent.startsWith('3:')");
-    set(&mut tab, &text);
-    tab.click("#plan");
+    // A browser reads no path with two dots.
+    let example = root().join("examples/pick_and_place.canon");
+    tab.choose("#file", &example.canonicalize().unwrap());
     tab.wait("__view.program.plan && __view.stage.planned && __view.stage.planned.count > 100");
     tab.wait("!document.querySelector('#findings button')");
+    assert_eq!(
+        tab.eval("document.querySelector('#program-name').textContent"),
+        "pick_and_place.canon"
+    );
     tab.click("#run");
     tab.wait("!__view.status.idle && __view.program.line > 0");
-    tab.wait("__view.stage.trail.count > 60");
+    // The smooth move of line 25, in both colours and on a tablet.
+    tab.wait("__view.program.line === 25 && document.querySelector('#certificate .why')");
     tab.dark(false);
-    tab.wait("document.querySelector('#certificate .why')");
     keep(&mut tab, "view_light.png");
     tab.dark(true);
-    std::thread::sleep(Duration::from_millis(400));
+    tab.click("[data-tab=commands]");
+    tab.click("[data-layer=corridor]");
+    std::thread::sleep(Duration::from_millis(300));
     keep(&mut tab, "view_dark.png");
-    tab.eval("(() => { const o = document.querySelector('#override'); o.value = 30; o.dispatchEvent(new Event('input')); })()");
-    tab.wait("__view.status.idle || Math.abs(__view.status.time_scaling - 0.3) < 0.02");
-    tab.click("#pause");
-    tab.wait("__view.status.held && __view.status.time_scaling === 0");
-    tab.click("#resume");
-    tab.wait("!__view.status.held");
-    tab.click("#stop");
-    tab.wait("__view.status.held");
-    tab.click("#abort");
+    tab.resize([820, 1180]);
+    std::thread::sleep(Duration::from_millis(300));
+    keep(&mut tab, "view_tablet.png");
+    tab.resize(SIZE);
     tab.wait("__view.status.idle");
-    tab.click("#resume");
-    tab.wait("!__view.status.held");
+    lead(&mut tab);
     // The engine stands still for longer than the watchdog: a fault, with its words on the page.
     signal::send(&scene.engine.child, libc::SIGSTOP);
     std::thread::sleep(Duration::from_millis(700));
@@ -126,116 +121,94 @@ pub(crate) fn a_program_is_led_from_the_page() {
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
 }
 
-/// Whether joint 1 moves, by what the engine published.
-const MOVES: &str = "Math.abs(__view.samples.at(__view.samples.count - 1, 7 + 6)) > 0.02";
-
-/// Waits until the arm rests; ms and rad of joint 1 since `from`.
-fn rest(scene: &Scene, since: Instant, from: f64) -> (f64, f64) {
-    let mut last = f64::NAN;
-    loop {
-        let now = scene.status()["setpoint"][0].as_f64().unwrap();
-        if now == last {
-            return (since.elapsed().as_secs_f64() * 1e3, (now - from).abs());
-        }
-        last = now;
-        assert!(since.elapsed() < Duration::from_secs(60), "the jog runs on");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+/// Runs the program of the page again, slower, and stops it in every way.
+fn lead(tab: &mut Tab) {
+    tab.eval("(() => { const o = document.querySelector('#override'); o.value = 30; o.dispatchEvent(new Event('input')); })()");
+    tab.click("#run");
+    tab.wait("!__view.status.idle && Math.abs(__view.status.time_scaling - 0.3) < 0.02");
+    tab.click("#pause");
+    tab.wait("__view.status.held && __view.status.time_scaling === 0");
+    tab.click("#resume");
+    tab.wait("!__view.status.held");
+    tab.click("#stop");
+    tab.wait("__view.status.held");
+    tab.click("#abort");
+    tab.wait("__view.status.idle");
+    tab.click("#resume");
+    tab.wait("!__view.status.held");
+    tab.eval("(() => { const o = document.querySelector('#override'); o.value = 100; o.dispatchEvent(new Event('input')); })()");
 }
 
-fn joint(scene: &Scene) -> f64 {
-    scene.status()["setpoint"][0].as_f64().unwrap()
-}
-
-/// Every way in which whoever holds a button can be lost ends the jog; how long and how far it went
-/// on is printed.
-pub(crate) fn a_jog_ends_with_every_doubt() {
-    let scene = Scene::start("jog");
+/// In single step each command waits for the button; then all go on.
+pub(crate) fn a_program_goes_step_by_step() {
+    let scene = Scene::start("steps");
     let browser = Browser::start();
     let mut tab = browser.open(&scene.hand, SIZE);
     ready(&mut tab);
     take_hand(&mut tab);
-    tab.eval("(() => { const s = document.querySelector('#jog-speed'); s.value = 10; s.dispatchEvent(new Event('input')); })()");
-    let ways: [(&str, &str); 8] = [
-        ("released", ""),
-        ("key released", ""),
-        ("focus lost", "window.dispatchEvent(new Event('blur'))"),
-        (
-            "tab hidden",
-            "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
-             document.dispatchEvent(new Event('visibilitychange')); delete document.hidden; 0",
-        ),
-        (
-            "mode changed",
-            "document.querySelector('[data-space=tool]').click()",
-        ),
-        (
-            "pointer cancelled",
-            "window.dispatchEvent(new PointerEvent('pointercancel', { pointerId: __view.pendant.held.pointer }))",
-        ),
-        ("socket closed", "__view.act.link.socket.close()"),
-        ("page stands still", ""),
-    ];
-    println!("| jog ends by | after, ms | joint 1 went on, rad |");
-    println!("|---|---|---|");
-    for (index, (way, script)) in ways.into_iter().enumerate() {
-        let button = format!("[data-jog='0:{}']", if index % 2 == 0 { 1 } else { -1 });
-        tab.click("[data-space=joint]");
+    tab.eval("__view.program.set('steps.canon', 'InitCanon()\\nDwell(0.2)\\nDwell(0.3)\\nMessage(\"end\")\\nEndCanon(0)\\n'); __view.program.edited = true; 0");
+    let done = |tab: &mut Tab, count: usize| {
         tab.wait(&format!(
-            "document.querySelector(\"{button}\") && !document.querySelector(\"{button}\").disabled"
+            "[...document.querySelectorAll('#notes li')].filter((note) => note.textContent.endsWith(' done')).length === {count}"
         ));
-        if way == "key released" {
-            tab.eval(&format!("document.querySelector(\"{button}\").focus()"));
-            tab.space("keyDown");
-        } else {
-            tab.pointer("mousePressed", &button);
-        }
-        tab.wait(MOVES);
-        let (from, since) = (joint(&scene), Instant::now());
-        match way {
-            "released" => tab.pointer("mouseReleased", &button),
-            "key released" => tab.space("keyUp"),
-            "page stands still" => signal::send(&browser.child, libc::SIGSTOP),
-            _ => {
-                tab.eval(script);
-            }
-        }
-        if way == "page stands still" {
-            // The whole browser: children of it that go on know nothing of what is held.
-            tab_stalls(&browser);
-        }
-        let (after, went) = rest(&scene, since, from);
-        println!("| {way} | {after:.0} | {went:.4} |");
-        // The beat's time and the braking time; a machine under load needs longer.
-        assert!(went < 1.0, "{way}: {went} rad");
-        if way == "page stands still" {
-            break;
-        }
-        tab.wait("__view.pendant.held === null");
-        tab.pointer("mouseReleased", &button);
-        if way == "socket closed" {
-            tab.wait("__view.act.link.isOpen && !document.querySelector('#hand').disabled");
-            assert_eq!(
-                tab.eval("__view.pendant.has"),
-                false,
-                "the hand goes with the socket"
-            );
-            take_hand(&mut tab);
-        }
+        tab.wait("document.querySelector('#state').textContent === 'waits for Step'");
+    };
+    for count in 1..=3 {
+        tab.click("#step-on");
+        done(&mut tab, count);
+        std::thread::sleep(Duration::from_millis(300));
+        done(&mut tab, count);
     }
+    assert_eq!(
+        tab.eval("document.querySelector('#run').textContent"),
+        "Continue"
+    );
+    tab.click("#run");
+    tab.wait("__view.status.idle && __view.status.state === 'ended'");
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
-    resume(&browser);
 }
 
-/// Stops every process of the browser.
-fn tab_stalls(browser: &Browser) {
+/// While the plots are frozen, the picture shows where the arm was, and says so.
+pub(crate) fn the_past_is_looked_at() {
+    let scene = Scene::start("past");
+    let browser = Browser::start();
+    let mut tab = browser.open(&scene.hand, SIZE);
+    ready(&mut tab);
+    take_hand(&mut tab);
+    let jog = "__view.act.ask({ do: 'step', space: 'joint', speeds: [0.3, 0, 0, 0, 0, 0], distance: 0.3, sent_ms: performance.now() }).then((a) => a.ok)";
+    let first = tab.number("__view.samples.newestJoints(true)[0]");
+    assert_eq!(tab.eval(jog), true);
+    tab.wait(&format!(
+        "__view.samples.newestJoints(true)[0] > {first} + 0.29 && __view.status.idle"
+    ));
+    tab.click("#freeze");
+    tab.eval(
+        "(() => { __view.plots.end = __view.samples.tick(20); __view.plots.cursor = null; })()",
+    );
+    tab.wait("!document.querySelector('#past').hidden && document.querySelector('#past').textContent.includes('s ago')");
+    // The picture has the joint where it was.
+    tab.wait(&format!("Math.abs(2 * Math.asin(__view.stage.robot.joints[0].moving.quaternion.z) - ({first})) < 0.01"));
+    tab.click("#freeze");
+    tab.wait("document.querySelector('#past').hidden");
+    let csv = tab.eval("__view.plots.csv()");
+    let text = csv.as_str().unwrap();
+    assert!(
+        text.starts_with("t_s,J1 (% of limit)") && text.lines().count() > 100,
+        "{text:.200}"
+    );
+    assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
+}
+
+/// Stops every process of the browser: its parts that go on know nothing of what is held.
+pub(crate) fn stall(browser: &Browser) {
+    signal::send(&browser.child, libc::SIGSTOP);
     for process in family(browser.child.id()) {
         send(process, libc::SIGSTOP);
     }
 }
 
 /// Lets them go on, so that they can be ended.
-fn resume(browser: &Browser) {
+pub(crate) fn resume(browser: &Browser) {
     for process in family(browser.child.id()) {
         send(process, libc::SIGCONT);
     }
@@ -297,7 +270,7 @@ pub(crate) fn two_pages_fight_for_the_hand() {
         refused.as_str().unwrap().contains("another page"),
         "{refused}"
     );
-    let jog = "__view.act.ask({ do: 'jog', space: 'joint', speeds: [0.1, 0, 0, 0, 0, 0] }).then((a) => a.ok)";
+    let jog = "__view.act.ask({ do: 'jog', space: 'joint', speeds: [0.1, 0, 0, 0, 0, 0], sent_ms: performance.now() }).then((a) => a.ok)";
     assert_eq!(second.eval(jog), false);
     assert_eq!(
         watcher.eval("__view.act.ask({ do: 'take' }).then((a) => a.ok)"),

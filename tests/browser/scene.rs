@@ -58,25 +58,43 @@ impl Peer {
 pub(crate) struct Scene {
     pub(crate) arm: String,
     pub(crate) engine: Peer,
-    _view: Peer,
+    view: Peer,
     pub(crate) hand: String,
     pub(crate) watch: String,
+    /// Where viewers of other programs connect.
+    pub(crate) viewer: String,
 }
 
 impl Scene {
     pub(crate) fn start(name: &str) -> Self {
-        let arm = format!("browser{}/{name}", std::process::id());
-        let mut engine = Peer::start(&["engine", "--robot", "ur5e", "--arm", &arm]);
-        engine.line("engine of ur5e");
+        Self::of(name, "ur5e")
+    }
+
+    /// The same with another robot.
+    pub(crate) fn of(name: &str, robot: &str) -> Self {
+        let arm = if name.contains('/') {
+            name.to_owned()
+        } else {
+            format!("browser{}/{name}", std::process::id())
+        };
+        let mut engine = Peer::start(&["engine", "--robot", robot, "--arm", &arm]);
+        engine.line("engine of ");
         let mut view = Peer::start(&["view", "--arm", &arm, "--port", "0"]);
         let (hand, watch) = (view.line("http://"), view.line("http://"));
+        let viewer = view.line("ws://");
         Self {
             arm,
             engine,
-            _view: view,
+            view,
             hand,
             watch,
+            viewer,
         }
+    }
+
+    /// The number of the view's process.
+    pub(crate) fn view_process(&self) -> u32 {
+        self.view.child.id()
     }
 
     /// The port of the view.

@@ -6,15 +6,19 @@
 
 #[path = "../suite/canter.rs"]
 mod canter;
+mod faults;
+mod kills;
+mod readers;
+mod replays;
 
-use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::canter::{Ran, canter, command};
-use system_tests::signal;
+
+use libtest_mimic::{Arguments, Trial};
 
 /// How long a test waits for something that must come.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -27,7 +31,7 @@ fn arm(name: &str) -> String {
 }
 
 /// A process that is killed when a test fails before its end.
-struct Peer(Child);
+pub(crate) struct Peer(pub(crate) Child);
 
 impl Drop for Peer {
     fn drop(&mut self) {
@@ -53,6 +57,16 @@ fn engine(arm: &str, options: &[String]) -> Peer {
     Peer(child)
 }
 
+/// Gives the program to an engine and looks on while it runs.
+fn send(arm: &str) -> Peer {
+    let child = command(["send", PROGRAM, "--arm", arm])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    Peer(child)
+}
+
 fn recorded_run(file: &Path, name: &str) -> Ran {
     let record = format!("--record={}", file.display());
     let ran = canter([
@@ -72,8 +86,7 @@ fn recorded_run(file: &Path, name: &str) -> Ran {
 
 /// A recorded run is judged like its CSV, and executed again with equal bits; one changed number is
 /// found, with command, time and joint.
-#[test]
-fn a_recorded_run_is_judged_and_executed_again() {
+pub(crate) fn a_recorded_run_is_judged_and_executed_again() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.mcap");
     recorded_run(&file, "judged");
@@ -129,8 +142,7 @@ fn a_recorded_run_is_judged_and_executed_again() {
 }
 
 /// A recording that looks on from outside has the run, and ends with its engine.
-#[test]
-fn an_arm_is_recorded_from_outside() {
+pub(crate) fn an_arm_is_recorded_from_outside() {
     let arm = arm("outside");
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("outside.mcap");
@@ -171,11 +183,16 @@ fn an_arm_is_recorded_from_outside() {
 }
 
 fn wait_until_idle(arm: &str) {
+    wait_for(arm, |now| now["idle"] == true && now["queued"] == 0);
+}
+
+/// Waits until the status of an arm is as wanted.
+fn wait_for(arm: &str, wanted: impl Fn(&serde_json::Value) -> bool) {
     let end = Instant::now() + PATIENCE;
     loop {
         let ran = canter(["status", "--json", "--arm", arm]);
         let now: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
-        if now["idle"] == true && now["queued"] == 0 {
+        if wanted(&now) {
             return;
         }
         assert!(Instant::now() < end, "{now}");
@@ -183,112 +200,64 @@ fn wait_until_idle(arm: &str) {
     }
 }
 
-/// The file that is being written is read after a kill, up to the last second or two.
-#[test]
-fn a_kill_loses_a_moment_at_most() {
-    let folder = tempfile::tempdir().unwrap();
-    for (number, life_ms) in [(0, 2300), (1, 3100)] {
-        let file = folder.path().join(format!("killed{number}.mcap"));
-        let record = format!("--record={}", file.display());
-        let mut engine = engine(&arm(&format!("killed{number}")), &[record]);
-        std::thread::sleep(Duration::from_millis(life_ms));
-        engine.0.kill().unwrap();
-        engine.0.wait().unwrap();
-        let part = folder.path().join(format!("killed{number}.mcap.part"));
-        let recorded = recorder::read(&part).unwrap();
-        assert!(recorded.cut.is_some());
-        let seconds = recorded.samples.len() as f64 * 1e-3;
-        // A machine under load may have started late.
-        assert!(seconds > 0.3, "{seconds} s of {life_ms} ms");
-        let ran = canter(["record", "--recover", &part.display().to_string()]);
-        assert_eq!(ran.code, 0, "{}", ran.stderr);
-        let whole = recorder::read(&file).unwrap();
-        assert_eq!(whole.cut, None);
-        assert_eq!(whole.samples, recorded.samples);
-    }
-}
-
-/// A fault writes the time before it to a file that its message names.
-#[test]
-fn a_fault_leaves_the_minute_before_it() {
-    let arm = arm("fault");
-    let folder = tempfile::tempdir().unwrap();
-    let faults = format!("--faults={}", folder.path().display());
-    let engine = engine(&arm, &[faults]);
-    assert_eq!(canter(["send", PROGRAM, "--arm", &arm]).code, 0);
-    std::thread::sleep(Duration::from_millis(1200));
-    // Longer than the watchdog of engine and driver.
-    signal::send(&engine.0, libc::SIGSTOP);
-    std::thread::sleep(Duration::from_millis(600));
-    signal::send(&engine.0, libc::SIGCONT);
-    let end = Instant::now() + PATIENCE;
-    let fault = loop {
-        let ran = canter(["status", "--json", "--arm", &arm]);
-        let now: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
-        if let Some(fault) = now["fault"]
-            .as_str()
-            .filter(|fault| fault.contains(".mcap"))
-        {
-            break fault.to_owned();
-        }
-        assert!(Instant::now() < end, "no fault with a file: {now}");
-        std::thread::sleep(Duration::from_millis(50));
+macro_rules! trials {
+    ($($test:path),* $(,)?) => {
+        vec![$((stringify!($test), $test as fn())),*]
     };
-    let named = fault.rsplit(' ').next().map(PathBuf::from).unwrap();
-    assert!(named.starts_with(folder.path()), "{fault}");
-    while !named.exists() {
-        assert!(Instant::now() < end, "{} is not finished", named.display());
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    let recorded = recorder::read(&named).unwrap();
-    assert_eq!(recorded.head.reason, "fault");
-    assert_eq!(recorded.programs.len(), 1);
-    assert!(recorded.samples.len() > 500, "{}", recorded.samples.len());
-    assert!(
-        recorded
-            .notes
-            .iter()
-            .any(|note| note.json.contains("faulted"))
-    );
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// The Python library reads the file, with equal counts and values.
-#[test]
-#[ignore = "needs Python with mcap and mcap-ros2-support: pip install mcap mcap-ros2-support"]
-fn python_reads_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("run.mcap");
-    recorded_run(&file, "python");
-    let script = "import sys, json\n\
-        from mcap.reader import make_reader\n\
-        from mcap_ros2.decoder import DecoderFactory\n\
-        n = {}; s = 0.0\n\
-        reader = make_reader(open(sys.argv[1], 'rb'), validate_crcs=True, \
-        decoder_factories=[DecoderFactory()])\n\
-        for schema, channel, message, ros in reader.iter_decoded_messages():\n    \
-        n[channel.topic] = n.get(channel.topic, 0) + 1\n    \
-        s += sum(ros.position) if channel.topic == '/canter/setpoint' else 0.0\n\
-        print(json.dumps([n, s]))\n";
-    let python = std::process::Command::new("python3")
-        .args(["-c", script])
-        .arg(&file)
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&python.stderr);
-    assert!(python.status.success(), "{text}");
-    let found: serde_json::Value = serde_json::from_slice(&python.stdout).unwrap();
-    let ours = recorder::read(&file).unwrap();
-    let sum: f64 = ours
-        .samples
-        .iter()
-        .map(|sample| sample.position[..6].iter().sum::<f64>())
-        .sum();
-    assert_eq!(found[0]["/canter/setpoint"], ours.samples.len());
-    assert_eq!(found[0]["/canter/state"], ours.samples.len());
-    assert_eq!(found[0]["/robot_description"], 1);
-    assert!(
-        (found[1].as_f64().unwrap() - sum).abs() < 1e-6,
-        "{found} {sum}"
+/// Whether a program runs these words without an error.
+fn runs(program: &str, words: [&str; 2]) -> bool {
+    let ran = std::process::Command::new(program).args(words).output();
+    ran.is_ok_and(|ran| ran.status.success())
+}
+
+fn main() {
+    let always: Vec<(&str, fn())> = trials! {
+        a_recorded_run_is_judged_and_executed_again,
+        an_arm_is_recorded_from_outside,
+        kills::a_kill_loses_a_moment_at_most,
+        faults::a_fault_leaves_the_minute_before_it,
+    };
+    // Minutes each: --run-ignored (nextest) or --ignored runs them.
+    let long: Vec<(&str, fn())> = trials! {
+        kills::fifty_kills_lose_a_moment_each,
+        faults::twenty_faults_leave_the_minute_before_them,
+        replays::twenty_recordings_are_executed_again,
+    };
+    let python = runs("python3", ["-c", "import mcap, mcap_ros2"]);
+    let node = runs(
+        "node",
+        ["-e", "require('@mcap/core'); require('@mcap/support')"],
     );
+    if !python {
+        eprintln!("Python has no mcap: pip install mcap mcap-ros2-support");
+    }
+    if !node {
+        eprintln!("node has no @mcap/core: npm install @mcap/core @mcap/support, and NODE_PATH");
+    }
+    let trial = |(name, test): (&str, fn()), ignored: bool| {
+        Trial::test(name, move || {
+            test();
+            Ok(())
+        })
+        .with_ignored_flag(ignored)
+    };
+    let mut trials: Vec<Trial> = always
+        .into_iter()
+        .map(|found| trial(found, false))
+        .collect();
+    trials.extend(long.into_iter().map(|found| trial(found, true)));
+    trials.push(trial(
+        ("python_reads_the_file", readers::python_reads_the_file),
+        !python,
+    ));
+    trials.push(trial(
+        ("node_reads_the_file", readers::node_reads_the_file),
+        !node,
+    ));
+    let mut arguments = Arguments::from_args();
+    // Each has an engine by the clock: side by side they would take each other's time.
+    arguments.test_threads = Some(1);
+    libtest_mimic::run(&arguments, trials).exit();
 }

@@ -3,7 +3,7 @@
 const KEY = 'canter token';
 
 /** The token of the address, which is then taken out of it, or of this tab's memory. */
-function token() {
+export function token() {
   const word = location.hash.slice(1);
   if (/^[0-9a-f]{32}$/.test(word)) {
     sessionStorage.setItem(KEY, word);

@@ -1,14 +1,22 @@
 // Puts the page together.
 
 import { drawRamp, JOINTS } from './colours.js';
-import { Link } from './link.js';
+import { Gamepads } from './gamepad.js';
+import { Header } from './header.js';
+import { Link, token } from './link.js';
+import { Measure } from './measure.js';
+import { Meshes } from './mesh.js';
 import { Pendant } from './pendant.js';
 import { Player } from './player.js';
 import { Plots } from './plots.js';
+import { Poses } from './poses.js';
 import { Program } from './program.js';
-import { axes, Readout, rollPitchYaw } from './readout.js';
+import { Queue } from './queue.js';
+import { Readout, rollPitchYaw } from './readout.js';
 import { COMMAND, PATH_TIME, POINT, Samples } from './samples.js';
 import { Stage } from './scene.js';
+import { Tabs } from './tabs.js';
+import { WorldObjects } from './world.js';
 
 const get = (id) => document.getElementById(id);
 const samples = new Samples();
@@ -23,29 +31,64 @@ let command = null;
 const wanted = localStorage.getItem('canter theme') || (matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
 document.documentElement.dataset.theme = wanted;
 
-const stage = new Stage(get('view'));
-const plots = new Plots(get('plot'), samples);
 const readout = new Readout();
+const tabs = new Tabs(get('tabs'));
+const lost = (name) => readout.tell(`The mesh ${name} cannot be read: the arm is shown without it.`);
+const stage = new Stage(get('view'), new Meshes(token(), lost));
+const plots = new Plots(get('plot'), samples);
+const world = new WorldObjects(stage);
 const act = {
   link: null,
   ask: (wish) => act.link.ask(wish),
   tell: (text) => readout.tell(text),
   joints: () => (status && status.idle !== false ? status.setpoint : null),
+  status: () => status,
 };
 const program = new Program(act);
 const pendant = new Pendant(act);
-const player = new Player(act.ask);
+const gamepads = new Gamepads(pendant);
+const header = new Header(order, () => pendant.end('stopped'));
+const player = new Player(act.ask, (time) => showPlanned(time));
+const queue = new Queue(program);
+const measure = new Measure(stage, (text) => hint(text));
+const poses = new Poses({
+  program,
+  pendant,
+  tell: act.tell,
+  ghost: (joints) => stage.showPose(joints),
+  /** Where the arm is: joints, point (m) and turn (w, x, y, z) of the tool. */
+  now: () => (status && status.position_m ? { joints: status.setpoint, point: status.position_m, turn: status.orientation_wxyz } : null),
+});
+
+// What is hidden does not scroll.
+tabs.onshow = (name) => { if (name === 'messages') get('notes').scrollTop = get('notes').scrollHeight; };
+
+/** A text over the picture, until there is another. */
+function hint(text) {
+  get('hint').hidden = !text;
+  get('hint').textContent = text || '';
+}
+
+let saidUntil = 0;
+readout.onnote = (text, kind) => {
+  tabs.mark('messages', kind);
+  // What went wrong stays until something else is said.
+  if (kind === '' && get('said').dataset.kind === 'bad') return;
+  get('said').textContent = text;
+  get('said').dataset.kind = kind;
+  get('said').hidden = false;
+  saidUntil = kind === 'bad' ? Infinity : performance.now() + 6000;
+};
 
 function setRobot(about) {
   robot = about;
-  get('robot-name').textContent = about.name;
-  get('robot-name').title = about.description;
-  get('arm-name').textContent = about.arm;
+  header.setRobot(about);
   get('legend-most').textContent = `${about.tool.speed} m/s`;
   stage.setRobot(about);
   plots.setRobot(about);
   readout.setRobot(about);
   pendant.setRobot(about);
+  poses.setRobot(about);
   get('quantities').replaceChildren(...plots.all.map((quantity, index) => {
     const button = document.createElement('button');
     button.setAttribute('role', 'radio');
@@ -73,32 +116,11 @@ function keys(texts) {
 plots.onvalues = keys;
 plots.onfreeze = (frozen) => get('freeze').setAttribute('aria-pressed', String(frozen));
 
-/** The state in a word, and its kind. */
-function stateOf(message) {
-  const now = message.status;
-  if (!message.engine) return ['no engine', 'off'];
-  if (message.replay) return [message.replay.plays ? 'replay' : 'replay, standing', 'off'];
-  if (message.dry) return ['preview, nothing moves', 'off'];
-  if (now.fault) return [now.fault, 'fault'];
-  if (now.held) return [now.time_scaling > 0 ? 'stopping' : 'held', 'held'];
-  if (now.command === 'jog') return ['moved by hand', 'moves'];
-  if (!now.idle) return [now.command || 'running', 'moves'];
-  return ['idle', 'idle'];
-}
-
 function setStatus(message) {
   status = message.status || null;
   replay = Boolean(message.replay);
   dry = Boolean(message.dry);
-  const [text, kind] = stateOf(message);
-  get('state').textContent = text;
-  get('state').title = text;
-  get('state').dataset.kind = kind;
-  get('recover').hidden = kind !== 'fault';
-  get('resume').hidden = kind !== 'held';
-  get('pause').hidden = kind === 'held';
-  // What stands still for ever has nothing to stop.
-  document.body.dataset.live = replay || dry ? 'no' : 'yes';
+  header.set(message);
   notice(message.engine ? '' : message.reason);
   if (message.replay) player.set(message.replay);
   if (!status || !robot) return;
@@ -108,7 +130,15 @@ function setStatus(message) {
     readout.pose(status.position_m, angles);
     pendant.values(status.joints, [...status.position_m, ...angles]);
   }
-  if (samples.count === 0) stage.setJoints(status.joints);
+  if (samples.count === 0 && !player.here) stage.setJoints(status.joints);
+}
+
+/** What stands in the workstation, and the plan that is executed there. */
+function setWorld(about) {
+  world.set(about);
+  get('objects-layer').hidden = false;
+  get('plan-now').hidden = !about.plan;
+  get('plan-now').textContent = about.plan || '';
 }
 
 function notice(text) {
@@ -120,8 +150,13 @@ const handlers = {
   hello: (message) => { pendant.hello(message); get('pendant').hidden = message.replay; notice(''); },
   robot: (message) => setRobot(message.robot),
   status: setStatus,
+  world: (message) => setWorld(message.world),
   program: (message) => program.given(message.program),
-  preview: (message) => { program.planned(message); stage.setPlan(message.ok ? message : null); },
+  preview: (message) => {
+    program.planned(message);
+    stage.setPlan(message.ok ? message : null);
+    if (dry && message.ok) player.setPlan(message.duration_s);
+  },
   notes: (message) => readout.notes(message.notes),
   hand: (message) => pendant.setHolder(message.page),
 };
@@ -136,8 +171,7 @@ act.link = new Link({
   closed: (reason) => {
     pendant.end('the connection is lost');
     pendant.hello({ page: 0, may_move: false });
-    get('state').textContent = 'no connection';
-    get('state').dataset.kind = 'fault';
+    header.state('no connection', 'fault');
     notice(reason);
   },
 });
@@ -155,24 +189,56 @@ function follow() {
   }
   drawnRow = last;
   const newest = samples.count - 1;
-  stage.setJoints(samples.newestJoints(true));
+  if (!plots.frozen) stage.setJoints(samples.newestJoints(true));
   const time = samples.at(newest, PATH_TIME);
   command = program.at(samples.at(newest, COMMAND), time);
   if (command) stage.cross(command.index, time);
   progress(time);
 }
 
+/** Shows the arm at a time of a plan that is played here. */
+function showPlanned(time) {
+  const { plan } = program;
+  if (!plan || plan.path.joints.length === 0) return;
+  const row = Math.min(Math.round(time / plan.path.step_s), plan.path.joints.length - 1);
+  stage.setJoints(plan.path.joints[row]);
+  const now = plan.commands.findLast((found) => found.start_s <= time);
+  if (now) {
+    program.show(now, time - now.start_s);
+    stage.cross(now.index, time - now.start_s);
+  }
+  header.progress(time, plan.duration_s);
+}
+
+/** While the plots are frozen, the picture shows the arm as it was then, and says so. */
+let lookedAt = null;
+function lookBack() {
+  const row = plots.lookedAt();
+  if (row === lookedAt) return;
+  lookedAt = row;
+  const newest = samples.count - 1;
+  get('past').hidden = row === null;
+  if (newest < 0) return;
+  stage.setJoints(samples.jointsAt(row ?? newest, true));
+  if (row === null) return;
+  const ago = (samples.tick(newest) - samples.tick(row)) * samples.period;
+  get('past').textContent = `The past: ${ago.toFixed(2)} s ago. The arm has moved on.`;
+}
+
 function progress(time) {
   const plan = program.plan;
   const active = command && plan && (replay || (status && !status.idle));
-  get('progress-bar').style.width = active ? `${Math.min((command.start_s + time) / plan.duration_s, 1) * 100}%` : '0';
-  get('time').textContent = active ? `${(command.start_s + time).toFixed(1)} / ${plan.duration_s.toFixed(1)} s` : '';
-  get('command').textContent = active ? command.name : '';
+  header.progress(active ? command.start_s + time : null, plan?.duration_s);
+  queue.set(active ? command : null, time, replay ? null : status);
 }
 
 function frame() {
+  gamepads.look();
   if (!document.hidden) {
     follow();
+    lookBack();
+    player.turn();
+    if (performance.now() > saidUntil) get('said').hidden = true;
     stage.draw();
     plots.draw();
   }
@@ -184,15 +250,6 @@ async function order(wish) {
   if (!answer.ok) act.tell(answer.message);
 }
 
-get('stop').addEventListener('click', () => { pendant.end('stopped'); order({ do: 'stop', fast: false }); });
-get('pause').addEventListener('click', () => order({ do: 'pause' }));
-get('resume').addEventListener('click', () => order({ do: 'resume' }));
-get('abort').addEventListener('click', () => order({ do: 'abort' }));
-get('recover').addEventListener('click', () => order({ do: 'recover' }));
-get('override').addEventListener('input', (event) => {
-  get('override-value').textContent = `${event.target.value} %`;
-  order({ do: 'override', share: Number(event.target.value) / 100 });
-});
 get('theme').addEventListener('click', () => {
   const next = document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark';
   document.documentElement.dataset.theme = next;
@@ -210,32 +267,33 @@ get('copy').addEventListener('click', async () => {
   }
 });
 for (const button of document.querySelectorAll('[data-camera]')) button.addEventListener('click', () => stage.look(button.dataset.camera));
-for (const box of document.querySelectorAll('[data-layer]')) box.addEventListener('change', () => stage.show(box.dataset.layer, box.checked));
+for (const box of document.querySelectorAll('[data-layer]')) {
+  box.addEventListener('change', () => {
+    if (box.dataset.layer === 'objects') world.show(box.checked);
+    else stage.show(box.dataset.layer, box.checked);
+  });
+}
 get('view').addEventListener('keydown', (event) => {
   const name = ['iso', 'front', 'side', 'top'][Number(event.key) - 1];
   if (name) stage.look(name);
 });
 get('view').addEventListener('pointermove', (event) => {
+  if (measure.on) return;
   const found = stage.under(event.offsetX, event.offsetY);
   const planned = found && program.plan && program.plan.commands.find((entry) => entry.index === found.command);
-  get('hint').hidden = !found;
-  if (!found) return;
+  stage.showPose(found ? found.joints : null);
+  if (!found) { hint(world.under(event.offsetX, event.offsetY)); return; }
   const place = found.point.map((value) => (value * 1000).toFixed(1)).join(', ');
-  get('hint').textContent = `${place} mm at ${found.time.toFixed(2)} s, ${(found.speed * 1000).toFixed(0)} mm/s${planned ? `, line ${planned.line} ${planned.name}` : ''}`;
+  hint(`${place} mm at ${found.time.toFixed(2)} s, ${(found.speed * 1000).toFixed(0)} mm/s${planned ? `, line ${planned.line} ${planned.name}` : ''}`);
 });
-addEventListener('keydown', (event) => {
-  if (event.key === 'Escape') { pendant.end('stopped'); order({ do: 'stop', fast: false }); }
+let pressed = null;
+get('view').addEventListener('pointerdown', (event) => { pressed = [event.offsetX, event.offsetY]; });
+get('view').addEventListener('pointerup', (event) => {
+  // A drag turns the picture.
+  const still = pressed && Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) < 4;
+  if (measure.on && still) measure.click(event.offsetX, event.offsetY);
 });
-
-/** Numbers of a program, without digits that say nothing. */
-const short = (value, digits) => String(Number(value.toFixed(digits)));
-get('teach').addEventListener('click', () => {
-  if (!status || !status.position_m) return;
-  const { z, x } = axes(status.orientation_wxyz);
-  const list = (values, digits) => `{${values.map((value) => short(value, digits)).join(', ')}}`;
-  const point = status.position_m.map((value) => value * 1000);
-  program.insert(`MoveTo({${list(point, 3)}, ${list(z, 9)}, ${list(x, 9)}})`);
-});
+get('measure').addEventListener('click', () => get('measure').setAttribute('aria-pressed', String(measure.toggle())));
 const grip = (call) => async () => {
   const ready = status && status.state === 'ready';
   await order({ do: 'run', name: 'pendant', program: `${ready ? '' : 'InitCanon()\n'}${call}()\n` });
@@ -247,4 +305,4 @@ drawRamp(get('legend'));
 requestAnimationFrame(frame);
 
 // What tests look at.
-window.__view = { act, samples, stage, plots, pendant, program, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
+window.__view = { act, samples, stage, plots, pendant, program, poses, queue, measure, gamepads, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };

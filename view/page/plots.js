@@ -26,7 +26,7 @@ function quantities(robot, samples) {
     { title: 'Acceleration', unit: '% of limit', scale: 100, lines: names, limit: 100, value: share(joint(2), robot.acceleration) },
     { title: 'Jerk', unit: '% of limit', scale: 100, lines: names, limit: 100, value: share(jerk, robot.jerk) },
     { title: 'Tool speed', unit: 'mm/s', scale: 1000, lines: ['tool'], limit: robot.tool.speed * 1000, value: speed },
-    { title: 'Following error', unit: 'mrad or mm', scale: 1000, lines: names, value: (row, k) => samples.at(row, Q + k) - samples.at(row, Q + 3 * n + k) },
+    { title: 'Following', unit: 'mrad or mm', scale: 1000, lines: names, value: (row, k) => samples.at(row, Q + k) - samples.at(row, Q + 3 * n + k) },
     { title: 'Path speed', unit: '%', scale: 100, lines: ['override'], limit: 100, value: (row) => samples.at(row, RATE) },
     { title: 'Period', unit: 'us late', scale: 1, lines: ['published'], value: (row) => samples.at(row, LATE) },
   ];
@@ -104,6 +104,14 @@ export class Plots {
     event.preventDefault();
   }
 
+  /** The row that is looked back at: the one under the pointer, or the last one shown. */
+  lookedAt() {
+    if (!this.frozen || this.samples.count === 0) return null;
+    const [, last, left, right] = this.rows();
+    if (this.cursor === null || this.cursor < 58) return last;
+    return this.samples.rowAt(left + (this.cursor - 58) / (this.canvas.clientWidth - 70) * (right - left));
+  }
+
   /** First and last row that are shown. */
   rows() {
     const right = this.right();
@@ -139,7 +147,7 @@ export class Plots {
     context.clearRect(0, 0, clientWidth, clientHeight);
     const quantity = this.all[this.chosen];
     if (!quantity) return;
-    const area = { x: 58, y: 6, width: clientWidth - 70, height: clientHeight - 28 };
+    const area = { x: 58, y: 14, width: clientWidth - 70, height: clientHeight - 36 };
     if (this.samples.count === 0) { this.frame(context, area, quantity, [-1, 1]); return; }
     const columns = this.columns(quantity, Math.floor(area.width));
     const range = this.range(columns, quantity);

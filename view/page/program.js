@@ -5,7 +5,7 @@ import { JOINTS } from './colours.js';
 const get = (id) => document.getElementById(id);
 
 export class Program {
-  /** `act` has ask(wish), tell(text), isResting(), joints(). */
+  /** `act` has ask(wish), tell(text), joints(), status(). */
   constructor(act) {
     this.act = act;
     this.running = null;
@@ -18,7 +18,8 @@ export class Program {
     this.text.addEventListener('input', () => { this.edited = true; this.bad.clear(); this.draw(); });
     this.text.addEventListener('scroll', () => this.scrolled());
     get('plan').addEventListener('click', () => this.preview());
-    get('run').addEventListener('click', () => this.run());
+    get('run').addEventListener('click', () => this.run(false));
+    get('step-on').addEventListener('click', () => this.step());
     get('open').addEventListener('click', () => get('file').click());
     get('file').addEventListener('change', (event) => this.load(event.target.files[0]));
     this.draw();
@@ -42,6 +43,8 @@ export class Program {
 
   /** The engine was given a program: it is shown unless this page has another one in work. */
   given(program) {
+    // What the pendant sends is no program of a person.
+    if (program.name === 'pendant') return;
     this.running = program;
     if (!this.edited || program.text === this.text.value) this.set(program.name, program.text);
   }
@@ -55,23 +58,57 @@ export class Program {
     if (!answer.ok) this.act.tell(answer.message);
   }
 
-  async run() {
-    const answer = await this.act.ask({ do: 'run', name: this.name, program: this.text.value });
-    if (answer.ok) this.edited = false;
-    else this.act.tell(answer.message);
+  /** Runs the program, or lets one go on that waits from command to command. */
+  async run(stepwise) {
+    const { status } = this.act;
+    const waits = status() && !status().idle && status().single_step;
+    if (!await this.order({ do: 'single_step', on: stepwise }) || waits) return;
+    if (!await this.order({ do: 'run', name: this.name, program: this.text.value })) return;
+    this.edited = false;
+    if (stepwise) await this.order({ do: 'next' });
   }
 
-  /** Inserts a line behind that of the cursor. */
+  /** Executes one command: the next one, or the first of the program. */
+  step() {
+    const status = this.act.status();
+    return status && !status.idle && status.single_step ? this.order({ do: 'next' }) : this.run(true);
+  }
+
+  async order(wish) {
+    const answer = await this.act.ask(wish);
+    if (!answer.ok) this.act.tell(answer.message);
+    return answer.ok;
+  }
+
+  /** Inserts a line behind that of the cursor, and before the end of the program. */
   insert(line) {
     const { value, selectionStart: at } = this.text;
     const end = value.indexOf('\n', at);
-    const place = value === '' ? 0 : (end < 0 ? value.length : end + 1);
+    const behind = value === '' ? 0 : (end < 0 ? value.length : end + 1);
+    const last = value.search(/^[ \t]*EndCanon\b/m);
+    const place = last >= 0 && last < behind ? last : behind;
     const before = value.slice(0, place);
     const text = `${before === '' || before.endsWith('\n') ? '' : '\n'}${line}\n`;
     this.text.value = before + text + value.slice(place);
     this.text.selectionStart = this.text.selectionEnd = place + text.length - 1;
     this.edited = true;
     this.draw();
+  }
+
+  /** Puts a pose in place of the first one in the line of the cursor; says whether there is one. */
+  replacePose(pose) {
+    const { value, selectionStart: at } = this.text;
+    const from = value.lastIndexOf('\n', at - 1) + 1;
+    const end = value.indexOf('\n', at) < 0 ? value.length : value.indexOf('\n', at);
+    const line = value.slice(from, end);
+    const list = '\\{[^{}]*\\}';
+    const changed = line.replace(new RegExp(`\\{\\s*${list}\\s*,\\s*${list}\\s*,\\s*${list}\\s*\\}`), pose);
+    if (changed === line) return false;
+    this.text.value = value.slice(0, from) + changed + value.slice(end);
+    this.text.selectionStart = this.text.selectionEnd = from;
+    this.edited = true;
+    this.draw();
+    return true;
   }
 
   /** A plan has come: findings, certificates. */
@@ -82,6 +119,8 @@ export class Program {
       ...(plan.refusals || []).map((refusal) => ({ severity: 'error', ...refusal, message: `${refusal.name}: ${refusal.message}` })),
       ...(plan.error ? [{ severity: 'error', line: 1, column: 1, message: plan.error }] : []),
     ];
+    this.shown = null;
+    get('certificate').replaceChildren();
     this.bad = new Set(found.filter((finding) => finding.severity !== 'warning').map((finding) => finding.line));
     get('findings').replaceChildren(...found.map((finding) => this.finding(finding)));
     this.draw();
@@ -110,7 +149,11 @@ export class Program {
   at(id, time) {
     const running = this.running;
     const index = running && id >= running.first && id <= running.last ? id - running.first : -1;
-    const command = this.plan && this.plan.commands.find((found) => found.index === index);
+    return this.show(this.plan && this.plan.commands.find((found) => found.index === index), time);
+  }
+
+  /** Shows that a command of the plan is at `time` s of its path; none without. */
+  show(command, time) {
     const line = command && !this.edited ? command.line : 0;
     if (line !== this.line) { this.line = line; this.draw(); }
     this.follow(line);
@@ -139,7 +182,8 @@ export class Program {
   }
 
   scrolled() {
-    for (const id of ['gutter', 'marks']) get(id).scrollTop = this.text.scrollTop;
+    // Their own scrolling would end where the text has a scroll bar.
+    for (const id of ['gutter', 'marks']) get(id).style.transform = `translateY(${-this.text.scrollTop}px)`;
   }
 
   /** Why the move takes as long as it does. */

@@ -3,7 +3,9 @@
 import { JOINTS } from './colours.js';
 
 const get = (id) => document.getElementById(id);
-const degrees = (angle) => (angle * 180 / Math.PI).toFixed(2);
+/** A number with so many digits, and no minus before a zero. */
+export const digits = (value, count) => value.toFixed(count).replace(/^-(?=0(\.0*)?$)/, '');
+const degrees = (angle) => digits(angle * 180 / Math.PI, 2);
 
 /** Roll, pitch and yaw about the fixed axes of a quaternion w, x, y, z. */
 export function rollPitchYaw([w, x, y, z]) {
@@ -34,7 +36,7 @@ export class Readout {
       line.append(label, bar, value);
       return line;
     }));
-    const names = ['X', 'Y', 'Z', 'R', 'P', 'Y'];
+    const names = ['X', 'Y', 'Z', 'roll', 'pitch', 'yaw'];
     get('pose').replaceChildren(...names.map((name) => {
       const cell = document.createElement('div');
       const [label, value] = [document.createElement('b'), document.createElement('span')];
@@ -47,14 +49,15 @@ export class Readout {
   joints(positions) {
     for (const [k, line] of [...get('joints').children].entries()) {
       const [low, high] = [this.robot.lower[k] ?? -Math.PI, this.robot.upper[k] ?? Math.PI];
+      const slides = this.robot.slides[k];
       const share = (positions[k] - low) / (high - low);
       line.children[1].style.setProperty('--at', `${Math.min(Math.max(share, 0), 1) * 100}%`);
-      line.children[2].textContent = `${degrees(positions[k])}\u00b0`;
+      line.children[2].textContent = slides ? `${digits(positions[k] * 1000, 1)} mm` : `${degrees(positions[k])}\u00b0`;
     }
   }
 
   pose(point, angles) {
-    const texts = [...point.map((value) => `${(value * 1000).toFixed(2)}`), ...angles.map((angle) => `${degrees(angle)}\u00b0`)];
+    const texts = [...point.map((value) => digits(value * 1000, 2)), ...angles.map((angle) => `${degrees(angle)}\u00b0`)];
     for (const [k, cell] of [...get('pose').children].entries()) cell.lastChild.textContent = texts[k];
   }
 
@@ -63,6 +66,7 @@ export class Readout {
     for (const { note } of notes) {
       const item = document.createElement('li');
       const [text, kind] = words(note);
+      this.onnote?.(text, kind);
       item.textContent = text;
       item.dataset.kind = kind;
       list.append(item);

@@ -24,7 +24,7 @@ export function setPose(group, [x, y, z, qw, qx, qy, qz]) {
 
 const child = (element, name) => [...element.children].find((found) => found.tagName === name);
 
-/** A primitive shape; nothing for a mesh, which stays a stick. */
+/** A primitive shape; nothing for a mesh, which is read from the server. */
 function shape(geometry) {
   const box = child(geometry, 'box');
   if (box) return new BoxGeometry(...numbers(box.getAttribute('size')));
@@ -40,16 +40,31 @@ function shape(geometry) {
   return sphere ? new SphereGeometry(Number(sphere.getAttribute('radius')), 32, 20) : null;
 }
 
+/** The colour that a visual names, or that is given to its name in the whole robot. */
+function colourOf(xml, visual) {
+  const material = child(visual, 'material');
+  if (!material) return null;
+  const named = [...xml.children].find((found) => found.tagName === 'material' && found.getAttribute('name') === material.getAttribute('name'));
+  const colour = child(material, 'color') || (named && child(named, 'color'));
+  return colour ? numbers(colour.getAttribute('rgba')).slice(0, 3) : null;
+}
+
 export class Robot {
-  /** `about` is the robot as the server tells it. */
-  constructor(about) {
+  /** `about` is the robot as the server tells it; `meshes` gives the shapes of its files, and
+   * `ready` is called when they are there. */
+  constructor(about, meshes, ready) {
     this.about = about;
+    this.meshes = meshes;
+    this.ready = ready;
+    this.ghost = null;
+    /** How many meshes are drawn. */
+    this.drawn = 0;
     this.root = new Group();
     this.joints = about.joints.map(() => null);
     this.materials = [];
     const xml = new DOMParser().parseFromString(about.urdf, 'text/xml').documentElement;
     this.links = new Map();
-    for (const link of xml.children) if (link.tagName === 'link') this.links.set(link.getAttribute('name'), this.link(link));
+    for (const link of xml.children) if (link.tagName === 'link') this.links.set(link.getAttribute('name'), this.link(link, xml));
     const below = new Set();
     for (const joint of xml.children) if (joint.tagName === 'joint') below.add(this.joint(joint));
     for (const [name, link] of this.links) if (!below.has(name)) this.root.add(link);
@@ -69,11 +84,14 @@ export class Robot {
     return made;
   }
 
-  link(element) {
+  link(element, xml) {
     const group = new Group();
     const visuals = [...element.children].filter((found) => found.tagName === 'visual');
     for (const [index, visual] of visuals.entries()) {
-      const geometry = shape(child(visual, 'geometry'));
+      const described = child(visual, 'geometry');
+      const file = described && child(described, 'mesh');
+      if (file) { this.addMesh(group, visual, file, colourOf(xml, visual)); continue; }
+      const geometry = described && shape(described);
       if (!geometry) continue;
       // The second shape of a link is its joint: a darker one shows where the arm bends.
       const mesh = new Mesh(geometry, this.material(index === 0 && visuals.length > 1 ? 0xdfe5ec : 0x5b7fa8));
@@ -82,6 +100,30 @@ export class Robot {
       group.add(mesh);
     }
     return group;
+  }
+
+  /** Draws the mesh of a visual as soon as it is there. */
+  async addMesh(group, visual, file, colour) {
+    const holder = new Group();
+    place(holder, visual);
+    group.add(holder);
+    const shapes = await this.meshes.shapes(file.getAttribute('filename'));
+    if (!shapes) return;
+    shapes.scale.set(...numbers(file.getAttribute('scale'), [1, 1, 1]));
+    shapes.traverse((object) => {
+      if (!object.isMesh) return;
+      const own = [object.material].flat()[0]?.color;
+      const made = this.material(0xb9c3cf);
+      if (colour) made.color.setRGB(...colour);
+      // The loaders give white where a file has no colour.
+      else if (own && own.getHex() !== 0xffffff) made.color.copy(own);
+      if (this.ghost !== null) this.fade(made);
+      object.material = made;
+      object.castShadow = this.ghost === null;
+    });
+    holder.add(shapes);
+    this.drawn += 1;
+    this.ready();
   }
 
   joint(element) {
@@ -137,13 +179,20 @@ export class Robot {
 
   /** Makes all shapes transparent, in one colour. */
   makeGhost(colour) {
-    for (const material of this.materials) {
-      material.color.set(colour);
-      material.transparent = true;
-      material.opacity = 0.2;
-      material.depthWrite = false;
-    }
+    this.ghost = colour;
+    for (const material of this.materials) this.fade(material);
     this.root.traverse((object) => { object.castShadow = false; });
+  }
+
+  fade(material) {
+    material.color.set(this.ghost);
+    material.transparent = true;
+    material.opacity = 0.2;
+    material.depthWrite = false;
+    // Where both arms are in one place, the real one is seen.
+    material.polygonOffset = true;
+    material.polygonOffsetFactor = 4;
+    material.polygonOffsetUnits = 4;
   }
 
   dispose() {

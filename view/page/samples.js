@@ -78,10 +78,12 @@ export class Samples {
     return low;
   }
 
-  /** Published positions of the newest row. */
-  newestJoints(measured) {
-    if (this.count === 0) return null;
+  /** Joint positions of a row: measured or published. */
+  jointsAt(row, measured) {
     const from = Q + (measured ? 3 * this.joints : 0);
-    return Array.from({ length: this.joints }, (_, joint) => this.at(this.count - 1, from + joint));
+    return Array.from({ length: this.joints }, (_, joint) => this.at(row, from + joint));
   }
+
+  /** Joint positions of the newest row. */
+  newestJoints(measured) { return this.count === 0 ? null : this.jointsAt(this.count - 1, measured); }
 }

@@ -7,6 +7,7 @@ import {
   Vector3, WebGLRenderer,
 } from './vendor/three.js';
 import { ramp, styled } from './colours.js';
+import { corridors, reachSurface } from './layers.js';
 import { Robot } from './robot.js';
 
 const TRAIL = 6000;
@@ -49,8 +50,10 @@ class Segments {
 }
 
 export class Stage {
-  constructor(canvas) {
+  /** `meshes` gives the shapes that a robot's URDF names. */
+  constructor(canvas, meshes) {
     this.canvas = canvas;
+    this.meshes = meshes;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -60,9 +63,13 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener('change', () => { this.dirty = true; });
-    this.layers = { planned: true, travelled: true, balls: true, ghost: true, frames: true };
+    this.layers = { planned: true, travelled: true, balls: true, ghost: true, frames: true, corridor: false, reach: false };
     this.robot = null;
     this.ghost = null;
+    this.corridor = null;
+    this.surface = null;
+    /** Where the ghost stands instead of at the goal, while a taught pose is looked at. */
+    this.shownPose = null;
     this.most = 1;
     this.plan = null;
     this.lastPoint = null;
@@ -73,8 +80,6 @@ export class Stage {
     this.trail = new Segments(this.scene, TRAIL, 3.2);
     this.planned = null;
     this.balls = null;
-    this.marks = new Group();
-    this.scene.add(this.marks);
     this.workstation = new AxesHelper(0.18);
     this.scene.add(this.workstation);
     this.look('iso');
@@ -94,6 +99,7 @@ export class Stage {
     const floor = new Mesh(new PlaneGeometry(8, 8), new ShadowMaterial({ opacity: 0.22 }));
     floor.receiveShadow = true;
     floor.position.z = -0.001;
+    this.floor = floor;
     this.scene.add(floor);
   }
 
@@ -134,8 +140,9 @@ export class Stage {
     for (const old of [this.robot, this.ghost]) {
       if (old) { this.scene.remove(old.root); old.dispose(); }
     }
-    this.robot = new Robot(about);
-    this.ghost = new Robot(about);
+    const ready = () => { this.dirty = true; };
+    this.robot = new Robot(about, this.meshes, ready);
+    this.ghost = new Robot(about, this.meshes, ready);
     this.ghost.makeGhost(0xe69f00);
     this.ghost.root.visible = false;
     this.frame = new AxesHelper(0.11);
@@ -148,6 +155,9 @@ export class Stage {
     this.robot.root.traverse((object) => { if (object.type === 'Group') length += object.position.length(); });
     this.reach = Math.min(Math.max(length / 1.5, 0.5), 2.6);
     this.base = this.robot.root.position.clone().setZ(0);
+    if (this.surface) this.scene.remove(this.surface);
+    this.surface = about.reach ? reachSurface(about.reach, 0x0072b2) : null;
+    if (this.surface) this.scene.add(this.surface);
     this.clearTrail();
     this.look('iso');
   }
@@ -181,7 +191,8 @@ export class Stage {
   setPlan(plan) {
     if (this.planned) { this.scene.remove(this.planned.object); this.planned = null; }
     if (this.balls) { this.scene.remove(this.balls); this.balls = null; }
-    this.marks.clear();
+    if (this.corridor) { this.scene.remove(this.corridor); this.corridor = null; }
+    this.hasGoal = false;
     this.plan = plan;
     this.dirty = true;
     this.ghost && (this.ghost.root.visible = false);
@@ -197,12 +208,17 @@ export class Stage {
       this.planned.add(points[k - 1], points[k], shade);
     }
     this.setBalls(plan);
+    this.corridor = corridors(plan, 0x009e73);
+    this.scene.add(this.corridor);
     if (this.ghost && joints.length > 0) {
-      this.ghost.set(joints[joints.length - 1]);
+      this.goal = joints[joints.length - 1];
       this.hasGoal = true;
     }
     this.apply();
   }
+
+  /** Shows the ghost arm at these joints, or at the goal again with null. */
+  showPose(joints) { this.shownPose = joints; this.apply(); }
 
   setBalls(plan) {
     const found = [];
@@ -244,7 +260,11 @@ export class Stage {
     if (this.planned) this.planned.object.visible = layers.planned && this.planned.count > 0;
     this.trail.object.visible = layers.travelled && this.trail.count > 0;
     if (this.balls) this.balls.visible = layers.balls;
-    if (this.ghost) this.ghost.root.visible = layers.ghost && this.plan !== null && Boolean(this.hasGoal);
+    const ghostAt = this.shownPose || (layers.ghost && this.plan !== null && this.hasGoal ? this.goal : null);
+    if (this.ghost) this.ghost.root.visible = ghostAt !== null;
+    if (this.ghost && ghostAt) this.ghost.set(ghostAt);
+    if (this.corridor) this.corridor.visible = layers.corridor;
+    if (this.surface) this.surface.visible = layers.reach;
     this.workstation.visible = layers.frames;
     if (this.frame) this.frame.visible = layers.frames;
     this.dirty = true;
@@ -254,7 +274,7 @@ export class Stage {
   under(x, y) {
     if (!this.plan || !this.plan.path || !this.layers.planned) return null;
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const { points, step_s: step, commands } = this.plan.path;
+    const { points, joints, step_s: step, commands } = this.plan.path;
     const seen = new Vector3();
     let best = null;
     for (let k = 0; k < points.length; k += 1) {
@@ -269,6 +289,7 @@ export class Stage {
       time: best.k * step,
       command: commands[best.k],
       point,
+      joints: joints[best.k],
       speed: Math.hypot(...point.map((value, axis) => value - before[axis])) / step,
     };
   }

@@ -71,14 +71,17 @@ fn incoming(request: &httparse::Request<'_, '_>) -> Incoming {
         })
     };
     let target = request.path.unwrap_or_default();
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
     Incoming {
         visitor: Visitor {
             method: request.method.unwrap_or_default().to_owned(),
-            path: target.split('?').next().unwrap_or_default().to_owned(),
+            path: path.to_owned(),
+            query: query.to_owned(),
             host: header("host"),
             origin: header("origin"),
             fetch_site: header("sec-fetch-site"),
             protocols: header("sec-websocket-protocol"),
+            authorization: header("authorization"),
             upgrades: has("upgrade", "websocket"),
         },
         key: header("sec-websocket-key"),
@@ -123,15 +126,15 @@ pub(crate) fn answer(
     stream.flush()
 }
 
-/// Answers a WebSocket's handshake.
+/// Answers a WebSocket's handshake; `protocol` is what will be spoken.
 ///
 /// # Errors
 /// The connection breaks.
-pub(crate) fn upgrade(stream: &mut TcpStream, key: &str) -> io::Result<()> {
+pub(crate) fn upgrade(stream: &mut TcpStream, key: &str, protocol: &str) -> io::Result<()> {
     let accept = tungstenite::handshake::derive_accept_key(key.as_bytes());
     let head = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-         Sec-WebSocket-Accept: {accept}\r\nSec-WebSocket-Protocol: canter\r\n\r\n"
+         Sec-WebSocket-Accept: {accept}\r\nSec-WebSocket-Protocol: {protocol}\r\n\r\n"
     );
     stream.write_all(head.as_bytes())?;
     stream.flush()

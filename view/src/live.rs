@@ -1,13 +1,18 @@
 //! A running arm: two threads that look on, one that asks and one for what cannot wait.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{Builder, sleep};
 use std::time::{Duration, Instant};
 
-use ipc::{Answer, Arm, Client, ControlAsk, ControlClient, IpcError, Observer, State, Verb};
+use ipc::{
+    Answer, Arm, Client, ControlAsk, ControlClient, IpcError, Observer, Setpoint, State, Verb,
+};
+use nalgebra::Isometry3;
 use planner::robot::Robot;
+use recorder::{Head, MAX_JOINTS, Sample};
 use serde_json::{Value, json};
 
 use crate::ViewError;
@@ -47,12 +52,12 @@ pub(crate) struct EngineHandle {
 
 impl EngineHandle {
     /// Asks the engine; its words where it refuses.
-    pub(crate) fn ask(&self, verb: Verb) -> Result<Value, String> {
+    pub(crate) fn ask(&self, verb: Verb) -> Result<(), String> {
         let (tell, told) = channel();
         let gone = || "the view is ending".to_owned();
         self.asks.send((verb, tell)).map_err(|_| gone())?;
         match told.recv().map_err(|_| gone())? {
-            Ok(answer) if answer.accepted => Ok(answer.body),
+            Ok(answer) if answer.accepted => Ok(()),
             Ok(answer) => Err(answer.message),
             Err(error) => Err(error.to_string()),
         }
@@ -197,9 +202,12 @@ impl Talk {
             let (Some(urdf), Some(toml)) = texts else {
                 return false;
             };
-            let Ok(robot) = planner::robot::parse(name, &urdf, &toml) else {
+            let Ok(mut robot) = planner::robot::parse(name, &urdf, &toml) else {
                 return false;
             };
+            // Its meshes are there, for the picture.
+            let folder = whole(client, "folder").filter(|folder| !folder.is_empty());
+            robot.folder = folder.map(PathBuf::from);
             let period_ns = period_of(&body);
             self.board
                 .set_robot(&scene::robot(&robot, &self.arm.to_string(), period_ns));
@@ -304,8 +312,11 @@ fn watch(arm: &Arm, robots: &Receiver<(Robot, u64)>, board: &Board, ends: &Atomi
                 let (Ok(point), Ok(observer)) = (forward(&robot), Observer::open(arm)) else {
                     continue;
                 };
+                board.periods.set_head(head(arm, &robot, period_ns));
                 let stream = Stream {
+                    arm: arm.clone(),
                     observer,
+                    samples: Vec::new(),
                     joints: robot.dof(),
                     packer: Packer::new(robot.dof(), period_ns),
                     state: State::default(),
@@ -321,7 +332,10 @@ fn watch(arm: &Arm, robots: &Receiver<(Robot, u64)>, board: &Board, ends: &Atomi
 
 /// The periods of one engine.
 struct Stream {
+    arm: Arm,
     observer: Observer,
+    /// Whole periods, where a viewer of another program looks on.
+    samples: Vec<Sample>,
     joints: usize,
     packer: Packer,
     state: State,
@@ -339,10 +353,12 @@ impl Stream {
                 if let Some(block) = self.packer.take() {
                     board.blocks.push(block);
                 }
+                board.periods.push(std::mem::take(&mut self.samples));
             }
             match robots.try_recv() {
                 Ok((robot, period_ns)) if robot.dof() == self.joints => {
                     if let Ok(point) = forward(&robot) {
+                        board.periods.set_head(head(&self.arm, &robot, period_ns));
                         self.point = point;
                         self.packer = Packer::new(self.joints, period_ns);
                     }
@@ -364,6 +380,10 @@ impl Stream {
             if setpoint.check(self.joints).is_err() {
                 continue;
             }
+            let pose = (self.point)(&setpoint.position);
+            if board.periods.is_wanted() {
+                self.samples.push(self.sample(&setpoint, &pose));
+            }
             let list = |values: &[f64]| values.iter().take(self.joints).copied().collect();
             let row = Row {
                 tick: setpoint.tick,
@@ -377,11 +397,56 @@ impl Stream {
                     list(&setpoint.acceleration),
                     list(&self.state.position),
                 ],
-                point: (self.point)(&setpoint.position),
+                point: pose.translation.vector.into(),
             };
             if let Some(block) = self.packer.push(&row) {
                 board.blocks.push(block);
             }
         }
+    }
+
+    /// A period as recordings have it.
+    fn sample(&self, setpoint: &Setpoint, pose: &Isometry3<f64>) -> Sample {
+        let list = |values: &[f64]| {
+            let mut all = [0.0; MAX_JOINTS];
+            for (to, from) in all.iter_mut().zip(values.iter().take(self.joints)) {
+                *to = *from;
+            }
+            all
+        };
+        let measured = (self.point)(&self.state.position);
+        Sample {
+            tick: setpoint.tick,
+            command: setpoint.command,
+            path_time: setpoint.path_time,
+            time_scaling: setpoint.time_scaling,
+            position: list(&setpoint.position),
+            velocity: list(&setpoint.velocity),
+            acceleration: list(&setpoint.acceleration),
+            measured: list(&self.state.position),
+            tool: scene::list(pose),
+            measured_tool: measured.translation.vector.into(),
+        }
+    }
+}
+
+/// What the periods of an arm are about; wall time is taken from the first of them.
+fn head(arm: &Arm, robot: &Robot, period_ns: u64) -> Head {
+    Head {
+        form: recorder::FORM,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        arm: arm.to_string(),
+        robot: robot.name.clone(),
+        driver: String::new(),
+        joints: robot.joint_names(),
+        root_link: robot.model.base_link.clone(),
+        period_ns,
+        begin_ns: 0,
+        workstation_from_base: scene::list(&robot.workstation_from_base),
+        start: Vec::new(),
+        default_length: "mm".to_owned(),
+        reason: "live".to_owned(),
+        urdf: robot.urdf.clone(),
+        robot_toml: String::new(),
     }
 }

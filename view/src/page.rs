@@ -24,7 +24,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const IMAGE: &str = "image/svg+xml";
 
 /// Every file that is served.
-pub(crate) const FILES: [PageFile; 15] = [
+pub(crate) const FILES: [PageFile; 24] = [
     PageFile {
         path: "/",
         kind: HTML,
@@ -43,6 +43,15 @@ pub(crate) const FILES: [PageFile; 15] = [
     file!("readout.js", SCRIPT),
     file!("player.js", SCRIPT),
     file!("colours.js", SCRIPT),
+    file!("gamepad.js", SCRIPT),
+    file!("header.js", SCRIPT),
+    file!("layers.js", SCRIPT),
+    file!("measure.js", SCRIPT),
+    file!("mesh.js", SCRIPT),
+    file!("poses.js", SCRIPT),
+    file!("queue.js", SCRIPT),
+    file!("tabs.js", SCRIPT),
+    file!("world.js", SCRIPT),
     file!("vendor/three.js", SCRIPT),
 ];
 

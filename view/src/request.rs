@@ -10,14 +10,24 @@ use planner::robot::Robot;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::Access;
+use crate::freshness::Freshness;
 use crate::hand::HandPost;
 use crate::live::EngineHandle;
 use crate::player::Player;
 use crate::preview::{Draft, preview};
+use crate::{Access, mesh};
 
 /// How long a jog goes on when the page falls silent.
 const JOG: Duration = Duration::from_millis(200);
+
+/// How long a step may take: it ends by itself.
+const STEP: Duration = Duration::from_secs(2);
+
+/// The longest step: of the tool in m, of a joint in rad or m.
+const LONGEST_STEP: f64 = 1.0;
+
+/// How old a request to jog may be (ms).
+const OLDEST_JOG_MS: f64 = 150.0;
 
 /// The longest program that is planned for a page (bytes).
 const LONGEST: usize = 4 << 20;
@@ -34,7 +44,25 @@ pub(crate) enum Wish {
     Jog {
         space: String,
         speeds: Vec<f64>,
+        /// When it was sent, by the page's clock (ms).
+        sent_ms: f64,
+        /// Where a jog in space `goal` ends.
+        #[serde(default)]
+        goal: Vec<f64>,
     },
+    /// Moves by hand, as far as this.
+    Step {
+        space: String,
+        speeds: Vec<f64>,
+        sent_ms: f64,
+        distance: f64,
+    },
+    /// Executes commands one by one, or all again.
+    SingleStep {
+        on: bool,
+    },
+    /// Lets the next command begin.
+    Next,
     /// Stops on the path: everybody may.
     Stop {
         fast: bool,
@@ -95,6 +123,21 @@ pub(crate) struct Wisher {
     pub(crate) access: Access,
     /// The way back for what takes time.
     pub(crate) later: Sender<String>,
+    /// How old what it sends is.
+    pub(crate) freshness: Freshness,
+}
+
+impl Wisher {
+    /// Refuses what was sent long ago, or at no time.
+    fn check_fresh(&self, sent_ms: f64) -> Result<(), String> {
+        let age = self.freshness.age_ms(sent_ms);
+        if age <= OLDEST_JOG_MS {
+            return Ok(());
+        }
+        Err(format!(
+            "this request is {age:.0} ms old: the link stood still"
+        ))
+    }
 }
 
 impl Wish {
@@ -103,6 +146,9 @@ impl Wish {
         matches!(
             self,
             Self::Jog { .. }
+                | Self::Step { .. }
+                | Self::SingleStep { .. }
+                | Self::Next
                 | Self::Resume
                 | Self::Override { .. }
                 | Self::Recover
@@ -167,16 +213,62 @@ impl Service {
                 self.player()?.play(plays, speed);
                 Ok(())
             }
+            Wish::Jog {
+                space,
+                speeds,
+                sent_ms,
+                goal,
+            } => {
+                // Rest is never too old.
+                if speeds.iter().any(|speed| *speed != 0.0) {
+                    wisher.check_fresh(sent_ms)?;
+                }
+                self.engine()?.ask(Verb::Jog {
+                    space,
+                    speeds,
+                    timeout_ms: JOG.as_millis() as u64,
+                    distance: None,
+                    goal,
+                })
+            }
+            Wish::Step {
+                space,
+                speeds,
+                sent_ms,
+                distance,
+            } => {
+                wisher.check_fresh(sent_ms)?;
+                if !(0.0..=LONGEST_STEP).contains(&distance) {
+                    return Err(format!(
+                        "a step is at most {LONGEST_STEP} (m, rad), got {distance}"
+                    ));
+                }
+                self.engine()?.ask(Verb::Jog {
+                    space,
+                    speeds,
+                    timeout_ms: STEP.as_millis() as u64,
+                    distance: Some(distance),
+                    goal: Vec::new(),
+                })
+            }
             other => self.pass_on(other),
         }
     }
 
+    fn engine(&self) -> Result<&EngineHandle, String> {
+        let engine = self.engine.as_ref();
+        engine.ok_or_else(|| "nothing moves here: it is no running arm".to_owned())
+    }
+
+    /// A mesh of the robot that a page asks for.
+    pub(crate) fn mesh(&self, path: &str) -> Option<Vec<u8>> {
+        let robot = self.robot.lock().ok()?.clone()?;
+        mesh::read(&robot, path)
+    }
+
     /// Passes on what is for the engine.
     fn pass_on(&self, wish: Wish) -> Result<(), String> {
-        let engine = self
-            .engine
-            .as_ref()
-            .ok_or("nothing moves here: it is no running arm")?;
+        let engine = self.engine()?;
         match wish {
             Wish::Stop { fast } => engine.control(ControlAsk::Stop { fast }),
             Wish::Pause => engine.control(ControlAsk::Pause),
@@ -189,14 +281,8 @@ impl Service {
             }
             Wish::Abort => engine.control(ControlAsk::Abort),
             Wish::Recover => engine.control(ControlAsk::Recover),
-            Wish::Jog { space, speeds } => {
-                let verb = Verb::Jog {
-                    space,
-                    speeds,
-                    timeout_ms: JOG.as_millis() as u64,
-                };
-                engine.ask(verb).map(|_| ())
-            }
+            Wish::SingleStep { on } => engine.ask(Verb::SingleStep { on }),
+            Wish::Next => engine.ask(Verb::Next),
             Wish::Run { name, program } => {
                 let json = program.trim_start().starts_with(['{', '[']);
                 let verb = Verb::Submit {
@@ -204,7 +290,7 @@ impl Service {
                     name,
                     program,
                 };
-                engine.ask(verb).map(|_| ())
+                engine.ask(verb)
             }
             _ => Ok(()),
         }
@@ -236,6 +322,8 @@ impl Service {
                 space: "tool".to_owned(),
                 speeds: vec![0.0; 6],
                 timeout_ms: 50,
+                distance: None,
+                goal: Vec::new(),
             };
             // Without an engine there is no jog.
             let _ = engine.ask(verb);

@@ -4,8 +4,11 @@ use nalgebra::Isometry3;
 use planner::robot::Robot;
 use serde_json::{Value, json};
 
+use crate::forward::forward;
+use crate::reach::reach;
+
 /// x, y, z (m), qw, qx, qy, qz.
-fn list(pose: &Isometry3<f64>) -> [f64; 7] {
+pub(crate) fn list(pose: &Isometry3<f64>) -> [f64; 7] {
     let (place, turn) = (pose.translation, pose.rotation);
     [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
 }
@@ -30,6 +33,8 @@ pub(crate) fn robot(robot: &Robot, arm: &str, period_ns: u64) -> Value {
         "base_link": robot.model.base_link,
         "tip_link": robot.model.tip_link,
         "joints": robot.joint_names(),
+        "slides": robot.sliding(),
+        "reach": forward(robot).ok().map(|point| reach(robot, &point)),
         "lower": finite(&joints.lower),
         "upper": finite(&joints.upper),
         "velocity": joints.velocity,

@@ -12,13 +12,19 @@ use crate::hand::HandPost;
 use crate::preview::{Draft, preview};
 use crate::request::Service;
 use crate::source::Board;
-use crate::{Guard, Source, Token, ViewError, http, live, page, player, scene, socket};
+use crate::{
+    Guard, ReadWorld, Source, Token, ViewError, foxglove, http, live, mesh, page, player, scene,
+    socket,
+};
 
 /// How many connections there may be at once.
 const MOST: usize = 64;
 
 /// How long a connection may say nothing before it is closed.
 const SILENT: Duration = Duration::from_secs(20);
+
+/// How often the workstation is read again.
+const WORLD: Duration = Duration::from_millis(500);
 
 /// How the view is served.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,6 +46,7 @@ struct Shared {
 /// A view that is served. Dropping it ends it.
 pub struct Server {
     guard: Guard,
+    board: Arc<Board>,
     ends: Arc<AtomicBool>,
 }
 
@@ -68,13 +75,14 @@ impl Server {
             port,
             watch: Token::random()?,
             hand: Token::random()?,
+            look: Token::random()?,
         };
         let ends = Arc::new(AtomicBool::new(false));
         let board = Arc::new(Board::default());
         let service = service(source, &board, &ends)?;
         let shared = Arc::new(Shared {
             guard: guard.clone(),
-            board,
+            board: Arc::clone(&board),
             service,
             ends: Arc::clone(&ends),
             pages: AtomicU64::new(0),
@@ -86,7 +94,27 @@ impl Server {
             .map_err(|cause| ViewError::Thread {
                 cause: cause.to_string(),
             })?;
-        Ok(Self { guard, ends })
+        Ok(Self { guard, board, ends })
+    }
+
+    /// Shows what stands in the workstation as well, and reads it again twice a second.
+    ///
+    /// # Errors
+    /// [`ViewError::Thread`]: there is no thread for it.
+    pub fn show_world(&self, mut read: ReadWorld) -> Result<(), ViewError> {
+        let (board, ends) = (Arc::clone(&self.board), Arc::clone(&self.ends));
+        let look = move || {
+            while !ends.load(Ordering::Acquire) {
+                if let Some(world) = read() {
+                    board.set_world(&world);
+                }
+                std::thread::sleep(WORLD);
+            }
+        };
+        let spawned = Builder::new().name("view world".to_owned()).spawn(look);
+        spawned.map(|_| ()).map_err(|cause| ViewError::Thread {
+            cause: cause.to_string(),
+        })
     }
 
     /// The guard with its tokens.
@@ -105,6 +133,13 @@ impl Server {
     #[must_use]
     pub fn watch_address(&self) -> String {
         self.address(&self.guard.watch)
+    }
+
+    /// The address of the live data for Foxglove, Lichtblick and PlotJuggler.
+    #[must_use]
+    pub fn viewer_address(&self) -> String {
+        let (port, token) = (self.guard.port, self.guard.look.word());
+        format!("ws://127.0.0.1:{port}{}?t={token}", foxglove::PATH)
     }
 
     /// The token stands behind the #: browsers keep that to themselves.
@@ -138,9 +173,10 @@ fn service(
         Source::Arm(arm) => {
             service.engine = Some(live::start(&arm, board, &service.robot, ends)?);
         }
-        Source::Recording(recorded) => {
+        Source::Recording { recorded, folder } => {
             let head = &recorded.head;
-            let robot = planner::robot::parse(&head.robot, &head.urdf, &head.robot_toml)?;
+            let mut robot = planner::robot::parse(&head.robot, &head.urdf, &head.robot_toml)?;
+            robot.folder = folder;
             service.robot = Arc::new(Mutex::new(Some(robot)));
             service.player = Some(player::start(*recorded, board, ends)?);
         }
@@ -156,7 +192,6 @@ fn service(
                 rate_hz: 1000.0,
                 ..Draft::default()
             };
-            board.set_preview(&preview(&robot, &draft));
             let start = &robot.home;
             board.set_status(
                 &json!({"is": "status", "engine": true, "dry": true, "status": {
@@ -164,6 +199,7 @@ fn service(
                     "setpoint": start, "idle": true,
                 }}),
             );
+            board.set_preview(&preview(&robot, &draft));
             service.robot = Arc::new(Mutex::new(Some(*robot)));
         }
     }
@@ -209,50 +245,81 @@ fn serve(mut stream: TcpStream, shared: &Shared) {
         if visitor.upgrades {
             return upgrade(stream, &incoming, shared);
         }
-        let answered = match shared.guard.admit(visitor) {
-            Err(refusal) => {
-                tracing::warn!(?refusal, "a request was refused");
-                let (status, text) = refusal.answer();
-                http::answer(&mut stream, (status, "text/plain"), text.as_bytes(), false)
-                    .and(Err(std::io::ErrorKind::PermissionDenied.into()))
-            }
-            Ok(()) => match page::at(&visitor.path) {
-                Some(file) => {
-                    http::answer(&mut stream, (200, file.kind), file.body, incoming.stays)
-                }
-                None => http::answer(
-                    &mut stream,
-                    (404, "text/plain"),
-                    b"no such file\n",
-                    incoming.stays,
-                ),
-            },
-        };
+        let answered = answer(&mut stream, &incoming, shared);
         if answered.is_err() || !incoming.stays {
             return;
         }
     }
 }
 
+/// Answers one request that asks for a file.
+fn answer(
+    stream: &mut TcpStream,
+    incoming: &http::Incoming,
+    shared: &Shared,
+) -> std::io::Result<()> {
+    let path = &incoming.visitor.path;
+    let is_mesh = path.starts_with(mesh::PATH);
+    let admitted = if is_mesh {
+        shared.guard.admit_reader(&incoming.visitor)
+    } else {
+        shared.guard.admit(&incoming.visitor)
+    };
+    if let Err(refusal) = admitted {
+        tracing::warn!(?refusal, "a request was refused");
+        let (status, text) = refusal.answer();
+        http::answer(stream, (status, "text/plain"), text.as_bytes(), false)?;
+        return Err(std::io::ErrorKind::PermissionDenied.into());
+    }
+    if let Some(file) = page::at(path) {
+        return http::answer(stream, (200, file.kind), file.body, incoming.stays);
+    }
+    let found = is_mesh.then(|| shared.service.mesh(path)).flatten();
+    match found {
+        Some(bytes) => {
+            let kind = "application/octet-stream";
+            http::answer(stream, (200, kind), &bytes, incoming.stays)
+        }
+        None => http::answer(
+            stream,
+            (404, "text/plain"),
+            b"no such file\n",
+            incoming.stays,
+        ),
+    }
+}
+
 fn upgrade(mut stream: TcpStream, incoming: &http::Incoming, shared: &Shared) {
-    let admitted = shared.guard.admit_socket(&incoming.visitor);
-    let (access, key) = match (admitted, &incoming.key) {
-        (Ok(access), Some(key)) if incoming.visitor.path == "/live" => (access, key),
-        (admitted, _) => {
-            let (status, text) = match admitted {
-                Err(refusal) => {
-                    tracing::warn!(?refusal, "a WebSocket was refused");
-                    refusal.answer()
-                }
-                Ok(_) => (400, "no WebSocket is served here"),
-            };
-            let _ = http::answer(&mut stream, (status, "text/plain"), text.as_bytes(), false);
-            return;
+    let visitor = &incoming.visitor;
+    let refuse = |mut stream: TcpStream, (status, text): (u16, &str)| {
+        // Whoever is refused may have gone.
+        let _ = http::answer(&mut stream, (status, "text/plain"), text.as_bytes(), false);
+    };
+    let admitted = match visitor.path.as_str() {
+        foxglove::PATH => shared.guard.admit_viewer(visitor).map(|()| None),
+        _ => shared.guard.admit_socket(visitor).map(Some),
+    };
+    let access = match admitted {
+        Ok(access) => access,
+        Err(refusal) => {
+            tracing::warn!(?refusal, "a WebSocket was refused");
+            return refuse(stream, refusal.answer());
         }
     };
-    if http::upgrade(&mut stream, key).is_err() {
+    let protocol = match (access, visitor.path.as_str()) {
+        (None, _) => foxglove::protocol(visitor.protocols.as_deref()),
+        (_, "/live") => Some("canter"),
+        _ => None,
+    };
+    let (Some(protocol), Some(key)) = (protocol, &incoming.key) else {
+        return refuse(stream, (400, "no WebSocket of this kind is served here"));
+    };
+    if http::upgrade(&mut stream, key, protocol).is_err() {
         return;
     }
+    let Some(access) = access else {
+        return foxglove::run(stream, &shared.board, &shared.ends);
+    };
     let page = shared.pages.fetch_add(1, Ordering::AcqRel) + 1;
     socket::run(
         stream,

@@ -12,6 +12,7 @@ use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
 
 use crate::Access;
+use crate::freshness::Freshness;
 use crate::request::{Service, Wisher};
 use crate::source::{Board, Seen};
 
@@ -44,6 +45,7 @@ pub(crate) fn run(
         page,
         access,
         later,
+        freshness: Freshness::new(),
     };
     let mut seen = Seen::from_now(board);
     let may_move = access == Access::Hand;

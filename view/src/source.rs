@@ -1,5 +1,6 @@
 //! What is shown.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ipc::Arm;
@@ -7,15 +8,22 @@ use planner::robot::Robot;
 use recorder::Recorded;
 use serde_json::{Value, json};
 
+use crate::World;
 use crate::blocks::Blocks;
+use crate::live_periods::LivePeriods;
 
 /// What is shown.
 #[derive(Debug)]
 pub enum Source {
     /// A running arm.
     Arm(Arm),
-    /// A recording.
-    Recording(Box<Recorded>),
+    /// A recording, and the robot's folder where its meshes are.
+    Recording {
+        /// All that the file has.
+        recorded: Box<Recorded>,
+        /// The folder; without it an arm of meshes is not drawn.
+        folder: Option<PathBuf>,
+    },
     /// A program that is planned and not executed: name, form (`text` or `json`), text.
     Program {
         /// The robot.
@@ -36,12 +44,16 @@ pub(crate) struct Posted {
 #[derive(Debug, Default)]
 pub(crate) struct Board {
     pub(crate) blocks: Blocks,
+    /// Every period, for viewers of other programs.
+    pub(crate) periods: LivePeriods,
     /// The robot, with its URDF.
     robot: Mutex<Posted>,
     /// Where the session is.
     status: Mutex<Posted>,
     /// The program with its text.
     program: Mutex<Posted>,
+    /// What stands in the workstation.
+    world: Mutex<Posted>,
     /// The same program, planned.
     preview: Mutex<Posted>,
     /// What happened, the last few hundred.
@@ -73,6 +85,10 @@ impl Board {
         post(&self.status, status);
     }
 
+    pub(crate) fn set_world(&self, world: &World) {
+        post(&self.world, &json!({"is": "world", "world": world}));
+    }
+
     pub(crate) fn set_program(&self, program: &Value) {
         post(&self.program, &json!({"is": "program", "program": program}));
     }
@@ -97,9 +113,10 @@ impl Board {
         let mut texts = Vec::new();
         let places = [
             (&self.robot, &mut seen.robot),
+            (&self.status, &mut seen.status),
+            (&self.world, &mut seen.world),
             (&self.program, &mut seen.program),
             (&self.preview, &mut seen.preview),
-            (&self.status, &mut seen.status),
         ];
         for (place, seen) in places {
             let posted = locked(place).clone();
@@ -135,6 +152,7 @@ pub(crate) struct Seen {
     pub(crate) blocks: u64,
     robot: u64,
     status: u64,
+    world: u64,
     program: u64,
     preview: u64,
     notes: u64,

@@ -60,6 +60,8 @@ impl Jog {
                 space: space.to_owned(),
                 speeds,
                 timeout_ms: self.timeout,
+                distance: None,
+                goal: Vec::new(),
             };
             let answer = client.ask(verb, PATIENCE)?;
             client::accepted(answer).map(|_| ())

@@ -86,7 +86,7 @@ impl Plan {
                 robot: Box::new(robot),
                 program: texts.map(str::to_owned),
             };
-            return viewing::serve(printer, source, None, || false);
+            return viewing::serve(printer, (source, None), None, || false);
         }
         Ok(Exit::Done)
     }

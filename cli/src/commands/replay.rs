@@ -48,6 +48,9 @@ pub(crate) struct Replay {
     /// Show the recording in the browser: so it is without --check and --info
     #[arg(long, conflicts_with_all = ["check", "info"])]
     view: bool,
+    /// Folder of the robot, for the meshes of its picture: a recording has none
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["check", "info"])]
+    robot: Option<PathBuf>,
     /// Port of the page on 127.0.0.1 [default: 8230, or a free one where that is taken]
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
@@ -58,14 +61,18 @@ impl Replay {
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let recorded = RecordedFile::read(&self.file)?;
         if self.check {
+            recorded.check_whole()?;
             return check(&recorded);
         }
         summary(printer, &recorded);
         if self.info {
             return Ok(Exit::Done);
         }
-        let source = Source::Recording(Box::new(recorded.content));
-        viewing::serve(printer, source, self.port, || false)
+        let source = Source::Recording {
+            recorded: Box::new(recorded.content),
+            folder: self.robot.clone(),
+        };
+        viewing::serve(printer, (source, None), self.port, || false)
     }
 }
 

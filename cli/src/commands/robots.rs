@@ -37,8 +37,9 @@ enum What {
     },
     /// Make a robot folder from a URDF
     ///
-    /// Writes robot.urdf and robot.toml; what the URDF does not have is filled with cautious values
-    /// that are marked as such. Check robot.toml before the robot moves.
+    /// Writes robot.urdf and robot.toml, and copies the meshes that are found; what the URDF does
+    /// not have is filled with cautious values that are marked as such. Check robot.toml before the
+    /// robot moves.
     Import {
         /// The URDF file
         #[arg(value_name = "FILE.urdf")]
@@ -98,6 +99,16 @@ fn import(
         robot::import(file, folder, tip).map_err(|error| Failure::new(Exit::Unreadable, error))?;
     let mut out = io::stdout().lock();
     writeln!(out, "{}: {} joints", folder.display(), robot.dof())?;
+    let names = robot::mesh_names(&robot.urdf);
+    let is_lost = |name: &&&str| robot::mesh_file(folder, name).is_none();
+    if let Some(lost) = names.iter().find(is_lost) {
+        let count = names.iter().filter(is_lost).count();
+        output::note(&format!(
+            "{count} of {} meshes were not found, the first is {lost}: the live view shows the arm \
+             without them",
+            names.len()
+        ));
+    }
     output::note(&format!(
         "check {} before the robot moves: values that the URDF does not have are defaults",
         folder.join("robot.toml").display()

@@ -83,6 +83,7 @@ impl Verify {
     /// Judges a recording: every program of it, or the one that is given.
     fn run_recording(&self, path: &Path) -> Result<Exit, Failure> {
         let recorded = RecordedFile::read(path)?;
+        recorded.check_whole()?;
         let robot = match &self.robot {
             Some(name) => robot::load(name)?,
             None => recorded.robot()?,

@@ -1,4 +1,5 @@
 use std::io::Read;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +10,7 @@ use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::printer::Printer;
-use crate::viewing;
+use crate::{viewing, world_boxes};
 
 /// Show a running arm in the browser, and lead it by hand
 ///
@@ -24,6 +25,10 @@ pub(crate) struct View {
     /// Port on 127.0.0.1; 0 takes a free one [default: 8230, or a free one where that is taken]
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
+    /// Show the objects of this world too: the database of a plan as it changes, or a workstation
+    /// file
+    #[arg(long, value_name = "WORLD")]
+    world: Option<PathBuf>,
     /// End when standard input ends
     #[arg(long, hide = true)]
     until_end_of_input: bool,
@@ -42,7 +47,8 @@ impl View {
                 tell.store(true, Ordering::Relaxed);
             });
         }
-        viewing::serve(printer, Source::Arm(arm), self.port, || {
+        let world = self.world.as_deref().map(world_boxes::reader).transpose()?;
+        viewing::serve(printer, (Source::Arm(arm), world), self.port, || {
             ended.load(Ordering::Relaxed)
         })
     }

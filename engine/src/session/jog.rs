@@ -15,6 +15,8 @@ pub enum JogSpace {
     Tool,
     /// Along x, y, z and about x, y, z of the workstation, in the controlled point.
     Workstation,
+    /// All joints together towards [`Jog::goal`]: the one fraction is of their largest speeds.
+    Goal,
 }
 
 /// A request to jog the arm.
@@ -26,6 +28,11 @@ pub struct Jog {
     pub speeds: Vec<f64>,
     /// The arm stops when no further request comes for this long.
     pub timeout: Duration,
+    /// How far at most: m of the tool, or rad or m of the joint that moves most. The jog then ends
+    /// by itself. None: as far as the arm can go.
+    pub distance: Option<f64>,
+    /// Where a jog in [`JogSpace::Goal`] ends (rad, m, one per joint).
+    pub goal: Vec<f64>,
 }
 
 /// Why a jog is refused.
@@ -40,6 +47,17 @@ pub enum JogError {
         /// What was given.
         got: String,
     },
+    /// The goal has not one position per joint, or one that is no number.
+    #[error("the goal of a jog has {wanted} positions, got {got}")]
+    Goal {
+        /// How many joints there are.
+        wanted: usize,
+        /// What was given.
+        got: String,
+    },
+    /// The distance of a step is not a length.
+    #[error("a step is longer than 0, got {0}")]
+    Distance(f64),
     /// A program is running or waiting.
     #[error("a program is running; canter abort ends it")]
     Program,
@@ -68,6 +86,7 @@ pub(super) fn direction<const N: usize>(
     let wanted = match jog.space {
         JogSpace::Joint => N,
         JogSpace::Tool | JogSpace::Workstation => 6,
+        JogSpace::Goal => 1,
     };
     let speeds = &jog.speeds;
     if speeds.len() != wanted || !speeds.iter().all(|share| (-1.0..=1.0).contains(share)) {
@@ -77,17 +96,35 @@ pub(super) fn direction<const N: usize>(
     if speeds.iter().all(|share| *share == 0.0) {
         return Ok(None);
     }
+    let distance = jog.distance.unwrap_or(f64::INFINITY);
+    if distance.is_nan() || distance <= 0.0 {
+        return Err(JogError::Distance(distance));
+    }
     let back = match jog.space {
         JogSpace::Workstation => workstation_from_tool.inverse(),
         _ => UnitQuaternion::identity(),
     };
     Ok(Some(match jog.space {
-        JogSpace::Joint => Direction::Joints(SVector::from_fn(|joint, _| speeds[joint])),
+        JogSpace::Joint => Direction::Joints {
+            shares: SVector::from_fn(|joint, _| speeds[joint]),
+            distance,
+        },
         JogSpace::Tool | JogSpace::Workstation => Direction::Tool {
             linear: back * Vector3::from_column_slice(&speeds[..3]),
             angular: back * Vector3::from_column_slice(&speeds[3..]),
+            distance,
         },
+        JogSpace::Goal => towards(&jog.goal, speeds[0].abs())?,
     }))
+}
+
+fn towards<const N: usize>(goal: &[f64], share: f64) -> Result<Direction<N>, JogError> {
+    if goal.len() != N || !goal.iter().all(|position| position.is_finite()) {
+        let got = format!("{goal:?}");
+        return Err(JogError::Goal { wanted: N, got });
+    }
+    let joints = SVector::from_column_slice(goal);
+    Ok(Direction::Goal { joints, share })
 }
 
 #[cfg(test)]
@@ -102,12 +139,41 @@ mod tests {
             space: JogSpace::Workstation,
             speeds: vec![0.0, 0.0, -0.5, 0.1, 0.0, 0.0],
             timeout: Duration::from_millis(100),
+            distance: None,
+            goal: Vec::new(),
         };
-        let Some(Direction::<6>::Tool { linear, angular }) = direction(&jog, &turned).unwrap()
+        let Some(Direction::<6>::Tool {
+            linear, angular, ..
+        }) = direction(&jog, &turned).unwrap()
         else {
             panic!("no direction");
         };
         assert!((turned * linear - Vector3::new(0.0, 0.0, -0.5)).norm() < 1e-12);
         assert!((turned * angular - Vector3::new(0.1, 0.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_goal_has_a_position_for_each_joint() {
+        let jog = |goal: Vec<f64>| Jog {
+            space: JogSpace::Goal,
+            speeds: vec![0.2],
+            timeout: Duration::from_millis(100),
+            distance: None,
+            goal,
+        };
+        let turn = UnitQuaternion::identity();
+        assert!(direction::<2>(&jog(vec![0.1, 0.2]), &turn).is_ok());
+        for wrong in [vec![], vec![0.1], vec![0.1, f64::NAN]] {
+            let refused = direction::<2>(&jog(wrong), &turn);
+            assert!(matches!(refused, Err(JogError::Goal { wanted: 2, .. })));
+        }
+        let backwards = Jog {
+            distance: Some(-1.0),
+            ..jog(vec![0.1, 0.2])
+        };
+        assert_eq!(
+            direction::<2>(&backwards, &turn),
+            Err(JogError::Distance(-1.0))
+        );
     }
 }

@@ -136,6 +136,21 @@ pub enum SubmitError {
     Closed,
 }
 
+/// Why no command is let go in single step.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StepError {
+    /// Commands are not executed one by one.
+    #[error("single step is off: all commands are executed one after the other")]
+    Off,
+    /// The command before has not ended.
+    #[error("the command before has not ended")]
+    Moving,
+    /// Nothing waits.
+    #[error("no command waits")]
+    Empty,
+}
+
 /// How long the worker may continue to plan after the arm rests and the session is over; its result
 /// is not needed then.
 const LAST_THOUGHT: Duration = Duration::from_millis(500);
@@ -293,6 +308,20 @@ impl Session {
         Ok(ids)
     }
 
+    /// Executes commands one by one from now on, or all again. In single step each command waits for
+    /// [`Session::step_on`]; what is planned ahead already is executed.
+    pub fn set_single_step(&self, on: bool) {
+        self.shared.inbox().set_single_step(on);
+    }
+
+    /// Lets the next command begin that waits in single step.
+    ///
+    /// # Errors
+    /// [`StepError`], and nothing begins.
+    pub fn step_on(&self) -> Result<(), StepError> {
+        self.shared.inbox().step_on()
+    }
+
     /// A handle to control the motion, for a separate thread.
     #[must_use]
     pub fn steering(&self) -> Steering {
@@ -357,6 +386,7 @@ impl Session {
         (self.live.0)(&mut status);
         let inbox = self.shared.inbox();
         status.queued = inbox.waiting();
+        status.single_step = inbox.is_single_step();
         status.idle &= !inbox.is_busy();
         status
     }

@@ -22,6 +22,8 @@ pub struct Status {
     pub command: Option<&'static str>,
     /// Commands that wait.
     pub queued: usize,
+    /// Whether each command waits until it is let go.
+    pub single_step: bool,
     /// Whether nothing is left to do.
     pub idle: bool,
     /// Whether a pause or a stop holds the arm.

@@ -190,7 +190,7 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     fn read_orders(&mut self) {
-        let waiting = !self.ends.shared.inbox().is_empty() && self.flight.len() < AHEAD;
+        let waiting = self.ends.shared.inbox().has(self.epoch) && self.flight.len() < AHEAD;
         let busy = !self.work.is_empty() || waiting;
         // In lock-step the driver waits for this thread.
         let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();

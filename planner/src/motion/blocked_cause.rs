@@ -61,6 +61,15 @@ pub enum JogRefusal {
         /// The joint.
         joint: String,
     },
+    /// The goal is where the arm is.
+    #[error("the pose is reached")]
+    AtGoal,
+    /// The goal is beyond the range of a joint.
+    #[error("the goal is beyond the range of {joint}")]
+    GoalBeyond {
+        /// The joint.
+        joint: String,
+    },
     /// The direction is zero, or too small for a move.
     #[error("no direction")]
     NoDirection,

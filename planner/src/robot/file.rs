@@ -146,6 +146,7 @@ impl Files<'_> {
         Ok(Robot {
             name: self.name.to_owned(),
             description: document.description.clone(),
+            folder: None,
             urdf: self.urdf.to_owned(),
             toml: self.toml.to_owned(),
             joints,

@@ -3,12 +3,14 @@
 use super::Robot;
 use super::error::RobotError;
 use super::file::Files;
+use super::meshes::copy_meshes;
 use kinematics::{Model, urdf};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Makes a robot folder from a URDF: copies it to `folder/robot.urdf` and writes a
-/// `folder/robot.toml` whose defaults are marked as Canter's. Returns the loaded robot.
+/// Makes a robot folder from a URDF: copies it to `folder/robot.urdf` with the meshes that it names
+/// and that are found, and writes a `folder/robot.toml` whose defaults are marked as Canter's.
+/// Returns the loaded robot.
 ///
 /// `tip` names the link at the flange; it is needed when several could be it.
 ///
@@ -35,12 +37,18 @@ pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robo
     }
     .read()?;
     let is_new = !folder.exists();
-    let written = write(folder, &urdf, &toml);
+    let from = urdf_file.canonicalize().unwrap_or_default();
+    let from = from.parent().unwrap_or(urdf_file);
+    let written = write(folder, &urdf, &toml).and_then(|()| {
+        let copied = copy_meshes(&urdf, from, folder);
+        copied.map_err(|error| unwritable(folder, error.to_string()))
+    });
     if written.is_err() && is_new {
         // An incomplete folder is removed; the write error is reported.
         let _ = std::fs::remove_dir_all(folder);
     }
-    written.map(|()| robot)
+    let folder = folder.canonicalize().ok();
+    written.map(|_| Robot { folder, ..robot })
 }
 
 fn write(folder: &Path, urdf: &str, toml: &str) -> Result<(), RobotError> {

@@ -7,7 +7,7 @@ use planner::motion::Direction;
 use realtime::Segment;
 use servo::Control;
 
-use super::super::jog::{Jog, JogError, direction};
+use super::super::jog::{Jog, JogError, JogSpace, direction};
 use super::super::note::Note;
 use super::{Work, Worker};
 
@@ -56,7 +56,9 @@ impl<const N: usize> Worker<'_, N> {
                 None => Ok(()),
             };
         };
-        let same = direction.is_some() && jogging.request.speeds == request.speeds;
+        let same = direction.is_some()
+            && jogging.request.speeds == request.speeds
+            && jogging.request.goal == request.goal;
         if same && jogging.request.space == request.space && jogging.phase != Phase::Ending {
             jogging.until = until;
             return Ok(());
@@ -162,13 +164,18 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// Whether it was a jog that came to the end of its path; it continues from there if it can.
+    /// Whether it was a jog that came to the end of its path. It continues from there if it can,
+    /// and is over where its length or its goal was given.
     pub(super) fn jog_finished(&mut self, command: u32) -> bool {
         let ours = command == COMMAND;
         if let Some(jogging) = self.jogging.as_mut().filter(|_| ours)
             && jogging.phase == Phase::Moving
         {
-            jogging.phase = Phase::Waiting;
+            if jogging.request.distance.is_some() || jogging.request.space == JogSpace::Goal {
+                self.rest_from_jog();
+            } else {
+                jogging.phase = Phase::Waiting;
+            }
         }
         ours
     }

@@ -1,0 +1,87 @@
+//! A fault at any moment leaves the time before it.
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use crate::canter::canter;
+use crate::{PATIENCE, arm, engine, send, wait_for};
+use system_tests::signal;
+
+/// Runs the program, stops the engine for longer than the watchdogs at `after_ms`, and reads the file
+/// that the fault names: seconds of it before the fault.
+fn fault_after(name: &str, after_ms: u64) -> f64 {
+    let arm = arm(name);
+    let folder = tempfile::tempdir().unwrap();
+    let faults = format!("--faults={}", folder.path().display());
+    let engine = engine(&arm, &[faults]);
+    let begun = Instant::now();
+    let _program = send(&arm);
+    wait_for(&arm, |now| now["idle"] == false);
+    std::thread::sleep(Duration::from_millis(after_ms));
+    let lived = begun.elapsed().as_secs_f64();
+    // Longer than the watchdog of engine and driver.
+    signal::send(&engine.0, libc::SIGSTOP);
+    std::thread::sleep(Duration::from_millis(600));
+    signal::send(&engine.0, libc::SIGCONT);
+    let end = Instant::now() + PATIENCE;
+    let named = named_file(&arm, end);
+    assert!(named.starts_with(folder.path()), "{}", named.display());
+    while !named.exists() {
+        assert!(Instant::now() < end, "{} is not finished", named.display());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let recorded = recorder::read(&named).unwrap();
+    assert_eq!(recorded.head.reason, "fault");
+    assert!(recorded.cut.is_none() && !recorded.damaged);
+    assert_eq!(recorded.programs.len(), 1);
+    let is_fault = |note: &&recorder::RecordedNote| note.json.contains("\"faulted\"");
+    let fault = recorded.notes.iter().find(is_fault).unwrap();
+    let note: serde_json::Value = serde_json::from_str(&fault.json).unwrap();
+    let tick = note["tick"].as_u64().unwrap();
+    let before = recorded
+        .samples
+        .iter()
+        .filter(|sample| sample.tick <= tick)
+        .count();
+    let seconds = before as f64 * 1e-3;
+    // All that the engine lived before it, but for periods that a loaded machine skips.
+    assert!(seconds > 0.5 * lived, "{seconds} s of {lived} s");
+    let ran = canter(["replay", "--info", &named.display().to_string()]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.contains("1 programs"), "{}", ran.stdout);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    seconds
+}
+
+/// The file that the fault's message names.
+fn named_file(arm: &str, end: Instant) -> PathBuf {
+    loop {
+        let ran = canter(["status", "--json", "--arm", arm]);
+        let now: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        let fault = now["fault"].as_str();
+        if let Some(fault) = fault.filter(|fault| fault.contains(".mcap")) {
+            return fault.rsplit(' ').next().map(PathBuf::from).unwrap();
+        }
+        assert!(Instant::now() < end, "no fault with a file: {now}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// A fault writes the time before it to a file that its message names.
+pub(crate) fn a_fault_leaves_the_minute_before_it() {
+    for (number, after_ms) in [(0, 1200), (1, 3437)] {
+        fault_after(&format!("fault{number}"), after_ms);
+    }
+}
+
+/// The same at twenty moments of the program.
+pub(crate) fn twenty_faults_leave_the_minute_before_them() {
+    for number in 0..20_u64 {
+        let after_ms = 200 + number * 7919 % 6400;
+        let seconds = fault_after(&format!("faults{number}"), after_ms);
+        println!(
+            "fault {number}, {after_ms} ms after the program: {seconds:.3} s before it are there"
+        );
+    }
+}
