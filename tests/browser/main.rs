@@ -46,6 +46,7 @@ fn main() {
         jogs::steps_and_taught_poses
         jogs::a_gamepad_needs_its_enabling_button
         shapes::meshes_of_an_imported_robot_are_drawn
+        shapes::objects_of_the_world_are_drawn
         pages::two_pages_fight_for_the_hand
         pages::a_page_of_another_origin_gets_nothing
         pages::a_recording_is_shown

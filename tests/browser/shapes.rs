@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::canter::canter;
 use crate::devtools::Browser;
 use crate::pages::{SIZE, ready};
-use crate::scene::Scene;
+use crate::scene::{Peer, Scene};
 
 /// A box of 0.1 m as triangles: corners and the three corners of each triangle.
 const CORNERS: [[f64; 3]; 8] = [
@@ -167,5 +167,48 @@ pub(crate) fn meshes_of_an_imported_robot_are_drawn() {
     }
     // The browser itself says that a file is missing; nothing else.
     tab.complaints.retain(|text| !text.contains("none.stl"));
+    assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
+}
+
+/// What stands in the workstation is drawn where the world says, with its name under the pointer.
+pub(crate) fn objects_of_the_world_are_drawn() {
+    let scene = Scene::start("world");
+    let mut view = Peer::start(&[
+        "view",
+        "--arm",
+        &scene.arm,
+        "--port",
+        "0",
+        "--world",
+        "examples/kitting/workstation.toml",
+    ]);
+    let address = view.line("http://");
+    let browser = Browser::start();
+    let mut tab = browser.open(&address, SIZE);
+    ready(&mut tab);
+    tab.wait("__view.world.group.children.length > 3");
+    let ran = canter([
+        "world",
+        "export",
+        "examples/kitting/workstation.toml",
+        "--json",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let names = tab.eval(
+        "__view.world.group.children.map((box) => box.children[0].userData.name.split(' (')[0])",
+    );
+    for name in names.as_array().unwrap() {
+        assert!(
+            ran.stdout.contains(name.as_str().unwrap()),
+            "{name} is not in the world"
+        );
+    }
+    // The first box that is seen by itself names itself under the pointer.
+    let named = "__view.world.group.children.some((box) => { const p = box.children[0].getWorldPosition(box.position.clone()).project(__view.stage.camera); \
+        const { clientWidth: w, clientHeight: h } = __view.stage.canvas; \
+        return __view.world.under((p.x + 1) / 2 * w, (1 - p.y) / 2 * h) === box.children[0].userData.name; })";
+    assert_eq!(tab.eval(named), true);
+    tab.eval("document.querySelector('[data-layer=objects]').click()");
+    assert_eq!(tab.eval("__view.world.group.visible"), false);
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
 }

@@ -26,7 +26,7 @@ export function reachSurface({ middle, around, upwards, radii }, colour) {
   geometry.setAttribute('position', new BufferAttribute(new Float32Array(positions), 3));
   // Its far side only: the near one would lie over the arm.
   const skin = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.1, side: BackSide, depthWrite: false });
-  const lines = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.12, wireframe: true, side: DoubleSide, depthWrite: false });
+  const lines = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.07, wireframe: true, side: DoubleSide, depthWrite: false });
   const group = new Group();
   group.add(new Mesh(geometry, skin), new Mesh(geometry, lines));
   return group;

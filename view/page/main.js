@@ -305,4 +305,4 @@ drawRamp(get('legend'));
 requestAnimationFrame(frame);
 
 // What tests look at.
-window.__view = { act, samples, stage, plots, pendant, program, poses, queue, measure, gamepads, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
+window.__view = { act, samples, stage, world, plots, pendant, program, poses, queue, measure, gamepads, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
