@@ -14,7 +14,7 @@ use iceoryx2::prelude::{BackpressureStrategy, Node, ZeroCopySend};
 use iceoryx2::service::port_factory::request_response::PortFactory;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 
-use crate::node::{Shared, control_exchange, inhabitants, join};
+use crate::node::{ENGINE, Shared, control_exchange, inhabitants, join};
 use crate::{Arm, IpcError, PROTOCOL, RequestId, bytes_of, room, text_of};
 
 /// The kind of service of an arm.
@@ -208,7 +208,7 @@ impl ControlServer {
     /// # Errors
     /// [`IpcError::Taken`] when another engine serves this arm.
     pub fn open(arm: &Arm) -> Result<Self, IpcError> {
-        let node = join(arm, "engine for control")?;
+        let node = join(arm, ENGINE)?;
         let factory: Exchange = control_exchange(&node, arm, KIND)?;
         let server = factory
             .server_builder()
@@ -217,7 +217,7 @@ impl ControlServer {
             .map_err(|cause| match cause {
                 ServerCreateError::ExceedsMaxSupportedServers => IpcError::Taken {
                     arm: arm.to_string(),
-                    role: "engine for control",
+                    role: ENGINE,
                     owner: inhabitants(&factory, &node),
                 },
                 other => failed(arm, "opening the control channel", &other),

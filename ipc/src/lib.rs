@@ -51,7 +51,7 @@ pub use driver_link::{DriverLink, Greeting};
 pub use engine_link::{EngineLink, Greeted, READY};
 pub use error::{IpcError, MessageError};
 pub use hello::{Clock, DriverFeatures, Hello, HelloAck, Verdict, bytes_of, text_of};
-pub use node::{NodeCount, count_nodes, look_at_services, remove_dead_nodes};
+pub use node::{NodeCount, count_nodes, engines, look_at_services, remove_dead_nodes};
 pub use observer::Observer;
 pub use ownership::Ownership;
 pub use payload::Payload;

@@ -95,6 +95,36 @@ pub fn count_nodes(domain: &Domain) -> Result<NodeCount, IpcError> {
     Ok(found)
 }
 
+/// What an engine's node for the control channel is called, before the name of its arm.
+pub(crate) const ENGINE: &str = "engine for control";
+
+/// Names of the arms (`cell/arm`) whose engine runs in `domain`, in alphabetical order; changes
+/// nothing.
+///
+/// # Errors
+/// [`IpcError::Failed`] when the list cannot be read.
+pub fn engines(domain: &Domain) -> Result<Vec<String>, IpcError> {
+    let mut found = Vec::new();
+    let label = format!("{ENGINE} of ");
+    Node::<Shared>::list(&configuration(domain)?, |state| {
+        if let NodeState::Alive(view) = state
+            && let Some(details) = view.details()
+            && let Some(arm) = details.name().as_str().strip_prefix(&label)
+        {
+            found.push(arm.to_owned());
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(|cause| IpcError::Failed {
+        service: domain.directory().display().to_string(),
+        operation: "listing the processes",
+        cause: format!("{cause:?}"),
+    })?;
+    found.sort_unstable();
+    found.dedup();
+    Ok(found)
+}
+
 /// Removes what dead processes left behind in `domain`; returns how many were cleaned up and how
 /// many could not be.
 ///

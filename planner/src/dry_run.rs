@@ -331,7 +331,7 @@ fn planned_command<const N: usize>(
 }
 
 /// A motion of any number of joints.
-trait Motion: std::fmt::Debug + Send {
+trait Motion: std::fmt::Debug + Send + Sync {
     /// State `t` s after the start; at rest after the end.
     fn sample(&self, t: f64) -> PlanSample;
 

@@ -15,6 +15,7 @@ pub mod controller;
 mod dof;
 pub mod dry_run;
 pub mod end_effector;
+pub mod kernels;
 pub mod modal;
 pub mod motion;
 pub mod recorded;

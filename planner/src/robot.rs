@@ -11,7 +11,7 @@ mod meshes;
 mod shipped;
 
 pub use error::RobotError;
-pub use import::import;
+pub use import::{from_urdf, import};
 pub use meshes::{mesh_file, mesh_names};
 pub use shipped::list;
 

@@ -20,14 +20,13 @@ use std::path::Path;
 pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robot, RobotError> {
     let file = urdf_file.display().to_string();
     let urdf = super::text_of(urdf_file)?;
-    let model = urdf::read(&urdf, tip).map_err(|source| RobotError::Urdf { file, source })?;
+    let toml = defaults_for(&file, &urdf, tip)?;
     let toml_file = folder.join("robot.toml");
     if toml_file.exists() {
         let message = "it exists already".to_owned();
         return Err(unwritable(&toml_file, message));
     }
     // Read before anything is written: a robot that is refused leaves nothing behind.
-    let toml = defaults(&model);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let robot = Files {
         name: &name,
@@ -49,6 +48,34 @@ pub fn import(urdf_file: &Path, folder: &Path, tip: Option<&str>) -> Result<Robo
     }
     let folder = folder.canonicalize().ok();
     written.map(|_| Robot { folder, ..robot })
+}
+
+/// A robot from the text of a URDF, with Canter's defaults for what the URDF does not have. Nothing is
+/// written.
+///
+/// `tip` names the link at the flange; it is needed when several could be it.
+///
+/// # Errors
+/// [`RobotError`] when the URDF cannot be used.
+///
+/// ```
+/// let urdf = planner::robot::load("ur5e")?.urdf;
+/// let robot = planner::robot::from_urdf("mine", &urdf, None)?;
+/// assert_eq!(robot.dof(), 6);
+/// # Ok::<(), planner::robot::RobotError>(())
+/// ```
+pub fn from_urdf(name: &str, urdf: &str, tip: Option<&str>) -> Result<Robot, RobotError> {
+    let toml = defaults_for(name, urdf, tip)?;
+    super::parse(name, urdf, &toml)
+}
+
+/// Text of a `robot.toml` for a URDF.
+fn defaults_for(file: &str, urdf: &str, tip: Option<&str>) -> Result<String, RobotError> {
+    let model = urdf::read(urdf, tip).map_err(|source| RobotError::Urdf {
+        file: file.to_owned(),
+        source,
+    })?;
+    Ok(defaults(&model))
 }
 
 fn write(folder: &Path, urdf: &str, toml: &str) -> Result<(), RobotError> {
