@@ -58,7 +58,7 @@ use crate::printer::Printer;
 /// write a file; 4 no engine or driver; 5 stopped by the operator; 6 aborted by a limit or guard; 7
 /// driver fault or driver lost; 8 done, but some output was lost; 70 internal error.
 #[derive(Debug, Parser)]
-#[command(name = "canter", version, max_term_width = 100)]
+#[command(name = "canter", version = env!("CANTER_VERSION"), max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     command: commands::Command,

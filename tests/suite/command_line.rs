@@ -12,10 +12,10 @@ fn help_is_an_answer() {
 
 #[test]
 fn the_version_is_an_answer() {
-    assert_eq!(
-        canter(["--version"]).stdout,
-        concat!("canter ", env!("CARGO_PKG_VERSION"), "\n")
-    );
+    // A release also names its commit.
+    let version = canter(["--version"]).stdout;
+    let number = concat!("canter ", env!("CARGO_PKG_VERSION"));
+    assert!(version.starts_with(number), "{version}");
 }
 
 #[test]
