@@ -1,0 +1,66 @@
+#!/usr/bin/env bash
+# Makes canter_VERSION_ARCH.deb in a folder (target/packages unless named) from the release build:
+#
+#     cargo build --release --locked --bin canter && packaging/deb.sh [FOLDER]
+#
+# CANTER names another binary to pack. It needs nothing but dpkg-deb. The same binary and the same
+# commit give the same bytes: times are those of the commit, owner is root, the order is fixed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+binary=${CANTER:-target/release/canter}
+out=${1:-target/packages}
+[ -x "$binary" ] || { echo "packaging/deb.sh: there is no $binary: cargo build --release --bin canter" >&2; exit 1; }
+version=$("$binary" --version | awk '{print $2}')
+architecture=$(dpkg --print-architecture)
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 0)}
+export SOURCE_DATE_EPOCH
+
+tree=$(mktemp -d)
+trap 'rm -rf "$tree"' EXIT
+put() { install -D -m "$1" "$2" "$tree/$3"; }
+
+put 755 "$binary" usr/bin/canter
+strip "$tree/usr/bin/canter"
+"$binary" man --folder "$tree/usr/share/man/man1"
+find "$tree/usr/share/man" -name '*.1' -exec gzip -9n {} +
+mkdir -p "$tree"/usr/share/{bash-completion/completions,zsh/vendor-completions,fish/vendor_completions.d}
+"$binary" completions bash > "$tree/usr/share/bash-completion/completions/canter"
+"$binary" completions zsh > "$tree/usr/share/zsh/vendor-completions/_canter"
+"$binary" completions fish > "$tree/usr/share/fish/vendor_completions.d/canter.fish"
+put 644 packaging/limits.conf etc/security/limits.d/canter.conf
+put 644 packaging/arm.conf usr/share/doc/canter/examples/cell-arm.conf
+put 644 packaging/systemd/canter@.service usr/lib/systemd/system/canter@.service
+put 644 packaging/systemd/sysusers.conf usr/lib/sysusers.d/canter.conf
+put 644 packaging/copyright usr/share/doc/canter/copyright
+for example in examples/*.canon; do put 644 "$example" "usr/share/doc/canter/$example"; done
+
+mkdir "$tree/DEBIAN"
+echo /etc/security/limits.d/canter.conf > "$tree/DEBIAN/conffiles"
+put 755 packaging/postinst DEBIAN/postinst
+put 755 packaging/prerm DEBIAN/prerm
+put 755 packaging/postrm DEBIAN/postrm
+size=$(du -k -s --apparent-size "$tree/usr" | cut -f1)
+# The newest symbols that the binary uses; a system with an older library refuses the package.
+libc=$(objdump -T "$tree/usr/bin/canter" | grep -o 'GLIBC_[0-9.]*' | cut -d_ -f2 | sort -uV | tail -n1)
+cat > "$tree/DEBIAN/control" <<CONTROL
+Package: canter
+Version: $version
+Architecture: $architecture
+Maintainer: Canter <canter@localhost>
+Installed-Size: $size
+Depends: libc6 (>= $libc), libgcc-s1
+Section: electronics
+Priority: optional
+Description: real-time execution of motions of robot arms
+ Canter executes programs in NIST's canonical robot command language on a
+ robot arm, at servo rate: it plans each motion within the limits of joints and
+ tool, proves them, and sends the setpoints to a driver process.
+CONTROL
+(cd "$tree" && find usr etc -type f -print0 | LC_ALL=C sort -z | xargs -0 md5sum > DEBIAN/md5sums)
+find "$tree" -exec touch -h -d "@$SOURCE_DATE_EPOCH" {} +
+chmod -R u=rwX,go=rX "$tree"
+mkdir -p "$out"
+package="$out/canter_${version}_$architecture.deb"
+dpkg-deb --root-owner-group -Zxz --build "$tree" "$package" >/dev/null
+echo "$package"
