@@ -30,6 +30,18 @@ const ARROWS: [(&str, &[&str]); 20] = [
             "driver-conformance",
         ],
     ),
+    (
+        "canter-python",
+        &[
+            "planner",
+            "crcl",
+            "kinematics",
+            "trajectory",
+            "realtime",
+            "ipc",
+            "scheduling",
+        ],
+    ),
     ("view", &["planner", "crcl", "ipc", "recorder"]),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
@@ -67,7 +79,7 @@ const ARROWS: [(&str, &[&str]); 20] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 12] = [
+const FENCES: [(&str, &[&str]); 14] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
@@ -78,6 +90,8 @@ const FENCES: [(&str, &[&str]); 12] = [
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
+    ("pyo3", &["canter-python"]),
+    ("numpy", &["canter-python"]),
     ("rtrb", &["servo", "driver-franka"]),
     ("libc", &["ipc", "scheduling"]),
 ];
