@@ -3,8 +3,9 @@
 #
 #     cargo build --release --locked --bin canter && packaging/deb.sh [FOLDER]
 #
-# CANTER names another binary to pack. It needs nothing but dpkg-deb. The same binary and the same
-# commit give the same bytes: times are those of the commit, owner is root, the order is fixed.
+# CANTER names another binary to pack. It needs dpkg-deb and binutils. The same binary and the same
+# commit give the same bytes: times are those of the commit, owner is root, the order is fixed. COMPRESSION
+# is that of dpkg-deb, xz unless named.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -62,5 +63,5 @@ find "$tree" -exec touch -h -d "@$SOURCE_DATE_EPOCH" {} +
 chmod -R u=rwX,go=rX "$tree"
 mkdir -p "$out"
 package="$out/canter_${version}_$architecture.deb"
-dpkg-deb --root-owner-group -Zxz --build "$tree" "$package" >/dev/null
+dpkg-deb --root-owner-group -Z"${COMPRESSION:-xz}" --build "$tree" "$package" >/dev/null
 echo "$package"

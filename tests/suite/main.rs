@@ -19,6 +19,7 @@ mod faults;
 mod killed_plans;
 mod kitting_end_to_end;
 mod operators;
+mod packages;
 mod plan_costs;
 mod planned_motions;
 mod planned_once;
