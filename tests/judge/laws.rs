@@ -20,6 +20,12 @@ const NOISE: f64 = 1e-7;
 const ARRIVED: f64 = 2e-6;
 /// Largest distance from a straight line, m.
 const STRAIGHT: f64 = 1e-5;
+/// The orientation rule of the language: inside a ball the tool may be turned away from the pose by
+/// the radius over this length (m), and at most by this angle (rad).
+const BALL_LEVER: f64 = 0.05;
+const BALL_ANGLE: f64 = 0.2;
+/// Angles (rad) that count as zero.
+const EXACT_ANGLE: f64 = 1e-6;
 
 /// Checks a plan; `meanings` has one entry per command of the program.
 pub(crate) fn judge(arm: &Arm, meanings: &[Meaning], plan: &Plan, tally: &mut Tally) {
@@ -243,8 +249,26 @@ impl Seen<'_> {
         }
     }
 
+    /// Largest angle (rad) between the tool and an intermediate pose where it is passed.
+    fn angular_tolerance(&self) -> f64 {
+        let of_ball = (self.motion.tolerance / BALL_LEVER).min(BALL_ANGLE);
+        of_ball.min(self.motion.angular_tolerance)
+    }
+
+    /// Whether a pose may be passed between two samples: within its ball, with its orientation. No
+    /// time between them is farther from a sample than half of the rotation between them.
+    fn passes(&self, pair: &[State], pose: &Isometry3<f64>) -> [bool; 2] {
+        let tolerance = self.motion.tolerance.max(1e-6) + 1e-9;
+        let inside = nearest(pair, &pose.translation.vector) <= tolerance;
+        let [a, b] = [&pair[0].pose.rotation, &pair[1].pose.rotation];
+        let angle = apart_angle(a, &pose.rotation).min(apart_angle(b, &pose.rotation));
+        let most = self.angular_tolerance() + 0.5 * apart_angle(a, b) + EXACT_ANGLE;
+        [inside, inside && angle <= most]
+    }
+
     /// There are passing times in order, with the balls at them and the corridor between them: the
-    /// earliest and the latest samples by which each leg may be reached.
+    /// earliest and the latest samples by which each leg may be reached. There also are such times
+    /// with the orientation of each pose.
     fn smooth(&self, tally: &mut Tally) {
         let poses = &self.motion.poses;
         let legs = poses.len();
@@ -261,24 +285,34 @@ impl Seen<'_> {
             );
             return;
         }
-        let mut on = vec![false; legs];
-        on[0] = true;
-        let tolerance = self.motion.tolerance.max(1e-6) + 1e-9;
+        // The legs that the motion may be on: by the places alone, and with the orientations.
+        let mut on = vec![[false; 2]; legs];
+        on[0] = [true; 2];
         for pair in self.states.windows(2) {
             for leg in 0..legs - 1 {
-                on[leg + 1] |=
-                    on[leg] && nearest(pair, &poses[leg].translation.vector) <= tolerance;
+                if !on[leg][0] {
+                    continue;
+                }
+                let passes = self.passes(pair, &poses[leg]);
+                for kind in 0..2 {
+                    on[leg + 1][kind] |= on[leg][kind] && passes[kind];
+                }
             }
             let point = pair[1].pose.translation.vector;
             for (leg, on) in on.iter_mut().enumerate() {
                 let from = if leg == 0 { self.start } else { poses[leg - 1] };
                 let ends = [from.translation.vector, poses[leg].translation.vector];
-                *on &= to_segment(&point, &ends) <= self.motion.tolerance + STRAIGHT;
+                let inside = to_segment(&point, &ends) <= self.motion.tolerance + STRAIGHT;
+                *on = on.map(|on| on && inside);
             }
         }
         tally.must(
             "poses passed in order, within tolerance and corridor",
-            on[legs - 1],
+            on[legs - 1][0],
+        );
+        tally.must(
+            "poses passed with their orientation",
+            on[legs - 1][1] || !on[legs - 1][0],
         );
     }
 
@@ -311,6 +345,16 @@ impl Seen<'_> {
                 .fold(0.0, f64::max);
             let point = pose.translation.vector;
             let off = (pair[0].pose.translation.vector - point).norm();
+            let most = self.angular_tolerance().max(EXACT_ANGLE) + 1e-9;
+            tally.at_most("certificate: angles of passes", pass.angle_rad, most);
+            let spin = pair
+                .iter()
+                .map(|state| state.spin.norm())
+                .fold(0.0, f64::max);
+            let angle = apart_angle(&pair[0].pose.rotation, &pose.rotation);
+            let law = "certificate: the angle is that of its time";
+            let most = 1.5 * spin * PERIOD + EXACT_ANGLE;
+            tally.at_most(law, (angle - pass.angle_rad).abs(), most);
             // In a period the controlled point goes no farther than this.
             let most = 1.5 * speed * PERIOD + 1e-6;
             let law = "certificate: the deviation is that of its time";

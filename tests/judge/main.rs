@@ -13,8 +13,10 @@ mod tally;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crcl::Program;
+use k::nalgebra::{UnitQuaternion, Vector3};
 use planner::dry_run::{FailurePolicy, Plan, PlanOptions, plan_program};
 use planner::robot::{Robot, load};
+use programs::Meaning;
 use system_tests::arm::Arm;
 use tally::Tally;
 
@@ -92,6 +94,45 @@ macro_rules! robots {
 robots! {
     fr3 gantry iiwa14 iiwa7 irb120 irb1200_5_90 irb1200_7_70 lrmate200id panda tx2_60 ur10e ur5e
     xarm6 xarm7
+}
+
+/// A pose that is passed with another orientation than its ball allows is found, by the samples and
+/// by the angle in the certificate; the place is as it must be.
+#[test]
+fn a_pass_with_another_orientation_is_seen() {
+    const PLACES: &str = "poses passed in order, within tolerance and corridor";
+    let (arm, robot) = (Arm::read("ur5e"), load("ur5e").expect("a shipped robot"));
+    let mut seen = 0;
+    for seed in 0..30 {
+        let mut random = programs::program(&arm, seed);
+        let program: Program = random.commands.iter().cloned().collect();
+        let plan = planned(&robot, &program);
+        let made = |index: usize| plan.commands.iter().any(|command| command.index == index);
+        let smooth = random.meanings.iter_mut().enumerate();
+        let smooth = smooth.filter(|(index, _)| plan.refusals.is_empty() && made(*index));
+        let Some(motion) = smooth
+            .filter_map(|(_, meaning)| match meaning {
+                Meaning::Move(motion) if motion.poses.len() > 2 => Some(motion),
+                _ => None,
+            })
+            .next()
+        else {
+            continue;
+        };
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.6, 0.0));
+        motion.poses[0].rotation *= turn;
+        let mut tally = Tally::default();
+        laws::judge(&arm, &random.meanings, &plan, &mut tally);
+        assert!(!tally.is_broken(PLACES), "seed {seed}: {}", tally.table());
+        for law in [
+            "poses passed with their orientation",
+            "certificate: the angle is that of its time",
+        ] {
+            assert!(tally.is_broken(law), "seed {seed}: {law}");
+        }
+        seen += 1;
+    }
+    assert!(seen > 5, "{seen} programs had a smooth move");
 }
 
 #[test]

@@ -19,7 +19,9 @@ pub(crate) enum Meaning {
 pub(crate) struct Move {
     pub(crate) shape: Shape,
     pub(crate) poses: Vec<Isometry3<f64>>,
+    /// Radius of the balls (m), and the largest angle (rad) that was set for passes.
     pub(crate) tolerance: f64,
+    pub(crate) angular_tolerance: f64,
     /// Fractions of the largest speed and acceleration that apply.
     pub(crate) speed: f64,
     pub(crate) acceleration: f64,
@@ -42,10 +44,13 @@ pub(crate) struct Program {
 pub(crate) struct Writer<'a> {
     arm: &'a Arm,
     random: Random,
+    /// For the settings of angles, so that programs without them are as before.
+    random_angles: Random,
     program: Program,
     length: LengthUnit,
     angle: AngleUnit,
     tolerance: f64,
+    angular_tolerance: f64,
     speed: f64,
     acceleration: f64,
     /// The controlled point where the arm should be by then.
@@ -57,6 +62,7 @@ pub(crate) fn program(arm: &Arm, seed: u64) -> Program {
     let mut writer = Writer {
         arm,
         random: Random::new(seed),
+        random_angles: Random::new(!seed),
         program: Program {
             commands: Vec::new(),
             meanings: Vec::new(),
@@ -64,6 +70,7 @@ pub(crate) fn program(arm: &Arm, seed: u64) -> Program {
         length: LengthUnit::Millimeter,
         angle: AngleUnit::Degree,
         tolerance: 0.0,
+        angular_tolerance: f64::INFINITY,
         speed: 0.1,
         acceleration: 0.1,
         at: arm.flange(&arm.home) * arm.flange_from_tool(arm.mounted),
@@ -122,6 +129,11 @@ impl Writer<'_> {
             self.tolerance = self.random.pick(&[0.0, 1e-4, 1e-3, 5e-3, 0.02, 0.05]);
             let tolerance = self.tolerance / self.metres();
             self.still(Command::SetIntermediatePointTolerance { tolerance }, 0.0);
+        }
+        if self.random_angles.one_in(4) {
+            self.angular_tolerance = self.random_angles.pick(&[0.005, 0.05, 0.15, 0.3]);
+            let tolerance = self.angular_tolerance / self.radian();
+            self.still(Command::SetIntermediateAngleTolerance { tolerance }, 0.0);
         }
     }
 
@@ -190,6 +202,7 @@ impl Writer<'_> {
             shape,
             poses,
             tolerance: self.tolerance,
+            angular_tolerance: self.angular_tolerance,
             speed: self.speed,
             acceleration: self.acceleration,
         }));
@@ -198,11 +211,7 @@ impl Writer<'_> {
     fn written(&mut self, pose: &Isometry3<f64>) -> Pose {
         let point = (pose.translation.vector / self.metres()).into();
         let (roll, pitch, yaw) = pose.rotation.euler_angles();
-        let unit = if self.angle == AngleUnit::Degree {
-            1f64.to_radians()
-        } else {
-            1.0
-        };
+        let unit = self.radian();
         if self.random.one_in(3) {
             return Pose::RollPitchYaw {
                 point,
@@ -215,6 +224,14 @@ impl Writer<'_> {
             point,
             z_axis: (pose.rotation * Vector3::z()).into(),
             x_axis: (pose.rotation * Vector3::x() * 2.0).into(),
+        }
+    }
+
+    /// The unit of angles in rad.
+    fn radian(&self) -> f64 {
+        match self.angle {
+            AngleUnit::Degree => 1f64.to_radians(),
+            AngleUnit::Radian => 1.0,
         }
     }
 

@@ -53,6 +53,11 @@ impl Tally {
         self.laws.values().filter(|law| law.broken > 0).count()
     }
 
+    /// Whether this law was broken.
+    pub(crate) fn is_broken(&self, law: &str) -> bool {
+        self.laws.get(law).is_some_and(|law| law.broken > 0)
+    }
+
     /// A line for each law.
     pub(crate) fn table(&self) -> String {
         let mut table = format!(
