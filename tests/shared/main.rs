@@ -1,4 +1,5 @@
-//! Tests with files from outside the repository: programs, plans and workstations of NIST.
+//! Tests with files from outside the repository: programs, plans and workstations of NIST, and
+//! programs that once broke a law.
 //!
 //! The files are in a folder beside the repository, `../shared`, which a clone does not have. If it
 //! is missing, these tests are reported as ignored; every property that they test is also tested on
@@ -16,6 +17,7 @@ mod crcl_files;
 mod pddl;
 mod plans;
 mod programs;
+mod repro;
 mod workstations;
 
 use std::path::{Path, PathBuf};
@@ -38,6 +40,13 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
+/// Ignored because they do not hold yet for these programs of seven-joint arms and of smooth moves.
+const NOT_YET: [&str; 3] = [
+    "repro::tolerance_zero_is_not_slower_than_straight_moves",
+    "repro::more_tolerance_is_not_slower",
+    "repro::lines_that_can_be_followed_are_not_refused",
+];
+
 macro_rules! trials {
     ($($module:ident::$name:ident)*) => {
         vec![$((concat!(stringify!($module), "::", stringify!($name)), $module::$name as fn())),*]
@@ -54,6 +63,13 @@ fn main() {
         crcl_files::recorded_bytes_are_answered
         programs::sound_programs_have_no_findings
         programs::commands_with_errors
+        repro::programs_that_broke_a_law_hold_now
+        repro::a_turn_at_the_end_is_planned_on_every_robot
+        repro::a_move_to_where_the_arm_stands_takes_no_time
+        repro::tolerance_zero_is_not_slower_than_straight_moves
+        repro::more_tolerance_is_not_slower
+        repro::lines_that_can_be_followed_are_not_refused
+        repro::every_program_is_used
         workstations::nist_workstations_come_in
         workstations::a_nist_workstation_holds_what_it_says
         plans::the_document_is_read_unchanged
@@ -72,7 +88,7 @@ fn main() {
     let alone = !crcl_files::has_validator();
     let run = |name: &str| match name {
         "crcl_files::what_is_written_is_valid" => !alone,
-        _ => true,
+        name => !NOT_YET.contains(&name),
     };
     let trial = |(name, test): (&str, fn())| {
         Trial::test(name, move || {
