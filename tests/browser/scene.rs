@@ -1,10 +1,12 @@
 //! An engine with its view, to be looked at.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, ChildStderr, Stdio};
+use std::process::{ChildStderr, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+use system_tests::killed::Killed;
 
 use crate::canter::{canter, command};
 
@@ -13,16 +15,8 @@ const PATIENCE: Duration = Duration::from_secs(90);
 
 /// A process that is killed when a test is over.
 pub(crate) struct Peer {
-    pub(crate) child: Child,
+    pub(crate) child: Killed,
     stderr: BufReader<ChildStderr>,
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It has ended, unless the test is over before it.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Peer {
@@ -33,7 +27,10 @@ impl Peer {
             .spawn()
             .unwrap();
         let stderr = BufReader::new(child.stderr.take().unwrap());
-        Self { child, stderr }
+        Self {
+            child: Killed(child),
+            stderr,
+        }
     }
 
     /// The next line on standard error that has `mark`, from there on.

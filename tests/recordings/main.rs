@@ -13,12 +13,13 @@ mod replays;
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use crate::canter::{Ran, canter, command};
 
 use libtest_mimic::{Arguments, Trial};
+use system_tests::killed::Killed;
 
 /// How long a test waits for something that must come.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -30,19 +31,8 @@ fn arm(name: &str) -> String {
     format!("recordings{}/{name}", std::process::id())
 }
 
-/// A process that is killed when a test fails before its end.
-pub(crate) struct Peer(pub(crate) Child);
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It has ended, unless the test is failing.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// An engine that serves, with more options; its standard error is read on.
-fn engine(arm: &str, options: &[String]) -> Peer {
+fn engine(arm: &str, options: &[String]) -> Killed {
     let mut child = command(["engine", "--robot", "ur5e", "--arm", arm])
         .args(options)
         .stderr(Stdio::piped())
@@ -54,17 +44,17 @@ fn engine(arm: &str, options: &[String]) -> Peer {
     stderr.read_line(&mut line).unwrap();
     assert!(line.contains("engine of ur5e"), "{line}");
     std::thread::spawn(move || std::io::copy(&mut stderr, &mut std::io::sink()));
-    Peer(child)
+    Killed(child)
 }
 
 /// Gives the program to an engine and looks on while it runs.
-fn send(arm: &str) -> Peer {
+fn send(arm: &str) -> Killed {
     let child = command(["send", PROGRAM, "--arm", arm])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    Peer(child)
+    Killed(child)
 }
 
 fn recorded_run(file: &Path, name: &str) -> Ran {

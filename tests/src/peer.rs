@@ -1,10 +1,12 @@
 //! An engine or a driver as a separate process that a test talks to, signals and kills.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
+
+use crate::killed::Killed;
 
 /// How long a test waits for something that must come.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -13,17 +15,9 @@ pub const PATIENCE: Duration = Duration::from_secs(60);
 #[derive(Debug)]
 pub struct Peer {
     /// The process.
-    pub child: Child,
+    pub child: Killed,
     input: Option<ChildStdin>,
     lines: Receiver<String>,
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Peer {
@@ -57,7 +51,7 @@ impl Peer {
             });
         }
         Self {
-            child,
+            child: Killed(child),
             input,
             lines,
         }

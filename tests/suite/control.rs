@@ -2,13 +2,14 @@
 //! that has passed.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::canter::{canter, command};
 use crate::status::{status, wait_for};
+use system_tests::killed::Killed;
 use system_tests::long_move::smooth_list;
 use system_tests::pipe::full_pipe;
 use system_tests::signal;
@@ -22,15 +23,7 @@ fn arm(name: &str) -> String {
 }
 
 /// A process that is killed when a test fails before its end.
-struct Peer(Child);
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It has ended, unless the test is failing.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+struct Peer(Killed);
 
 impl Peer {
     /// Its exit code; none when it does not end within `limit`.
@@ -58,7 +51,7 @@ fn engine(arm: &str, stdout: Stdio) -> Peer {
     assert!(line.contains("engine of ur5e"), "{line}");
     // Read on, so that it has a reader for as long as it lives.
     std::thread::spawn(move || std::io::copy(&mut stderr, &mut std::io::sink()));
-    Peer(child)
+    Peer(Killed(child))
 }
 
 fn moves(now: &Value) -> bool {
@@ -125,7 +118,7 @@ fn a_stop_does_not_wait_for_the_planner() {
 #[test]
 fn ctrl_c_does_not_wait_for_the_planner() {
     let arm = arm("planning-run");
-    let mut run = Peer(
+    let mut run = Peer(Killed(
         command([
             "run",
             "-",
@@ -141,7 +134,7 @@ fn ctrl_c_does_not_wait_for_the_planner() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap(),
-    );
+    ));
     let mut input = run.0.stdin.take().unwrap();
     input.write_all(slow_then_long(2000).as_bytes()).unwrap();
     drop(input);
@@ -203,14 +196,14 @@ fn a_run_that_nobody_reads_is_no_success() {
 
     let arm_name = arm("unread-interrupted");
     let (_reader, writer) = full_pipe();
-    let mut run = Peer(
+    let mut run = Peer(Killed(
         command(["run", "examples/pick_and_place.canon", "-r", "ur5e"])
             .args(["--arm", &arm_name])
             .stdout(writer)
             .stderr(Stdio::null())
             .spawn()
             .unwrap(),
-    );
+    ));
     let deadline = Instant::now() + PATIENCE;
     while canter(["status", "--arm", &arm_name]).code != 0 {
         assert!(Instant::now() < deadline, "the run does not begin");

@@ -2,35 +2,26 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
+
+use system_tests::killed::Killed;
 
 use crate::canter::command;
 
 /// How long a test waits for something that must come.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// A process that is killed at the end.
-struct Peer(Child);
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It has ended, unless the test is failing.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// Starts `canter` with these arguments; gives the first line of its standard error that has this
 /// text in it.
-fn start(arguments: &[&str], text: &str) -> (Peer, String) {
+fn start(arguments: &[&str], text: &str) -> (Killed, String) {
     let mut child = command(arguments)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
-    let peer = Peer(child);
+    let peer = Killed(child);
     let mut all = String::new();
     loop {
         let mut line = String::new();
@@ -52,8 +43,8 @@ pub(crate) struct Scene {
     address: SocketAddr,
     /// Name of the arm.
     pub(crate) arm: String,
-    _server: Peer,
-    _engine: Peer,
+    _server: Killed,
+    _engine: Killed,
 }
 
 impl Scene {

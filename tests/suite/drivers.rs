@@ -1,9 +1,11 @@
 //! `canter driver`, `canter doctor` and `canter run --driver`, as real processes.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+use system_tests::killed::Killed;
 
 use crate::canter::{canter, command};
 
@@ -13,7 +15,9 @@ fn arm(name: &str) -> String {
 }
 
 /// A driver in a separate process, ended when dropped.
-struct Driver(Child);
+struct Driver {
+    _process: Killed,
+}
 
 impl Driver {
     fn start(words: &[&str]) -> Self {
@@ -22,15 +26,9 @@ impl Driver {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        Self(child)
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        // Its input ends with it, which ends it as well.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        Self {
+            _process: Killed(child),
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::canter::command;
+use system_tests::killed::Killed;
 use system_tests::signal;
 
 /// How long a client may take to answer. Generous: the machine has other work.
@@ -41,7 +42,7 @@ impl Random {
 
 /// A process of the test; what it prints is read at once.
 struct Process {
-    child: Child,
+    child: Killed,
     lines: Receiver<String>,
 }
 
@@ -65,7 +66,10 @@ impl Process {
                 lines.for_each(|line| drop(send.send(line)));
             });
         }
-        Self { child, lines }
+        Self {
+            child: Killed(child),
+            lines,
+        }
     }
 
     fn kill(&mut self) {
@@ -77,12 +81,6 @@ impl Process {
     /// What it printed since the last call.
     fn printed(&self) -> Vec<String> {
         self.lines.try_iter().collect()
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        self.kill();
     }
 }
 

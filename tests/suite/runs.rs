@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use crate::canter::{canter, command};
 use crate::status::{status, wait_for};
+use system_tests::killed::Killed;
 use system_tests::signal;
 
 /// An arm name that no other test uses.
@@ -255,7 +256,7 @@ fn driver(arm: &str, options: &[&str]) -> Engine {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    Engine(child)
+    Engine(Killed(child))
 }
 
 #[test]
@@ -316,7 +317,7 @@ fn an_external_arm_is_asked_where_it_stands() {
 }
 
 /// An engine as a process; killed when the test fails before its end.
-struct Engine(Child);
+struct Engine(Killed);
 
 impl Engine {
     fn start(arm: &str) -> Self {
@@ -329,18 +330,11 @@ impl Engine {
         let mut line = String::new();
         stderr.read_line(&mut line).unwrap();
         assert!(line.contains("engine of ur5e"), "{line}");
-        Self(child)
+        Self(Killed(child))
     }
 
     fn end(mut self) -> Option<i32> {
         self.0.wait().unwrap().code()
-    }
-}
-
-impl Drop for Engine {
-    fn drop(&mut self) {
-        // It has ended, unless the test is failing.
-        let _ = self.0.kill();
     }
 }
 

@@ -4,7 +4,7 @@ use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use ipc::{DOMAIN_VARIABLE, Domain, Verb};
 use serde_json::Value;
 use system_tests::domain;
+use system_tests::killed::Killed;
 
 use crate::canter::{canter, command};
 use crate::status::status;
@@ -20,7 +21,7 @@ use crate::status::status;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// An engine with its simulated driver; killed when the test fails before its end.
-struct Engine(Child);
+struct Engine(Killed);
 
 impl Engine {
     fn start(arm: &str, more: &[&str]) -> Self {
@@ -35,19 +36,11 @@ impl Engine {
         let said: Vec<_> = ready.collect();
         assert!(child.try_wait().unwrap().is_none(), "{said:?}");
         thread::spawn(move || lines.for_each(drop));
-        Self(child)
+        Self(Killed(child))
     }
 
     fn signal(&self, signal: i32) {
         system_tests::signal::send(&self.0, signal);
-    }
-}
-
-impl Drop for Engine {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
     }
 }
 

@@ -2,8 +2,10 @@
 
 use std::fs::File;
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
+
+use system_tests::killed::Killed;
 
 use crate::canter::{canter, command};
 use crate::killed_plans::moving;
@@ -11,7 +13,7 @@ use crate::plans::{PLAN, WORLD, world};
 
 /// A run of a plan, killed when it is dropped.
 struct Run {
-    process: Child,
+    process: Killed,
     stderr: std::path::PathBuf,
 }
 
@@ -37,6 +39,7 @@ impl Run {
             .stderr(File::create(&stderr).unwrap())
             .spawn()
             .unwrap();
+        let process = Killed(process);
         moving(path, 3);
         Self { process, stderr }
     }
@@ -52,14 +55,6 @@ impl Run {
             std::thread::sleep(Duration::from_millis(20));
         }
         panic!("the run does not end");
-    }
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 
