@@ -106,14 +106,29 @@ fn ratios<const N: usize>(
     all
 }
 
+/// The kind of a random move, and how many samples its certificate is held against.
+#[derive(Clone, Copy)]
+struct Task {
+    shape: Shape,
+    samples: usize,
+}
+
+/// How many moves, and samples of each.
+#[derive(Clone, Copy)]
+struct Counts {
+    moves: usize,
+    samples: usize,
+}
+
 /// Plans one random move and holds its certificate against `samples` samples.
 fn one_move<const N: usize>(
     planner: &Planner<N>,
     most: &ToolLimits,
-    (kind, samples): (usize, usize),
+    task: Task,
     random: &mut Random,
     seen: &mut Seen,
 ) {
+    let Task { shape, samples } = task;
     let limits = planner.limits();
     let mut joints = || {
         SVector::<f64, N>::from_fn(|i, _| {
@@ -123,7 +138,6 @@ fn one_move<const N: usize>(
     };
     let (start, goal) = (joints(), joints());
     let mut poses = vec![planner.chain().forward(&start)];
-    let shape = [Shape::Joint, Shape::Straight, Shape::Smooth][kind % 3];
     match shape {
         Shape::Joint => poses.push(planner.chain().forward(&goal)),
         Shape::Straight | Shape::Smooth => {
@@ -200,12 +214,7 @@ fn one_move<const N: usize>(
     }
 }
 
-fn on_robot<const N: usize>(
-    robot: &Robot,
-    counts: (usize, usize),
-    seed: u64,
-    seen: &mut [Seen; 3],
-) {
+fn on_robot<const N: usize>(robot: &Robot, counts: Counts, seed: u64, seen: &mut [Seen; 3]) {
     let planner = Planner::new(
         &robot.chain::<N>().unwrap(),
         Isometry3::identity(),
@@ -213,20 +222,19 @@ fn on_robot<const N: usize>(
         robot.joint_names(),
     );
     let mut random = Random(seed);
-    for kind in 0..counts.0 {
+    for kind in 0..counts.moves {
         let seen = &mut seen[kind % 3];
-        one_move(
-            &planner,
-            &robot.motion_limits(),
-            (kind, counts.1),
-            &mut random,
-            seen,
-        );
+        let task = Task {
+            shape: [Shape::Joint, Shape::Straight, Shape::Smooth][kind % 3],
+            samples: counts.samples,
+        };
+        one_move(&planner, &robot.motion_limits(), task, &mut random, seen);
     }
 }
 
 /// `moves` moves on every robot of a list, each against `samples` samples; prints what was seen.
-fn judge(names: &[&str], counts: (usize, usize)) -> [Seen; 3] {
+fn judge(names: &[&str], moves: usize, samples: usize) -> [Seen; 3] {
+    let counts = Counts { moves, samples };
     let mut seen = [Seen::default(), Seen::default(), Seen::default()];
     for (i, name) in names.iter().enumerate() {
         let (robot, seed) = (load(name).unwrap(), 0x9e37_79b9 + i as u64);
@@ -260,7 +268,7 @@ fn judge(names: &[&str], counts: (usize, usize)) -> [Seen; 3] {
 /// Few moves and samples: what every change is held against.
 #[test]
 fn no_sample_is_above_a_certificate() {
-    let seen = judge(&["ur5e", "panda", "irb120"], (24, 2000));
+    let seen = judge(&["ur5e", "panda", "irb120"], 24, 2000);
     for seen in seen {
         assert!(
             seen.moves - seen.refused >= 5,
@@ -288,6 +296,10 @@ fn ten_thousand_moves() {
         "xarm6",
         "ur10e",
     ];
-    judge(&names, (20, 100_000));
-    judge(&names, (980, 300));
+    judge(&names, 20, 100_000);
+    let [joint, straight, _] = judge(&names, 980, 300);
+    for (seen, most) in [(joint, 1.15), (straight, 1.10)] {
+        let median = quantile(&seen.optimality, 0.5);
+        assert!(median <= most, "duration / lower bound {median}");
+    }
 }

@@ -6,6 +6,7 @@ use trajectory::timing::least_time;
 
 use super::Planner;
 use super::draft::Draft;
+use super::least_turn::least_turn;
 use crate::task::{Move, Shape};
 
 impl<const N: usize> Planner<N> {
@@ -27,7 +28,11 @@ impl<const N: usize> Planner<N> {
             Shape::Straight => options.tolerance = 0.0,
             Shape::Smooth => {}
         }
-        let tool = smooth::least_time(&poses, &options).unwrap_or(0.0);
+        let mut tool = smooth::least_time(&poses, &options).unwrap_or(0.0);
+        if motion.shape == Shape::Joint {
+            let turn = least_turn(self.chain(), start, end);
+            tool = tool.max(smooth::least_turning_time(turn, &motion.limits));
+        }
         // The joints of a seven-joint arm may stop elsewhere at the same poses.
         let stops = motion.shape == Shape::Smooth && motion.tolerance == 0.0 && N <= 6;
         let joints = if stops {

@@ -16,6 +16,7 @@ mod jog;
 mod joined;
 mod kernel;
 mod least;
+mod least_turn;
 mod legs;
 mod motion_error;
 mod reach;

@@ -16,6 +16,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::crossing::RESOLUTION;
 use super::options::{SmoothError, SmoothOptions};
 use super::ramp::{self, Caps};
+use crate::ToolLimits;
 use crate::line::body_turn;
 use crate::timing::least_time as rest_to_rest;
 
@@ -32,6 +33,32 @@ pub fn least_time(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<f
     Ok(lower_bound(poses, &options.finite()))
 }
 
+/// A lower bound (s) of the time of all motions from rest to rest whose orientation travels `angle`
+/// (rad) within these limits.
+///
+/// ```
+/// use trajectory::{ToolLimits, smooth::least_turning_time};
+/// let limits = ToolLimits {
+///     angular_speed: 2.0,
+///     ..ToolLimits::UNLIMITED
+/// };
+/// assert!((least_turning_time(5.0, &limits) - 2.5).abs() < 1e-2);
+/// ```
+#[must_use]
+pub fn least_turning_time(angle: f64, limits: &ToolLimits) -> f64 {
+    let options = SmoothOptions::new(0.0, *limits).finite();
+    shortest(angle, &angular(&options.limits))
+}
+
+/// The limits of the rotation.
+fn angular(limits: &ToolLimits) -> Caps {
+    Caps {
+        speed: limits.angular_speed,
+        acceleration: limits.angular_acceleration,
+        jerk: limits.angular_jerk,
+    }
+}
+
 /// The better of the bounds, s.
 pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
     let limits = &options.limits;
@@ -40,11 +67,7 @@ pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> 
         acceleration: limits.acceleration,
         jerk: limits.jerk,
     };
-    let angular = Caps {
-        speed: limits.angular_speed,
-        acceleration: limits.angular_acceleration,
-        jerk: limits.angular_jerk,
-    };
+    let angular = angular(limits);
     let way = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
         (b.translation.vector - a.translation.vector).norm()
     };
@@ -181,7 +204,6 @@ fn standing_times(turns: &[f64], tolerance: f64, caps: &Caps) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ToolLimits;
 
     fn bound(places: &[[f64; 2]], tolerance: f64) -> f64 {
         let limits = ToolLimits {

@@ -30,7 +30,7 @@ use crate::poly;
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use crossing::{Crossing, RESOLUTION};
-pub use lower_bound::least_time;
+pub use lower_bound::{least_time, least_turning_time};
 pub use method::Method;
 pub use options::{SmoothError, SmoothOptions, angular_tolerance};
 pub use plan::{SmoothPlan, plan};
