@@ -39,11 +39,11 @@ fn main() {
         "case", "planner", "mean", "p99", "max"
     );
     let mut ratios = Vec::new();
-    case::<3>("3dof", Ends::Moving, (count, clock), &mut ratios);
-    case::<6>("6dof", Ends::Moving, (count, clock), &mut ratios);
-    case::<7>("7dof", Ends::Moving, (count, clock), &mut ratios);
-    case::<7>("stop-7dof", Ends::Stopping, (count, clock), &mut ratios);
-    case::<7>("rest-7dof", Ends::Resting, (count, clock), &mut ratios);
+    case::<3>("3dof", Ends::Moving, count, clock, &mut ratios);
+    case::<6>("6dof", Ends::Moving, count, clock, &mut ratios);
+    case::<7>("7dof", Ends::Moving, count, clock, &mut ratios);
+    case::<7>("stop-7dof", Ends::Stopping, count, clock, &mut ratios);
+    case::<7>("rest-7dof", Ends::Resting, count, clock, &mut ratios);
     for (name, ratio) in ratios {
         println!("ratio {name} {ratio:.4}");
     }
@@ -59,11 +59,11 @@ fn compared() -> Option<usize> {
 fn compare_all(count: usize) {
     println!("durations beside Ruckig's, {count} inputs a case");
     let show = |name: &str, durations: Durations| println!("{name:<16}{durations}");
-    show("3dof", Durations::of::<3>((1, Ends::Moving), count));
-    show("6dof", Durations::of::<6>((2, Ends::Moving), count));
-    show("7dof", Durations::of::<7>((3, Ends::Moving), count));
-    show("stop-7dof", Durations::of::<7>((4, Ends::Stopping), count));
-    show("rest-7dof", Durations::of::<7>((5, Ends::Resting), count));
+    show("3dof", Durations::of::<3>(1, Ends::Moving, count));
+    show("6dof", Durations::of::<6>(2, Ends::Moving, count));
+    show("7dof", Durations::of::<7>(3, Ends::Moving, count));
+    show("stop-7dof", Durations::of::<7>(4, Ends::Stopping, count));
+    show("rest-7dof", Durations::of::<7>(5, Ends::Resting, count));
 }
 
 /// How our durations compare with Ruckig's.
@@ -81,7 +81,7 @@ struct Durations {
 
 impl Durations {
     /// Compares the first `count` inputs of a random source.
-    fn of<const N: usize>((seed, ends): (u64, Ends), count: usize) -> Self {
+    fn of<const N: usize>(seed: u64, ends: Ends, count: usize) -> Self {
         let mut source = Problems::new(seed, ends);
         let mut otg = ruckig::Ruckig::new_direct(N, 0.005);
         let mut trajectory = ruckig::Trajectory::new_direct(N);
@@ -163,7 +163,8 @@ impl Times {
 fn case<const N: usize>(
     name: &str,
     ends: Ends,
-    (count, clock): (usize, f64),
+    count: usize,
+    clock: f64,
     ratios: &mut Vec<(String, f64)>,
 ) {
     let mut source = Problems::new(42, ends);
@@ -199,7 +200,7 @@ fn case<const N: usize>(
             }
         }
     }
-    let durations = Durations::of::<N>((42, ends), count);
+    let durations = Durations::of::<N>(42, ends, count);
     println!("{name:<16}{durations}");
     let copy = copy_cost(&problems[0]);
     let ours = ours.summary(clock);

@@ -288,7 +288,7 @@ impl<D> Host<D> {
                     let start = status.idle.then_some(status.setpoint);
                     let answer = submit(session, &format, &name, &program);
                     if answer.accepted {
-                        let given = GivenProgram::taken(&answer, (format, name, program), start);
+                        let given = GivenProgram::taken(&answer, format, name, program, start);
                         let given = given.in_unit(default_length);
                         if let Some(flight) = flight {
                             flight.program(&given, None);

@@ -32,7 +32,9 @@ impl GivenProgram {
     /// The program (form, name, text) that the answer is about; the arm stood at `start` then.
     pub(crate) fn taken(
         answer: &Answer,
-        (form, name, text): (String, String, String),
+        form: String,
+        name: String,
+        text: String,
         start: Option<Vec<f64>>,
     ) -> Self {
         let number = |of: &str| answer.body[of].as_u64().unwrap_or(0) as u32;

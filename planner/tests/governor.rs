@@ -114,7 +114,7 @@ impl<const N: usize> Bench<N> {
             begun |= step.started.is_some();
             if begun {
                 let leg = &self.legs[step.command as usize];
-                seen[step.command as usize].take(leg, (&step.setpoint.position, step.path_time))?;
+                seen[step.command as usize].take(leg, &step.setpoint.position, step.path_time)?;
             }
         }
         Err(TestCaseError::fail("the program never ended"))
@@ -188,7 +188,8 @@ impl Seen {
     fn take<const N: usize>(
         &mut self,
         leg: &Leg<N>,
-        (position, path_time): (&SVector<f64, N>, f64),
+        position: &SVector<f64, N>,
+        path_time: f64,
     ) -> Result<(), TestCaseError> {
         let trajectory = &leg.planned.trajectory;
         let planned = trajectory.sample(path_time.min(trajectory.duration()));

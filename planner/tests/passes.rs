@@ -19,7 +19,7 @@ fn random(state: &mut u64) -> f64 {
 }
 
 /// A pose at most `far` (m) and `turned` (rad) from another, in each axis.
-fn near(pose: &Isometry3<f64>, (far, turned): (f64, f64), state: &mut u64) -> Isometry3<f64> {
+fn near(pose: &Isometry3<f64>, far: f64, turned: f64, state: &mut u64) -> Isometry3<f64> {
     let mut vector = || Vector3::from_fn(|_, _| random(state));
     let place = pose.translation.vector + vector() * far;
     let turn = UnitQuaternion::from_scaled_axis(vector() * turned);
@@ -43,15 +43,11 @@ fn passes_are_in_order_and_true() {
         let tolerance = [0.0, 1e-4, 1e-3, 5e-3][round % 4];
         let mut poses = vec![planner.chain().forward(&home)];
         for _ in 0..3 {
-            let first = near(&poses[poses.len() - 1], (0.06, 0.1), &mut state);
+            let first = near(&poses[poses.len() - 1], 0.06, 0.1, &mut state);
             poses.push(first);
             for _ in 0..3 {
                 let turned = if round % 3 == 0 { 0.05 } else { 0.0 };
-                let close = near(
-                    &poses[poses.len() - 1],
-                    (0.4 * tolerance, turned),
-                    &mut state,
-                );
+                let close = near(&poses[poses.len() - 1], 0.4 * tolerance, turned, &mut state);
                 poses.push(close);
             }
         }

@@ -78,6 +78,7 @@ impl Record {
             head: head(&robot, &arm.to_string(), &first),
             forward: forward(&robot)?,
             joints: robot.dof(),
+            observer,
             last: None,
             state: State::default(),
             missed: 0,
@@ -89,7 +90,7 @@ impl Record {
             arm,
             path.display()
         ));
-        let silent = self.follow((&engine, &observer), (&mut watch, &recording), &stop);
+        let silent = self.follow(&engine, &mut watch, &recording, &stop);
         if silent {
             printer.note("canter: the engine has ended, and so does the recording");
         }
@@ -107,8 +108,9 @@ impl Record {
     /// Records until it is told to end; says whether the engine fell silent.
     fn follow(
         &self,
-        (engine, observer): (&EngineClient, &Observer),
-        (watch, recording): (&mut Watch, &Recording),
+        engine: &EngineClient,
+        watch: &mut Watch,
+        recording: &Recording,
         stop: &AtomicBool,
     ) -> bool {
         let mut chronicle = Chronicle::default();
@@ -118,7 +120,7 @@ impl Record {
             self.seconds.is_some_and(|most| seconds >= most)
         };
         while !stop.load(Ordering::Relaxed) && !over() && heard.elapsed() < SILENCE {
-            let samples = watch.look(observer);
+            let samples = watch.look();
             if !samples.is_empty() {
                 heard = Instant::now();
             }
@@ -187,6 +189,7 @@ fn head(robot: &Robot, arm: &str, first: &Setpoint) -> Head {
 
 /// Setpoints and states as they come.
 struct Watch {
+    observer: Observer,
     head: Head,
     forward: Forward,
     joints: usize,
@@ -199,14 +202,14 @@ struct Watch {
 
 impl Watch {
     /// What came since the last look, oldest first.
-    fn look(&mut self, observer: &Observer) -> Vec<Sample> {
+    fn look(&mut self) -> Vec<Sample> {
         let mut samples = Vec::new();
-        while let Some(setpoint) = observer.next_setpoint() {
+        while let Some(setpoint) = self.observer.next_setpoint() {
             if setpoint.check(self.joints).is_err() {
                 continue;
             }
             if let Some(before) = self.pending.replace(setpoint) {
-                self.read_states(observer, before.sequence);
+                self.read_states(before.sequence);
                 samples.push(self.sample(&before));
             }
         }
@@ -214,9 +217,9 @@ impl Watch {
     }
 
     /// Reads states up to the first that answers setpoint `sequence`.
-    fn read_states(&mut self, observer: &Observer, sequence: u64) {
+    fn read_states(&mut self, sequence: u64) {
         while self.state.setpoint_sequence < sequence {
-            match observer.next_state() {
+            match self.observer.next_state() {
                 Some(state) if state.check(self.joints).is_ok() => self.state = state,
                 Some(_) => {}
                 None => return,

@@ -18,7 +18,7 @@ const STEP: f64 = 0.1;
 /// Most such steps from one layer to the next.
 const SWING: usize = 3;
 /// Largest difference of a joint from one cell of the grid to the next, rad.
-const SURPRISE: f64 = 0.8;
+const CELL_CHANGE: f64 = 0.8;
 
 /// A cell of the grid: the joints and the cost of this cell.
 #[derive(Clone, Copy)]
@@ -69,7 +69,7 @@ fn fill<const N: usize>(
     let cell = |q0: &SVector<f64, N>, u: f64, column: usize| {
         let guess = Guess {
             q: q0,
-            within: SURPRISE,
+            within: CELL_CHANGE,
         };
         let q = task.newton(&guess, u, still, &value(column))?;
         Some(Cell {
@@ -141,7 +141,7 @@ fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
                     continue;
                 };
                 // The same null-space value can belong to another branch; the joints show it.
-                if (before.q - cell.q).amax() > 2.0 * SURPRISE {
+                if (before.q - cell.q).amax() > 2.0 * CELL_CHANGE {
                     continue;
                 }
                 let swing = column.abs_diff(source) as f64;

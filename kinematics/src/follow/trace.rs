@@ -25,7 +25,7 @@ const EXACT: f64 = 1e-12;
 /// Largest acceptable distance where rounding prevents a smaller one.
 const ENOUGH: f64 = 1e-10;
 /// Largest difference from the predicted joint positions, rad: more is another branch.
-const SURPRISE: f64 = 0.1;
+const OTHER_BRANCH: f64 = 0.1;
 /// Shortest step as a fraction of the whole path.
 const SHORTEST: f64 = 1e-9;
 /// Tolerance of a joint limit for rounding.
@@ -160,7 +160,7 @@ impl<const N: usize> Task<'_, N> {
     ) -> Option<SVector<f64, N>> {
         let guess = Guess {
             q: &predict(last, u),
-            within: SURPRISE,
+            within: OTHER_BRANCH,
         };
         self.newton(&guess, u, null_space, &null_space.at(u))
     }

@@ -185,31 +185,26 @@ impl<const N: usize> Op for Branching<'_, N> {
                 // Only seven joints have it; others need not carry its code.
                 if N == 7 {
                     let found = swivel.solve(&g, parameter, &held(seed, 0));
-                    self.settle(a, (0, &[0, 1, 2, 3, 4, 5, 6]), &found);
+                    self.settle(a, &[0, 1, 2, 3, 4, 5, 6], &found);
                 }
                 return;
             }
         };
         let found = six.solve(&g, held(seed, first));
-        self.settle(a, (first, six.slots()), &found);
+        self.settle(a, &six.slots().map(|slot| first + slot), &found);
     }
 }
 
 impl<const N: usize> Branching<'_, N> {
     /// Chooses the whole turns of every joint that are nearest to the seed inside the limits. Angle
-    /// `i` is that of joint `first + slots[i]`; any other joint is the free parameter.
+    /// `i` is that of joint `joints[i]`; any other joint is the free parameter.
     #[inline(always)]
-    fn settle<A: Four, const M: usize>(
-        mut self,
-        a: A,
-        (first, slots): (usize, &[usize; M]),
-        found: &Joints<A, M>,
-    ) {
+    fn settle<A: Four, const M: usize>(mut self, a: A, joints: &[usize; M], found: &Joints<A, M>) {
         let zero = F4::splat(a, 0.0);
         let mut sums = [(found.real[0], zero), (found.real[1], zero)];
         for i in 0..M {
             let angles = [found.angles[0][i], found.angles[1][i]];
-            self.put(first + slots[i], angles, &mut sums);
+            self.put(joints[i], angles, &mut sums);
         }
         if let Some(joint) = self.closed.given::<N>() {
             self.put(joint, [F4::splat(a, self.parameter); 2], &mut sums);

@@ -7,17 +7,26 @@ use super::subproblems::{
 use simd::{F4, Four, Mask};
 use std::f64::consts::PI;
 
-/// Rotations about three axes whose product turns the third axis to `axis`, and `spin`,
-/// perpendicular to it, to `spun`. If the first and third axis coincide, the first angle is held.
+/// What three rotations must reach: the third axis goes to `axis`, and `spin`, perpendicular to it,
+/// to `spun`.
+#[derive(Clone, Copy)]
+pub(crate) struct AxisGoal<A: Four> {
+    pub(crate) axis: Vec4<A>,
+    pub(crate) spun: Vec4<A>,
+    pub(crate) spin: [f64; 3],
+}
+
+/// Rotations about three axes whose product reaches the goal. If the first and third axis coincide, the first angle is held.
 /// Also returns both solutions for the middle one. The sine and cosine of the last rotation may
 /// have any length.
 #[inline(always)]
 pub(crate) fn orient<A: Four>(
     [first, middle, last]: [[f64; 3]; 3],
-    (axis, spun, spin): (Vec4<A>, Vec4<A>, [f64; 3]),
+    goal: AxisGoal<A>,
     sign: [f64; 4],
     hold: [Held; 3],
 ) -> ([Angle<A>; 3], Pair<A>) {
+    let AxisGoal { axis, spun, spin } = goal;
     let a = axis.0[0].build();
     let level = axis.along(first);
     let wave = TrigEquation::of(Vec4::splat(a, first), middle, Vec4::splat(a, last), level);
@@ -48,7 +57,7 @@ fn square([first, middle, last]: [[f64; 3]; 3]) -> bool {
 #[inline(always)]
 pub(crate) fn orient_both<A: Four>(
     axes: [[f64; 3]; 3],
-    goal: (Vec4<A>, Vec4<A>, [f64; 3]),
+    goal: AxisGoal<A>,
     hold: [Held; 3],
 ) -> [([F4<A>; 3], Mask<A>); 2] {
     let (turns, tilts) = orient(axes, goal, [1.0; 4], hold);

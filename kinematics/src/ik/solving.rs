@@ -118,16 +118,14 @@ impl<'a, A: Four> Solving<'a, A> {
         self.or_held(angle, self.number(scale * FREE).le(square), joint)
     }
 
-    /// The same if the length is known to be `length` up to rounding, so that no square root is
-    /// needed; `real` tells in which lanes it must be right.
+    /// The same if the length is known up to rounding, so that no square root is needed.
     #[inline(always)]
-    fn turn_by(
-        &mut self,
-        [cos, sin]: [F4<A>; 2],
-        length: F4<A>,
-        (scale, real): (f64, Mask<A>),
-        joint: usize,
-    ) -> Angle<A> {
+    fn turn_by(&mut self, [cos, sin]: [F4<A>; 2], known: KnownLength<A>, joint: usize) -> Angle<A> {
+        let KnownLength {
+            length,
+            scale,
+            real,
+        } = known;
         let one = self.number(1.0);
         let inverse = one / length;
         let (c, s) = (cos * inverse, sin * inverse);
@@ -212,7 +210,12 @@ impl<'a, A: Four> Solving<'a, A> {
         let cos = u.fma(along, v * off);
         let sin = u.taken_from(off, v * along);
         let square = upper * upper + fore * fore;
-        self.turn_by([cos, sin], u.fma(u, v * v), (square * square, real), 1)
+        let known = KnownLength {
+            length: u.fma(u, v * v),
+            scale: square * square,
+            real,
+        };
+        self.turn_by([cos, sin], known, 1)
     }
 
     /// A spherical wrist placed by two parallel axes.
@@ -266,7 +269,12 @@ impl<'a, A: Four> Solving<'a, A> {
         let cos = px.fma(out[0], py * level);
         let sin = px.taken_from(level, py * out[0]);
         let across = self.number(p[0] * p[0] + p[1] * p[1]);
-        let swing = self.turn_by([cos, sin], across, (far * far, bends & lifts), 0);
+        let known = KnownLength {
+            length: across,
+            scale: far * far,
+            real: bends & lifts,
+        };
+        let swing = self.turn_by([cos, sin], known, 0);
         let [sin, cos] = self.six.bend;
         let twist = bend.plus(Angle {
             sin: self.number(-sin),
@@ -424,6 +432,14 @@ impl<'a, A: Four> Solving<'a, A> {
             real: [real, real],
         }
     }
+}
+
+/// The length of a cosine and sine, up to rounding; `scale` is that beside which both zero means
+/// that the joint is free, and `real` tells in which lanes the length must be right.
+struct KnownLength<A: Four> {
+    length: F4<A>,
+    scale: f64,
+    real: Mask<A>,
 }
 
 /// A vector seen from a frame turned about z.

@@ -3,7 +3,7 @@
 //! The free parameter is the swivel angle: the angle of the plane of the arm about the line from
 //! shoulder to wrist, measured from the plane through that line and axis 1.
 
-use super::orient::{orient, orient_both};
+use super::orient::{AxisGoal, orient, orient_both};
 use super::product::Product;
 use super::six::{Joints, dot, minus};
 use super::subproblems::{FIRST, Held, SECOND, TrigEquation, Vec4, angle_of, angles_of};
@@ -109,11 +109,11 @@ impl Swivel {
             Vec4::splat(a, normal),
         ];
         let spin = across(h(2));
-        let goal = (
-            carried(Vec4::splat(a, h(2)), &frame, &plane),
-            carried(Vec4::splat(a, spin), &frame, &plane),
+        let goal = AxisGoal {
+            axis: carried(Vec4::splat(a, h(2)), &frame, &plane),
+            spun: carried(Vec4::splat(a, spin), &frame, &plane),
             spin,
-        );
+        };
         let (arm, tilts) = orient(
             [h(0), h(1), h(2)],
             goal,
@@ -124,11 +124,11 @@ impl Swivel {
         let spin = across(h(6));
         let axis = carried(Vec4::splat(a, g.turn(h(6))), &plane, &frame);
         let spun = carried(Vec4::splat(a, g.turn(spin)), &plane, &frame);
-        let goal = (
-            axis.turned(h(3), bend.back()),
-            spun.turned(h(3), bend.back()),
+        let goal = AxisGoal {
+            axis: axis.turned(h(3), bend.back()),
+            spun: spun.turned(h(3), bend.back()),
             spin,
-        );
+        };
         let hold = [hold[4], hold[5], hold[6]];
         let [(first, ok_first), (second, ok_second)] = orient_both([h(4), h(5), h(6)], goal, hold);
         let ([q1, q2, q3], q4) = (angles_of(arm), angle_of(bend));

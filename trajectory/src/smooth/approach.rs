@@ -12,31 +12,48 @@ use super::span::Span;
 /// Lengths (m) and angles (rad) below this count as zero.
 pub const RESOLUTION: f64 = 1e-12;
 
-/// First local closest approach to `pose` from (span, time) on, as (span, time); the end if there
-/// is none. If the start is within `tolerance` (m) of the pose, it may be the approach.
+/// A time of a motion, and the span that it is in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Moment {
+    /// The span, from 0.
+    pub(crate) span: usize,
+    /// Time since the start of the motion, s.
+    pub(crate) time: f64,
+}
+
+impl Moment {
+    /// The start of a motion.
+    pub(crate) const START: Self = Self { span: 0, time: 0.0 };
+}
+
+/// First local closest approach to `pose` from `since` on; the end if there is none. If the start is
+/// within `tolerance` (m) of the pose, it may be the approach.
 pub(crate) fn closest(
     spans: &[Span],
-    since: (usize, f64),
+    since: Moment,
     pose: &Isometry3<f64>,
     tolerance: f64,
-) -> (usize, f64) {
+) -> Moment {
     approach(spans, since, pose, tolerance).unwrap_or_else(|| match spans.last() {
-        Some(last) => (spans.len() - 1, last.end()),
-        None => (0, 0.0),
+        Some(last) => Moment {
+            span: spans.len() - 1,
+            time: last.end(),
+        },
+        None => Moment::START,
     })
 }
 
 /// First local closest approach that is followed by a rise, as [`closest`].
 pub(crate) fn approach(
     spans: &[Span],
-    (at, time): (usize, f64),
+    since: Moment,
     pose: &Isometry3<f64>,
     tolerance: f64,
-) -> Option<(usize, f64)> {
+) -> Option<Moment> {
     let goal = pose.translation.vector;
     let mut search = Search::new(tolerance + RESOLUTION, goal.norm());
-    for (index, span) in spans.iter().enumerate().skip(at) {
-        let from = (time - span.start).clamp(0.0, span.duration);
+    for (index, span) in spans.iter().enumerate().skip(since.span) {
+        let from = (since.time - span.start).clamp(0.0, span.duration);
         if from >= span.duration && index + 1 < spans.len() {
             continue;
         }
@@ -46,7 +63,10 @@ pub(crate) fn approach(
         }
         let velocity = span.velocity_control(from, span.duration);
         let product = poly::dot(&position, &velocity);
-        search.place = (index, span.start);
+        search.place = Moment {
+            span: index,
+            time: span.start,
+        };
         if search.done(&product, &position, [from, span.duration]) {
             return Some(search.lowest.1);
         }
@@ -69,9 +89,9 @@ struct Search {
     /// Greatest distance since the start of the search, until an approach begins.
     high: Option<f64>,
     /// Least distance of the approach, and its time.
-    lowest: (f64, (usize, f64)),
+    lowest: (f64, Moment),
     /// The current span and its start.
-    place: (usize, f64),
+    place: Moment,
 }
 
 impl Search {
@@ -81,8 +101,8 @@ impl Search {
             near,
             rise: RISE * (1.0 + 1e-3 * far),
             high: Some(f64::NEG_INFINITY),
-            lowest: (f64::INFINITY, (0, 0.0)),
-            place: (0, 0.0),
+            lowest: (f64::INFINITY, Moment::START),
+            place: Moment::START,
         }
     }
 
@@ -106,7 +126,10 @@ impl Search {
 
     /// True when the approach has ended by a time of the span, where the distance is `d`.
     fn reached(&mut self, d: f64, local: f64) -> bool {
-        let moment = (self.place.0, self.place.1 + local);
+        let moment = Moment {
+            span: self.place.span,
+            time: self.place.time + local,
+        };
         if let Some(high) = self.high {
             let began = d < high - self.rise;
             if began || (high == f64::NEG_INFINITY && d <= self.near) {
@@ -148,7 +171,7 @@ mod tests {
     /// The approach to a place on x from the start of the motion.
     fn seen(spans: &[Span], x: f64, tolerance: f64) -> Option<f64> {
         let pose = Isometry3::translation(x, 0.0, 0.0);
-        approach(spans, (0, 0.0), &pose, tolerance).map(|moment| moment.1)
+        approach(spans, Moment::START, &pose, tolerance).map(|moment| moment.time)
     }
 
     #[test]

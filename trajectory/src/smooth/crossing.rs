@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 pub use super::approach::RESOLUTION;
-use super::approach::{approach, closest};
+use super::approach::{Moment, approach, closest};
 use super::options::SmoothOptions;
 use super::span::Span;
 
@@ -49,9 +49,9 @@ pub(crate) fn crossings(
         .get(1..poses.len().saturating_sub(1))
         .unwrap_or_default();
     let mut result = Vec::with_capacity(inner.len());
-    let (mut at, mut time) = (0, 0.0);
+    let mut at = Moment::START;
     for (i, pose) in inner.iter().enumerate() {
-        let since = (at, time);
+        let since = at;
         let approach = closest(spans, since, pose, options.tolerance);
         let (deviation, angle) = apart(spans, &poses[0], approach, pose);
         // If the tool turns out of its tolerance meanwhile, a larger distance counts as a rest.
@@ -62,32 +62,27 @@ pub(crate) fn crossings(
         };
         let near = (deviation + rest).min(deviation.max(options.tolerance));
         let wanted = [near, options.angular_tolerance()];
-        (at, time) = turned(spans, since, approach, pose, wanted);
+        at = turned(spans, since, approach, pose, wanted);
         // Not earlier than the previous pass by rounding.
-        time = time.max(since.1);
-        let (deviation, angle) = apart(spans, &poses[0], (at, time), pose);
+        at.time = at.time.max(since.time);
+        let (deviation, angle) = apart(spans, &poses[0], at, pose);
         result.push(Crossing {
             index: i + 1,
             deviation,
             tolerance: options.tolerance,
             angle,
             angular_tolerance: options.angular_tolerance(),
-            time,
+            time: at.time,
         });
     }
     result
 }
 
-/// Distance (m) and angle (rad) between the motion at (span, time) and a pose.
-fn apart(
-    spans: &[Span],
-    start: &Isometry3<f64>,
-    (at, time): (usize, f64),
-    pose: &Isometry3<f64>,
-) -> (f64, f64) {
-    let (point, rotation) = match spans.get(at) {
+/// Distance (m) and angle (rad) between the motion at a moment and a pose.
+fn apart(spans: &[Span], start: &Isometry3<f64>, at: Moment, pose: &Isometry3<f64>) -> (f64, f64) {
+    let (point, rotation) = match spans.get(at.span) {
         Some(span) => {
-            let local = (time - span.start).clamp(0.0, span.duration);
+            let local = (at.time - span.start).clamp(0.0, span.duration);
             (span.motion(local)[0], span.rotation(local))
         }
         None => (start.translation.vector, start.rotation),
@@ -100,39 +95,50 @@ fn apart(
 const STEPS: u32 = 32;
 
 /// If the controlled point (nearly) rests at its closest approach while the tool turns, the time of
-/// the pass is the first time of that rest at which the angle is smallest: the first (span, time)
-/// whose angle is a local minimum below `near[1]`, in the interval around `approach` that begins
-/// not before `since` and keeps the distance below `near[0]`.
+/// the pass is the first time of that rest at which the angle is smallest: the first moment
+/// whose angle is a local minimum below `near[1]`, in the interval around `approach` that begins not
+/// before `since` and keeps the distance below `near[0]`.
 fn turned(
     spans: &[Span],
-    since: (usize, f64),
-    approach: (usize, f64),
+    since: Moment,
+    approach: Moment,
     pose: &Isometry3<f64>,
     near: [f64; 2],
-) -> (usize, f64) {
+) -> Moment {
     if spans.is_empty() {
         return approach;
     }
-    let seen = |moment: (usize, f64)| {
+    let seen = |moment: Moment| {
         let (distance, angle) = apart(spans, pose, moment, pose);
         (distance <= near[0]).then_some((moment, angle))
     };
     // Times of a span, from the first to the last one wanted.
     let moments = |at: usize| {
         let (span, share) = (&spans[at], 1.0 / f64::from(STEPS));
-        let from = if at == since.0 { since.1 } else { span.start };
-        (0..=STEPS).map(move |step| (at, from + (span.end() - from) * f64::from(step) * share))
+        let from = if at == since.span {
+            since.time
+        } else {
+            span.start
+        };
+        (0..=STEPS).map(move |step| Moment {
+            span: at,
+            time: from + (span.end() - from) * f64::from(step) * share,
+        })
     };
-    let back = (since.0..=approach.0)
+    let back = (since.span..=approach.span)
         .rev()
         .flat_map(|at| moments(at).rev());
     let mut rest: Vec<_> = back
-        .filter(|moment| moment.1 < approach.1)
+        .filter(|moment| moment.time < approach.time)
         .map_while(seen)
         .collect();
     rest.reverse();
-    let ahead = (approach.0..spans.len()).flat_map(moments);
-    rest.extend(ahead.filter(|moment| moment.1 > approach.1).map_while(seen));
+    let ahead = (approach.span..spans.len()).flat_map(moments);
+    rest.extend(
+        ahead
+            .filter(|moment| moment.time > approach.time)
+            .map_while(seen),
+    );
     let here = seen(approach).map_or(0.0, |(_, angle)| angle);
     let mut best = (approach, here - 1e-9);
     for (moment, angle) in rest {
@@ -159,7 +165,10 @@ pub(crate) fn settled(
     };
     let moment = |time: f64| {
         let next = spans.partition_point(|span| span.start <= time);
-        (next.saturating_sub(1), time)
+        Moment {
+            span: next.saturating_sub(1),
+            time,
+        }
     };
     let mut since = moment(0.0);
     for (crossing, pose) in crossings.iter().zip(&poses[1..]) {

@@ -57,39 +57,7 @@ impl<const N: usize> Bounded<'_, N> {
         };
         let cells = problem.cells();
         for k in 0..cells {
-            let (left, middle, right) = (
-                gridpoints.left(k),
-                gridpoints.middle(k),
-                gridpoints.right(k),
-            );
-            let [left_tool, middle_tool] = gridpoints.tools(k);
-            let at = |gridpoint, tool| Place { gridpoint, tool };
-            let lane = k % LANE;
-            let value = |middle: bool| Slot {
-                slot: Problem::value_slot(k, middle),
-                lane,
-            };
-            let jerk = |slot: usize| Slot { slot, lane };
-            let (left, middle) = (at(left, left_tool), at(middle, middle_tool));
-            rows.values(&mut problem, value(false), left);
-            rows.values(&mut problem, value(true), middle);
-            let slots = problem.jerk_slots(k);
-            let (first, last) = (slots.start, slots.end - 1);
-            rows.jerks(&mut problem, jerk(first), left);
-            rows.jerks(&mut problem, jerk(first + slots.len() / 2), middle);
-            let right = at(right, gridpoints.tool_right(k));
-            rows.jerks(&mut problem, jerk(last), right);
-            if problem.dense(k) {
-                for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
-                    let w = nodes[k] + share * problem.widths[k];
-                    let (joint, tool) = gridpoints.grid.place(self.path, w, 0.0);
-                    let place = Place {
-                        gridpoint: &joint,
-                        tool,
-                    };
-                    rows.jerks(&mut problem, jerk(slot), place);
-                }
-            }
+            self.set_cell(&rows, gridpoints, k, &mut problem);
         }
         let end = Place {
             gridpoint: gridpoints.right(cells - 1),
@@ -101,6 +69,45 @@ impl<const N: usize> Bounded<'_, N> {
         };
         rows.values(&mut problem, slot, end);
         problem
+    }
+
+    /// Sets all rows of cell `k`.
+    fn set_cell(
+        &self,
+        rows: &Rows<'_, N>,
+        gridpoints: &Gridpoints<'_, N>,
+        k: usize,
+        problem: &mut Problem,
+    ) {
+        let at = |gridpoint, tool| Place { gridpoint, tool };
+        let [left_tool, middle_tool] = gridpoints.tools(k);
+        let left = at(gridpoints.left(k), left_tool);
+        let middle = at(gridpoints.middle(k), middle_tool);
+        let right = at(gridpoints.right(k), gridpoints.tool_right(k));
+        let lane = k % LANE;
+        let value = |middle: bool| Slot {
+            slot: Problem::value_slot(k, middle),
+            lane,
+        };
+        let jerk = |slot: usize| Slot { slot, lane };
+        rows.values(problem, value(false), left);
+        rows.values(problem, value(true), middle);
+        let slots = problem.jerk_slots(k);
+        let (first, last) = (slots.start, slots.end - 1);
+        rows.jerks(problem, jerk(first), left);
+        rows.jerks(problem, jerk(first + slots.len() / 2), middle);
+        rows.jerks(problem, jerk(last), right);
+        if problem.dense(k) {
+            for (slot, share) in [(first + 1, 0.25), (first + 3, 0.75)] {
+                let w = gridpoints.grid.nodes[k] + share * problem.widths[k];
+                let (joint, tool) = gridpoints.grid.place(self.path, w, 0.0);
+                let place = Place {
+                    gridpoint: &joint,
+                    tool,
+                };
+                rows.jerks(problem, jerk(slot), place);
+            }
+        }
     }
 }
 
