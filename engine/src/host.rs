@@ -302,13 +302,18 @@ impl<D> Host<D> {
                     session.set_single_step(on);
                     Answer::accept(Value::Null)
                 }
-                Verb::Next => match session.step_on() {
-                    Ok(()) => Answer::accept(Value::Null),
-                    Err(error) => Answer::refuse(error.to_string()),
-                },
+                Verb::Next => done(session.step_on()),
                 _ => Answer::refuse("this engine cannot do that"),
             }
         })
+    }
+}
+
+/// The answer to a request that gives nothing back.
+fn done<E: std::fmt::Display>(result: Result<(), E>) -> Answer {
+    match result {
+        Ok(()) => Answer::accept(Value::Null),
+        Err(error) => Answer::refuse(error.to_string()),
     }
 }
 

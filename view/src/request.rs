@@ -213,6 +213,14 @@ impl Service {
                 self.player()?.play(plays, speed);
                 Ok(())
             }
+            jog @ (Wish::Jog { .. } | Wish::Step { .. }) => self.jog(wisher, jog),
+            other => self.pass_on(other),
+        }
+    }
+
+    /// Jogs, or goes one step.
+    fn jog(&self, wisher: &Wisher, wish: Wish) -> Result<(), String> {
+        match wish {
             Wish::Jog {
                 space,
                 speeds,

@@ -7,6 +7,7 @@ use crate::command::Command;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
 use crate::pose_and_set::PoseAndSet;
+use crate::screw::Screw;
 use crate::units::AngleUnit;
 
 /// The command in XML, with the `Name` that carries what XML has no element for. `angle` is the
@@ -58,16 +59,7 @@ pub(super) fn form(
             };
             through(waypoints.iter().map(own).collect::<Result<_, _>>()?)
         }
-        Command::MoveScrew { screw } => plain(XmlCommand::MoveScrew(MoveScrew {
-            start: match &screw.start {
-                Some(pose) => Some(waypoint(pose, angle)?),
-                None => None,
-            },
-            axis_point: screw.axis_point,
-            free: (screw.free != 0.0).then_some(screw.free),
-            advance: screw.advance,
-            turn: screw.turn,
-        })),
+        Command::MoveScrew { screw } => plain(XmlCommand::MoveScrew(move_screw(screw, angle)?)),
         Command::OpenGripper => plain(XmlCommand::SetEndEffector(1.0)),
         Command::CloseGripper => plain(XmlCommand::SetEndEffector(0.0)),
         Command::OpenToolChanger => plain(XmlCommand::OpenToolChanger),
@@ -79,6 +71,17 @@ pub(super) fn form(
         Command::SetCoordinateFrame { .. } => Err("XML has no coordinate frames".to_owned()),
         setting => plain(form_of_setting(setting)?),
     }
+}
+
+fn move_screw(screw: &Screw, angle: AngleUnit) -> Result<MoveScrew, String> {
+    let start = screw.start.as_ref();
+    Ok(MoveScrew {
+        start: start.map(|pose| waypoint(pose, angle)).transpose()?,
+        axis_point: screw.axis_point,
+        free: (screw.free != 0.0).then_some(screw.free),
+        advance: screw.advance,
+        turn: screw.turn,
+    })
 }
 
 /// A move through waypoints.

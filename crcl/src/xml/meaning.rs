@@ -153,18 +153,10 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
     use XmlCommand as X;
     let report = "it chooses what a status says, and a program in a file has no status";
     match command {
-        X::SetTransSpeed(Quantity::Absolute(value)) => {
-            one(Command::SetAbsoluteSpeed { value: *value })
-        }
-        X::SetTransSpeed(Quantity::Relative(share)) => one(Command::SetRelativeSpeed {
-            percent: percent(*share),
-        }),
-        X::SetTransAccel(Quantity::Absolute(value)) => {
-            one(Command::SetAbsoluteAcceleration { value: *value })
-        }
-        X::SetTransAccel(Quantity::Relative(share)) => one(Command::SetRelativeAcceleration {
-            percent: percent(*share),
-        }),
+        X::SetTransSpeed(quantity) => one(speed_setting(quantity)),
+        X::SetTransAccel(quantity) => one(acceleration_setting(quantity)),
+        X::SetRotSpeed(quantity) => one(rotation_speed_setting(quantity)),
+        X::SetRotAccel(quantity) => one(rotation_acceleration_setting(quantity)),
         X::SetEndPoseTolerance(tolerance) => Ok(Meaning::Commands(end_tolerance(tolerance))),
         X::SetIntermediatePoseTolerance(tolerance) => {
             let point = |tolerance| Command::SetIntermediatePointTolerance { tolerance };
@@ -189,18 +181,6 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         | X::DisableGripper(_)
         | X::EnableRobotParameterStatus(_)
         | X::DisableRobotParameterStatus(_) => Ok(Meaning::NoEffect(report)),
-        X::SetRotSpeed(Quantity::Absolute(value)) => {
-            one(Command::SetAbsoluteRotSpeed { value: *value })
-        }
-        X::SetRotSpeed(Quantity::Relative(share)) => one(Command::SetRelativeRotSpeed {
-            percent: percent(*share),
-        }),
-        X::SetRotAccel(Quantity::Absolute(value)) => {
-            one(Command::SetAbsoluteRotAccel { value: *value })
-        }
-        X::SetRotAccel(Quantity::Relative(share)) => one(Command::SetRelativeRotAccel {
-            percent: percent(*share),
-        }),
         X::SetEndEffectorParameters(_) | X::SetRobotParameters(_) => Ok(Meaning::NoEffect(
             "what parameters mean is not part of the language, and none means anything here",
         )),
@@ -213,6 +193,46 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
             "RunProgram: a program in the robot's own language",
         )),
         other => Err(refusal("CommandID", other.name())),
+    }
+}
+
+/// `SetTransSpeed` in the language.
+fn speed_setting(quantity: &Quantity) -> Command {
+    match *quantity {
+        Quantity::Absolute(value) => Command::SetAbsoluteSpeed { value },
+        Quantity::Relative(share) => Command::SetRelativeSpeed {
+            percent: percent(share),
+        },
+    }
+}
+
+/// `SetTransAccel` in the language.
+fn acceleration_setting(quantity: &Quantity) -> Command {
+    match *quantity {
+        Quantity::Absolute(value) => Command::SetAbsoluteAcceleration { value },
+        Quantity::Relative(share) => Command::SetRelativeAcceleration {
+            percent: percent(share),
+        },
+    }
+}
+
+/// `SetRotSpeed` in the language.
+fn rotation_speed_setting(quantity: &Quantity) -> Command {
+    match *quantity {
+        Quantity::Absolute(value) => Command::SetAbsoluteRotSpeed { value },
+        Quantity::Relative(share) => Command::SetRelativeRotSpeed {
+            percent: percent(share),
+        },
+    }
+}
+
+/// `SetRotAccel` in the language.
+fn rotation_acceleration_setting(quantity: &Quantity) -> Command {
+    match *quantity {
+        Quantity::Absolute(value) => Command::SetAbsoluteRotAccel { value },
+        Quantity::Relative(share) => Command::SetRelativeRotAccel {
+            percent: percent(share),
+        },
     }
 }
 

@@ -69,18 +69,7 @@ impl<const N: usize> Worker<'_, N> {
                 self.epoch = aborts;
                 self.on_abort(ours);
             }
-            Event::Faulted { fault, tick } => {
-                let (blame, reason) = (blame(&fault), fault.to_string());
-                let dropped = self.drop_all(None);
-                self.fault = Some(reason.clone());
-                self.ends.shared.inbox().set_fault(self.fault.clone());
-                self.say(Note::Faulted {
-                    blame,
-                    reason,
-                    tick,
-                    dropped,
-                });
-            }
+            Event::Faulted { fault, tick } => self.on_fault(&fault, tick),
             Event::Recovered { .. } => {
                 let dropped = self.drop_all(None);
                 self.fault = None;
@@ -90,6 +79,20 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Ended { .. } => self.closing = true,
         }
+    }
+
+    /// Drops everything, and keeps the fault until an operator recovers from it.
+    fn on_fault(&mut self, fault: &Fault, tick: u64) {
+        let (blame, reason) = (blame(fault), fault.to_string());
+        let dropped = self.drop_all(None);
+        self.fault = Some(reason.clone());
+        self.ends.shared.inbox().set_fault(self.fault.clone());
+        self.say(Note::Faulted {
+            blame,
+            reason,
+            tick,
+            dropped,
+        });
     }
 
     /// The arm rests after an abort: one that ends a jog, or one that an operator asked for. Only
