@@ -30,8 +30,14 @@ const ON_THE_WAY: usize = 12;
 
 /// The controller goes on by itself when the driver slept for longer than this (s), or when so many
 /// states in a row show a command that was not sent.
-const SLEPT: f64 = 2.5e-3;
+const SLEPT: f64 = 1.5e-3;
 const STRANGE: u32 = 6;
+
+/// Period of the controller (s).
+const PERIOD: f64 = 1e-3;
+
+/// For so many states at its beginning a motion holds what the controller commands.
+const FIRST: usize = 5;
 
 /// How long a motion that shall end may take to come to rest (periods).
 const PATIENCE: u32 = 2000;
@@ -177,7 +183,7 @@ impl ArmThread {
         loop {
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
-            if sent.is_empty() {
+            if sent.count < FIRST {
                 self.resampler.begin(&state.q_d);
             } else if sent.has_gone_on(&state, advance) {
                 self.rejoin(&state);
@@ -209,7 +215,9 @@ impl ArmThread {
     fn rejoin(&mut self, state: &RobotState) {
         let commanded: [Reference; JOINTS] = core::array::from_fn(|joint| Reference {
             position: state.q_d[joint],
-            velocity: state.dq_d[joint],
+            // The controller's velocity is the difference of its last two positions: that of half a
+            // period ago.
+            velocity: state.dq_d[joint] + state.ddq_d[joint] * PERIOD / 2.0,
             acceleration: state.ddq_d[joint],
         });
         self.resampler.rejoin(&commanded);
@@ -225,10 +233,6 @@ struct Sent {
 }
 
 impl Sent {
-    fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
     fn push(&mut self, command: [f64; JOINTS]) {
         self.commands[self.count % ON_THE_WAY] = command;
         self.count += 1;

@@ -24,6 +24,9 @@ const RING: usize = 256;
 /// Shares of the maker's accelerations and jerks that a plan may use.
 const PLANNED: [f64; 2] = [0.9, 0.6];
 
+/// The controller commands rest when it commands the same twice, to this difference (rad).
+const RESTS: f64 = 2e-6;
+
 /// A state that is older counts as none (ns).
 const OLD: u64 = 20_000_000;
 
@@ -41,6 +44,8 @@ pub struct Franka {
     starting: bool,
     /// Whether the motion was told to end and has not ended yet.
     ending: bool,
+    /// What the controller commanded when it was last asked (rad): a motion begins at rest.
+    held: [f64; JOINTS],
     hand: Option<Hand>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -98,6 +103,7 @@ impl Franka {
             now: Snapshot::default(),
             starting: false,
             ending: false,
+            held: [0.0; JOINTS],
             hand,
             stop,
             thread: Some(thread),
@@ -182,7 +188,15 @@ impl Robot for Franka {
         match self.now.phase {
             Phase::Moving => {
                 self.starting = false;
-                return Readiness::Ready;
+                let pairs = self.held.iter().zip(self.now.q_d);
+                let rests = pairs
+                    .into_iter()
+                    .all(|(held, now)| (held - now).abs() < RESTS);
+                self.held = self.now.q_d;
+                return match rests {
+                    true => Readiness::Ready,
+                    false => Readiness::Wait("the arm comes to rest".to_owned()),
+                };
             }
             Phase::Disconnected => {
                 self.starting = false;

@@ -42,6 +42,14 @@ pub enum DriverError {
         /// What the operating system said.
         cause: String,
     },
+    /// A port of the network cannot be used.
+    #[error("cannot listen on {address}: {cause}")]
+    Port {
+        /// The address and port.
+        address: String,
+        /// What the operating system said.
+        cause: String,
+    },
     /// A thread of the driver cannot be started.
     #[error("cannot start a thread: {cause}")]
     Thread {

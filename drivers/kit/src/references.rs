@@ -155,6 +155,12 @@ impl<R: Robot> Driver<R> {
     }
 
     fn send(&mut self, at_ns: u64, period: f64) {
+        // A controller with a clock of its own holds the arm by itself: outside a session it is told
+        // nothing, because the references are those of another one.
+        let holds = !self.is_following() && self.state != DriverState::Stopping;
+        if self.about.own_clock && holds {
+            return;
+        }
         self.robot.follow(&Command {
             joints: &self.references,
             effort: &self.efforts,

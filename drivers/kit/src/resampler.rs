@@ -10,8 +10,8 @@ const RING: usize = 256;
 /// Time constant of the filters of the measured lead (s), and bandwidth of the law that draws the
 /// playhead to its delay (rad/s): below 0.5 Hz, so that the jitter of arrivals does not reach the
 /// arm.
-const FILTER: f64 = 0.15;
-const BANDWIDTH: f64 = 0.8;
+const FILTER: f64 = 0.05;
+const BANDWIDTH: f64 = 3.0;
 
 /// How long the motion continues when the newest reference was passed, before it stops (s), and time
 /// constant in which the difference of the clocks is found at rest (s).
@@ -19,9 +19,9 @@ const COAST: f64 = 0.03;
 const LEARN: f64 = 1.0;
 
 /// Largest difference of the two clocks, as a share, and how fast the pace may change (1/s): at
-/// 3 rad/s that is 0.3 rad/s².
+/// 3 rad/s that is 0.9 rad/s².
 const CLOCKS: f64 = 0.25;
-const PACE: f64 = 0.1;
+const PACE: f64 = 0.3;
 
 /// Options of a [`Resampler`].
 #[derive(Clone, Debug, PartialEq)]

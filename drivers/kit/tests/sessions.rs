@@ -291,7 +291,10 @@ fn what_cannot_be_served_is_refused() {
 
 #[test]
 fn a_fault_of_the_hardware_is_told_in_its_words() {
-    let mut pair = Pair::new(Arm::default());
+    let mut pair = Pair::new(Arm {
+        own_clock: false,
+        ..Arm::default()
+    });
     pair.hold(20);
     let words = "joint_motion_generator_velocity_discontinuity";
     let mut arm = pair.driver.robot().clone();
@@ -314,6 +317,28 @@ fn a_fault_of_the_hardware_is_told_in_its_words() {
     assert_eq!(pair.greet(), Verdict::Welcome);
     let state = pair.hold(3);
     assert_eq!((state.fault_code, text_of(&state.text).as_str()), (0, ""));
+}
+
+/// A controller with a clock of its own is told nothing outside a session: the references are then
+/// those of another one, or of no arm at all.
+#[test]
+fn nothing_is_told_outside_a_session() {
+    let mut pair = Pair::new(Arm {
+        waits: 1,
+        ..Arm::default()
+    });
+    for _ in 0..50 {
+        pair.now += PERIOD;
+        pair.step();
+    }
+    assert!(pair.driver.robot().told.is_empty());
+    assert_eq!(pair.greet(), Verdict::Welcome);
+    pair.now += PERIOD;
+    pair.step();
+    assert!(pair.driver.robot().told.is_empty());
+    pair.hold(3);
+    assert_eq!(pair.driver.robot().told.len(), 3);
+    assert_eq!(pair.driver.robot().told[0].1, Reference::rest(0.2004));
 }
 
 #[test]
