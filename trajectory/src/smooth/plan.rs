@@ -3,11 +3,12 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::certificate::{Certificate, certify};
-use super::choose::Motion;
 use super::crossing::Crossing;
 use super::lower_bound::lower_bound;
 use super::method::Method;
+use super::motion::Motion;
 use super::options::{SmoothError, SmoothOptions};
+use super::rest::Rest;
 use super::span::Span;
 use super::windows::Windows;
 use super::{dense, exact_stop};
@@ -26,6 +27,7 @@ pub struct SmoothPlan {
     crossings: Vec<Crossing>,
     certificate: Certificate,
     parts: Vec<(Method, usize)>,
+    rests: Vec<Rest>,
     exact_stop: f64,
 }
 
@@ -45,6 +47,7 @@ impl SmoothPlan {
             crossings,
             certificate,
             parts: motion.parts,
+            rests: motion.rests,
             exact_stop,
         }
     }
@@ -82,16 +85,17 @@ impl SmoothPlan {
         }
     }
 
-    /// Parts of the motion that are not the time-optimal spline, though they
-    /// have poses to pass.
+    /// The rests between the start and the end, in the order of time: where the way turns back,
+    /// at exact stops, and where a list was divided.
+    #[must_use]
+    pub fn rests(&self) -> &[Rest] {
+        &self.rests
+    }
+
+    /// Number of [`SmoothPlan::rests`].
     #[must_use]
     pub fn fallbacks(&self) -> usize {
-        let stops = self
-            .parts
-            .iter()
-            .filter(|part| part.0 == Method::ExactStop)
-            .count();
-        if self.crossings.is_empty() { 0 } else { stops }
+        self.rests.len()
     }
 
     /// Time the motion would take with a stop at each pose, s.

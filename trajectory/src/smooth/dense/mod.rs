@@ -20,9 +20,10 @@ mod time_parameter;
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::choose::Motion;
 use super::crossing::RESOLUTION;
+use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::rest::RestCause;
 use crate::line::{Line, body_turn};
 use chords::Chords;
 use places::Units;
@@ -138,13 +139,11 @@ fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -
     let units = Units::new(options);
     let points = units.points::<D>(poses);
     let turning = Chords::new(&points).turning_points(&points);
-    let mut motion = Motion {
-        spans: Vec::new(),
-        parts: Vec::new(),
-    };
+    let mut motion = Motion::default();
     let mut from = 0;
     for to in turning.into_iter().chain([poses.len() - 1]) {
-        motion.append(Section::<D>::new(&poses[from..=to], options, units).motion()?);
+        let section = Section::<D>::new(&poses[from..=to], options, units);
+        motion.append(section.motion()?, RestCause::TurnsBack);
         from = to;
     }
     Some(motion)

@@ -9,10 +9,12 @@ use super::places::Units;
 use super::spans;
 use super::time_parameter::TimeParameter;
 use crate::smooth::certificate::{Certificate, certify};
-use crate::smooth::choose::{Motion, Then, corners, from_rest, stretch};
+use crate::smooth::choose::{Then, corners, from_rest, stretch};
 use crate::smooth::crossing::Crossing;
 use crate::smooth::method::Method;
+use crate::smooth::motion::Motion;
 use crate::smooth::options::SmoothOptions;
+use crate::smooth::rest::RestCause;
 use crate::smooth::span::Span;
 use crate::timing::Timed;
 use crate::{Boundary, JointLimits, TimingOptions, ToolLimits, time_path};
@@ -87,10 +89,7 @@ impl<'a, const D: usize> Section<'a, D> {
             return Some(corners(self.poses, self.options));
         }
         match self.fitted() {
-            Ok(spans) => {
-                let parts = vec![(Method::Fit, spans.len())];
-                Some(Motion { spans, parts })
-            }
+            Ok(spans) => Some(Motion::new(spans, Method::Fit)),
             Err(Failure::TooFast) => None,
             Err(_) if last < FEW => Some(from_rest(self.poses, self.options, Then::More)),
             Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
@@ -102,7 +101,7 @@ impl<'a, const D: usize> Section<'a, D> {
                     ..self
                 };
                 let mut motion = part(&self.poses[..=at]).motion()?;
-                motion.append(part(&self.poses[at..]).motion()?);
+                motion.append(part(&self.poses[at..]).motion()?, RestCause::Division);
                 Some(motion)
             }
         }

@@ -9,6 +9,7 @@
 mod band;
 mod basis;
 mod build;
+mod known;
 mod newton;
 mod problem;
 mod project;
@@ -18,4 +19,5 @@ mod start;
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
 pub(crate) use build::{Moving, Request, plan, turns};
+pub(crate) use project::GUESSED;
 pub(crate) use solve::Effort;

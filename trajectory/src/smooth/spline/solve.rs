@@ -18,6 +18,8 @@ pub(crate) struct Effort {
     pub(crate) spread: Option<f64>,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
+    /// Fraction of a bound up to which a first iterate is inside: `project::GUESSED` or `project::KNOWN`.
+    pub(crate) clear: f64,
     /// Longest useful time (s): an iterate is given up if its optimum is above it.
     pub(crate) most: f64,
 }
@@ -54,7 +56,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
 ) -> Option<usize> {
     let mut system = System::<D, B>::new(point.control.len());
     begin(problem, point, effort);
-    let mut room = Room::new(problem, point);
+    let mut room = Room::new(problem, point, effort.clear);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);

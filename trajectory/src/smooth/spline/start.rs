@@ -7,7 +7,7 @@ use super::problem::{Point, Problem, square};
 const SHARE: f64 = 0.6;
 
 /// Knot intervals in one time `A / J`.
-const KNOTS_PER_RAMP: f64 = 6.0;
+pub(super) const KNOTS_PER_RAMP: f64 = 6.0;
 
 /// Control points over which the offset of a start in motion fades out.
 const FADE: f64 = 16.0;
@@ -17,8 +17,8 @@ const ROUNDS: usize = 12;
 const HELD: f64 = 0.3;
 
 /// Least and most spans of one spline.
-const FEWEST: f64 = 12.0;
-const MOST: f64 = 700.0;
+pub(super) const FEWEST: f64 = 12.0;
+pub(super) const MOST: f64 = 700.0;
 
 /// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;
