@@ -17,8 +17,7 @@ const EFFORT: Effort = Effort {
     steps: 90,
     search: 72,
     spread: Some(1.0),
-    gap: 3e-3,
-    clear: spline::GUESSED,
+    gap: 2.4e-3,
     most: f64::INFINITY,
 };
 
@@ -56,29 +55,36 @@ pub(crate) struct Window<'a> {
 
 /// Fastest certified motion from rest in the first pose to rest in the last.
 pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
+    let motion = in_parts(poses, options, then);
+    if motion.rests.is_empty() {
+        return motion;
+    }
+    // From a motion that rests, a search may find one that does not.
+    let window = Window::from_rest(poses, options, then);
+    let through = window.spline(Some(&motion.spans), motion.duration());
+    through.unwrap_or(motion)
+}
+
+/// The same, with stops where no spline is found.
+fn in_parts(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
     let stop = corners(poses, options);
-    if poses.len() < 3 {
+    if poses.len() < 3 || options.tolerance <= RESOLUTION {
         return stop;
     }
-    let window = Window {
-        poses,
-        options,
-        moving: None,
-        then,
-    };
+    let window = Window::from_rest(poses, options, then);
     if let Some(motion) = window.spline(None, stop.duration()) {
         return motion;
     }
     // A stop in the middle splits the window into two easier ones.
     let middle = poses.len() / 2;
-    let mut best = from_rest(&poses[..=middle], options, Then::More);
-    let second = from_rest(&poses[middle..], options, then);
-    best.append(second, RestCause::Division);
-    if best.duration() >= stop.duration() {
-        best = stop;
+    let mut halves = in_parts(&poses[..=middle], options, Then::More);
+    let second = in_parts(&poses[middle..], options, then);
+    halves.append(second, RestCause::Division);
+    if halves.duration() < stop.duration() {
+        halves
+    } else {
+        stop
     }
-    let through = window.spline(Some(&best.spans), best.duration());
-    through.unwrap_or(best)
 }
 
 /// Straight legs with a stop at each corner. There is no stop at poses on a straight line, unless
@@ -106,7 +112,17 @@ struct Attempts<'a> {
     coupled: Option<bool>,
 }
 
-impl Window<'_> {
+impl<'a> Window<'a> {
+    /// A window that starts at rest.
+    fn from_rest(poses: &'a [Isometry3<f64>], options: &'a SmoothOptions, then: Then) -> Self {
+        Self {
+            poses,
+            options,
+            moving: None,
+            then,
+        }
+    }
+
     /// A certified spline through the window that takes at most `most` seconds, if one is found.
     ///
     /// From a motion that is `known`, the search has a point that holds every bound, so a motion

@@ -20,6 +20,7 @@ mod exact_stop;
 mod lower_bound;
 mod method;
 mod motion;
+mod normal_form;
 mod options;
 mod plan;
 mod ramp;

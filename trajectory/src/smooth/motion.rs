@@ -12,6 +12,8 @@ pub(crate) struct Motion {
     pub(crate) parts: Vec<(Method, usize)>,
     /// The rests inside, in the order of time.
     pub(crate) rests: Vec<Rest>,
+    /// Whether a part is slower than its way of planning usually is: another way may be faster.
+    pub(crate) eased: bool,
 }
 
 impl Motion {
@@ -26,6 +28,7 @@ impl Motion {
             spans,
             parts,
             rests: Vec::new(),
+            eased: false,
         }
     }
 
@@ -63,6 +66,7 @@ impl Motion {
                 .collect(),
             parts: self.parts.iter().rev().copied().collect(),
             rests: rests.collect(),
+            eased: self.eased,
         }
     }
 
@@ -78,6 +82,7 @@ impl Motion {
             rest
         }));
         self.parts.extend(other.parts);
+        self.eased |= other.eased;
     }
 
     /// Adds a motion that starts at rest where this one ends at rest.

@@ -136,15 +136,8 @@ impl Windows {
 
     /// Plans what is left and certifies the whole.
     #[must_use]
-    pub fn finish(self) -> SmoothPlan {
-        let options = self.options.clone();
-        self.finish_for(&options)
-    }
-
-    /// Plans what is left and certifies the whole for wider tolerances.
-    pub(crate) fn finish_for(mut self, options: &SmoothOptions) -> SmoothPlan {
+    pub fn finish(mut self) -> SmoothPlan {
         while self.advance() {}
-        self.options = options.finite();
         let stop = exact_stop::plan(&self.given, &self.options.limits);
         let exact_stop = stop.last().map_or(0.0, Span::end);
         let bound = lower_bound(&self.given, &self.options);
@@ -155,6 +148,12 @@ impl Windows {
         }
         whole.0.lower_bound = bound;
         SmoothPlan::new(&self.given, self.done, whole, exact_stop)
+    }
+
+    /// Plans what is left; the whole, uncertified.
+    pub(crate) fn motion(mut self) -> Motion {
+        while self.advance() {}
+        self.done
     }
 
     /// Braking time from full speed, s.
@@ -271,7 +270,7 @@ impl Windows {
         let rest = Motion {
             spans: rest,
             parts,
-            rests: Vec::new(),
+            ..Motion::default()
         };
         let mut head = std::mem::replace(&mut self.tail, rest);
         head.parts = vec![(Method::Spline, head.spans.len())];

@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::basis::{self, START};
 use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
-use super::project::KNOWN;
 use super::solve::{Effort, solve};
 use super::start;
 use crate::ToolPoint;
@@ -203,7 +202,7 @@ impl Task<'_> {
         let mut effort = self.request.effort;
         let mut point = match self.request.known {
             Some(spans) => {
-                (effort.spread, effort.clear) = (None, KNOWN);
+                effort.spread = None;
                 self.known(&mut problem, spans, used)
             }
             None => {

@@ -18,6 +18,11 @@ use crate::smooth::crossing::crossings;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::Span;
 
+/// Rate at which a motion that starts in motion is followed in the end, so that its limits leave the
+/// search room, and the share of its time in which the rate falls from 1.
+const RATE: f64 = 0.85;
+const FALL: f64 = 0.3;
+
 /// Knots that pass before a start from rest moves: the time at which the first control point that is
 /// free acts.
 const LEAD: f64 = 1.5;
@@ -70,11 +75,13 @@ impl<'a> Known<'a> {
     /// each inner pose is passed, in knots.
     pub(super) fn control(&self, spacing: f64, moving: bool) -> (Vec<[Vector3<f64>; 2]>, Vec<f64>) {
         let lead = if moving { 0.0 } else { LEAD };
-        let knots = (self.duration() / spacing + lead + LEAD).ceil().max(FEWEST) as usize + 4;
+        let follow = |time: f64| if moving { self.slower(time) } else { time };
+        let total = self.after(self.duration(), &follow);
+        let knots = (total / spacing + lead + LEAD).ceil().max(FEWEST) as usize + 4;
         let mut leg = 0;
         let mut control = Vec::with_capacity(knots);
         for k in 0..knots {
-            let time = (k as f64 - LEAD - lead) * spacing;
+            let time = follow((k as f64 - LEAD - lead) * spacing);
             while leg < self.times.len() && self.times[leg] <= time {
                 leg += 1;
             }
@@ -83,8 +90,31 @@ impl<'a> Known<'a> {
             control.push([point, self.vectors[leg] + turn]);
         }
         let end = (knots - 4) as f64;
-        let passes = self.times.iter().map(|t| (t / spacing + lead).min(end));
-        (control, passes.collect())
+        let pass = |time: &f64| (self.after(*time, &follow) / spacing + lead).min(end);
+        (control, self.times.iter().map(pass).collect())
+    }
+
+    /// Time of the motion that is followed after a time: the rate falls from 1 to [`RATE`].
+    fn slower(&self, time: f64) -> f64 {
+        let fall = FALL * self.duration();
+        let x = (time / fall).clamp(0.0, 1.0);
+        // The integral of the smooth step 3 x^2 - 2 x^3.
+        let slow = fall * x * x * x * (1.0 - 0.5 * x) + (time - fall).max(0.0);
+        time - (1.0 - RATE) * slow
+    }
+
+    /// When a time of the motion is reached.
+    fn after(&self, time: f64, follow: &dyn Fn(f64) -> f64) -> f64 {
+        let (mut low, mut high) = (0.0, time / RATE);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if follow(middle) < time {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        high
     }
 
     /// Place and orientation at a time; those of the ends before and after.

@@ -19,5 +19,4 @@ mod start;
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
 pub(crate) use build::{Moving, Request, plan, turns};
-pub(crate) use project::GUESSED;
 pub(crate) use solve::Effort;

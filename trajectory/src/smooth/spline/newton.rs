@@ -146,11 +146,15 @@ impl<const D: usize, const B: usize> System<D, B> {
         self.band.clear();
         self.sides.fill([0.0; 2]);
         (self.gradient_z, self.hessian_z) = (t, 0.0);
-        Build::detect().run(Norms {
-            system: self,
+        let at = Iterate {
             problem,
             point,
             room,
+            pinned: problem.pinned(point.z),
+        };
+        Build::detect().run(Norms {
+            system: self,
+            at: &at,
         });
         self.balls(problem, point, room);
         self.solve()
@@ -192,22 +196,16 @@ impl<const D: usize, const B: usize> System<D, B> {
 
     /// Speed, acceleration and jerk of one group.
     #[inline(always)]
-    fn limits<S: Four>(
-        &mut self,
-        simd: S,
-        (problem, point, room): (&Problem<D>, &Point<D>, &Room),
-        g: usize,
-    ) {
-        let pinned = problem.pinned(point.z);
-        let last = point.control.len() - 1;
-        let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, room));
+    fn limits<S: Four>(&mut self, simd: S, at: &Iterate<'_, D>, g: usize) {
+        let last = at.point.control.len() - 1;
+        let caps = [1, 2, 3].map(|k| at.problem.cap(g, k, at.point.z, at.room));
         for k in 0..last {
-            self.norm(simd, (point, &pinned), (k, &FIRST, g), &caps[0]);
+            self.norm(simd, at, &Sum::new(k, &FIRST, g), &caps[0]);
             if k + 2 <= last {
-                self.norm(simd, (point, &pinned), (k, &SECOND, g), &caps[1]);
+                self.norm(simd, at, &Sum::new(k, &SECOND, g), &caps[1]);
             }
             if k + 3 <= last {
-                self.norm(simd, (point, &pinned), (k, &THIRD, g), &caps[2]);
+                self.norm(simd, at, &Sum::new(k, &THIRD, g), &caps[2]);
             }
         }
     }
@@ -217,11 +215,12 @@ impl<const D: usize, const B: usize> System<D, B> {
     fn norm<S: Four, const M: usize>(
         &mut self,
         simd: S,
-        (point, pinned): (&Point<D>, &[[[f64; D]; 2]; 4]),
-        (first, w, g): (usize, &[f64; M], usize),
+        at: &Iterate<'_, D>,
+        sum: &Sum<'_, M>,
         [r, r1, r2]: &[f64; 3],
     ) {
-        let y = point.sum(first, w, g);
+        let Sum { first, w, g } = *sum;
+        let y = at.point.sum(first, w, g);
         let slack = 1.0 / (r * r - square(&y));
         let gradient = y.map(|x| 2.0 * x * slack);
         let hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
@@ -232,7 +231,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         if first < 4 {
             // The pinned control points move with z.
             let mut slide = [0.0; 3];
-            for (weight, pin) in w.iter().zip(&pinned[first..]) {
+            for (weight, pin) in w.iter().zip(&at.pinned[first..]) {
                 for d in 0..3 {
                     slide[d] += weight * pin[1][3 * g + d];
                 }
@@ -244,17 +243,13 @@ impl<const D: usize, const B: usize> System<D, B> {
                 border[d] += bent;
             }
         }
-        self.add(simd, (first, w, g), [&gradient, &border], &hessian);
+        self.add(simd, sum, [&gradient, &border], &hessian);
     }
 
     /// Corridor samples of one group.
     #[inline(always)]
-    fn corridor<S: Four>(
-        &mut self,
-        simd: S,
-        (problem, point, room): (&Problem<D>, &Point<D>, &Room),
-        g: usize,
-    ) {
+    fn corridor<S: Four>(&mut self, simd: S, at: &Iterate<'_, D>, g: usize) {
+        let (problem, point, room) = (at.problem, at.point, at.room);
         for k in 0..point.samples() {
             let foot = problem.nearest(&point.sample(k, g), room.legs[k], g);
             let (y, slide) = (foot.offset, problem.slide(&foot, g));
@@ -268,7 +263,8 @@ impl<const D: usize, const B: usize> System<D, B> {
                 }
             }
             let (first, w) = sample_weights(k);
-            self.add(simd, (first, w, g), [&gradient, &[0.0; 3]], &hessian);
+            let sum = Sum::new(first, w, g);
+            self.add(simd, &sum, [&gradient, &[0.0; 3]], &hessian);
         }
     }
 
@@ -277,10 +273,11 @@ impl<const D: usize, const B: usize> System<D, B> {
     fn add<S: Four, const M: usize>(
         &mut self,
         simd: S,
-        (first, w, g): (usize, &[f64; M], usize),
+        sum: &Sum<'_, M>,
         [gradient, border]: [&[f64; 3]; 2],
         h: &[[f64; 3]; 3],
     ) {
+        let Sum { first, w, g } = *sum;
         // Columns of the symmetric block, whole and from the diagonal on.
         let whole = [0, 1, 2].map(|b| simd.load(&[h[b][0], h[b][1], h[b][2], 0.0]));
         let second = simd.load(&[h[1][1], h[1][2], 0.0, 0.0]);
@@ -379,12 +376,34 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 }
 
-/// The terms of limits and corridors of a system.
-struct Norms<'a, const D: usize, const B: usize> {
-    system: &'a mut System<D, B>,
+/// An iterate with what the terms of its barrier need.
+struct Iterate<'a, const D: usize> {
     problem: &'a Problem<D>,
     point: &'a Point<D>,
     room: &'a Room,
+    /// The control points that the start fixes, and their derivatives to `z`.
+    pinned: [[[f64; D]; 2]; 4],
+}
+
+/// A weighted sum of consecutive control points, of the coordinates of one group.
+#[derive(Clone, Copy)]
+struct Sum<'a, const M: usize> {
+    first: usize,
+    w: &'a [f64; M],
+    g: usize,
+}
+
+impl<'a, const M: usize> Sum<'a, M> {
+    #[inline(always)]
+    fn new(first: usize, w: &'a [f64; M], g: usize) -> Self {
+        Self { first, w, g }
+    }
+}
+
+/// The terms of limits and corridors of a system.
+struct Norms<'a, const D: usize, const B: usize> {
+    system: &'a mut System<D, B>,
+    at: &'a Iterate<'a, D>,
 }
 
 impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
@@ -392,11 +411,10 @@ impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) {
-        let at = (self.problem, self.point, self.room);
         for g in 0..Problem::<D>::GROUPS {
-            self.system.limits(simd, at, g);
-            if self.problem.groups[g].width.is_finite() {
-                self.system.corridor(simd, at, g);
+            self.system.limits(simd, self.at, g);
+            if self.at.problem.groups[g].width.is_finite() {
+                self.system.corridor(simd, self.at, g);
             }
         }
     }

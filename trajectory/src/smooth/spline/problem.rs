@@ -50,8 +50,6 @@ pub(crate) struct Point<const D: usize> {
 /// Widened bounds that the present iterate needs until it is feasible.
 #[derive(Clone, Debug)]
 pub(crate) struct Room {
-    /// Fraction of a bound up to which it need not be widened.
-    pub(crate) clear: f64,
     /// Factor on speed, acceleration and jerk of each group.
     pub(crate) caps: [[f64; 3]; 2],
     /// Radius of each ball, by group.

@@ -7,10 +7,22 @@ use super::problem::{Point, Problem, Room, part, square};
 /// Iterates are held this far inside the widened bounds.
 const WIDEN: f64 = 1.03;
 
-/// Fraction of a bound up to which it need not be widened: of a first iterate that is a guess, and of
-/// one that is known to hold.
-pub(crate) const GUESSED: f64 = 0.99;
-pub(crate) const KNOWN: f64 = 1.0 - 1e-6;
+/// Fraction of a bound up to which it need not be widened.
+const CLEAR: f64 = 0.99;
+
+/// The same in the first spans after a start in motion, so many: there an iterate can be no farther
+/// inside than the start is.
+const BESIDE: f64 = 1.0 - 1e-6;
+const FIRST_SPANS: f64 = 8.0;
+
+/// The fraction at a time in knots.
+fn clear(moving: bool, time: f64) -> f64 {
+    if moving && time < FIRST_SPANS {
+        BESIDE
+    } else {
+        CLEAR
+    }
+}
 
 /// The same for speed, acceleration and jerk, and what a start in motion may reach of them.
 const NEAR_CAP: f64 = 0.9999;
@@ -137,11 +149,8 @@ fn ratios_of<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[[f64; 
 
 impl Room {
     /// Widened bounds for an iterate about which nothing is known yet.
-    ///
-    /// A bound need not be widened if the iterate uses no more than the fraction `clear` of it.
-    pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>, clear: f64) -> Self {
+    pub(crate) fn new<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
         let mut room = Self {
-            clear,
             caps: [[f64::INFINITY; 3]; 2],
             balls: [0, 1].map(|_| vec![f64::INFINITY; point.crossings.len()]),
             widths: [0, 1].map(|_| vec![f64::INFINITY; point.samples()]),
@@ -168,7 +177,12 @@ impl Room {
             let radius = problem.groups[g].radius;
             for i in 0..point.crossings.len() {
                 let far = miss(problem, point, i, g);
-                self.balls[g][i] = narrowed(self.balls[g][i], far, radius, self.clear);
+                self.balls[g][i] = narrowed(
+                    self.balls[g][i],
+                    far,
+                    radius,
+                    clear(problem.moving(), point.crossings[i]),
+                );
                 tight &= self.balls[g][i] <= radius;
             }
         }
@@ -224,7 +238,8 @@ impl Room {
                     1.0
                 };
                 let width = eased * problem.groups[g].width;
-                self.widths[g][k] = narrowed(self.widths[g][k], far, width, self.clear);
+                self.widths[g][k] =
+                    narrowed(self.widths[g][k], far, width, clear(problem.moving(), time));
                 tight &= self.widths[g][k] <= width;
             }
         }

@@ -18,8 +18,6 @@ pub(crate) struct Effort {
     pub(crate) spread: Option<f64>,
     /// Relative gap of `z` at which to end; the time is off by a third of it.
     pub(crate) gap: f64,
-    /// Fraction of a bound up to which a first iterate is inside: `project::GUESSED` or `project::KNOWN`.
-    pub(crate) clear: f64,
     /// Longest useful time (s): an iterate is given up if its optimum is above it.
     pub(crate) most: f64,
 }
@@ -40,6 +38,12 @@ const LOW: f64 = 100.0;
 /// narrowing is large.
 const PATIENCE: usize = 4;
 
+/// More steps for a start in motion that a first iterate does not keep up with.
+const ANCHORED: usize = 40;
+
+/// Square of the Newton decrement that is near enough to a centre on the way to a first valid motion.
+const ROUGHLY: f64 = 30.0;
+
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
 
@@ -56,12 +60,17 @@ pub(crate) fn solve<const D: usize, const B: usize>(
 ) -> Option<usize> {
     let mut system = System::<D, B>::new(point.control.len());
     begin(problem, point, effort);
-    let mut room = Room::new(problem, point, effort.clear);
+    let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let (mut short, mut freed) = (0, false);
-    for count in 0..effort.steps {
+    let more = if problem.anchor.is_some() {
+        ANCHORED
+    } else {
+        0
+    };
+    for count in 0..effort.steps + more {
         since += 1;
         if tight || since > PATIENCE {
             tight = room.tighten(problem, point);
@@ -71,7 +80,8 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             point.z = problem.anchor.take().unwrap_or(point.z);
         }
         let done = tight && problem.anchor.is_none();
-        if !done && count >= effort.search {
+        // An iterate that is inside goes on until it is as fast as its start.
+        if !tight && count >= effort.search {
             return None;
         }
         let Some(step) = system.step(problem, point, &room, weight) else {
@@ -87,7 +97,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         if short == STUCK && !freed {
             (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
         }
-        let centred = step.decrement < 3.0;
+        let centred = step.decrement < if done { 3.0 } else { ROUGHLY };
         if !moved || centred {
             let least = (point.z - parameter / weight).max(0.0);
             if done && point.spans() as f64 * problem.spacing(least) > effort.most {
@@ -109,7 +119,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             }
         }
     }
-    (tight && problem.anchor.is_none()).then_some(effort.steps)
+    (tight && problem.anchor.is_none()).then_some(effort.steps + more)
 }
 
 /// Moves a first iterate to a point from which the descent can begin.
