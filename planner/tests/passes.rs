@@ -87,3 +87,68 @@ fn passes_are_in_order_and_true() {
     }
     assert!(planned >= 20, "{planned} of 24 planned");
 }
+
+/// Time of straight moves to each pose in turn, s; `None` if one of them cannot be made.
+fn straight_time<const N: usize>(
+    planner: &Planner<N>,
+    motion: &Move,
+    home: &SVector<f64, N>,
+) -> Option<f64> {
+    let (mut joints, mut time) = (*home, 0.0);
+    for pose in &motion.poses {
+        let straight = Move {
+            shape: Shape::Straight,
+            poses: vec![*pose],
+            ..motion.clone()
+        };
+        let leg = planner.plan(&straight, &joints).ok()?;
+        time += leg.trajectory.duration();
+        joints = leg.end;
+    }
+    Some(time)
+}
+
+/// The bounds of a whole motion may be above those of its parts by this share, and slow it down.
+const ROOM: f64 = 1e-3;
+
+/// Counts the random lists of an arm of which both motions can be planned; the smooth one is never
+/// the slower one.
+fn compared<const N: usize>(name: &str, seed: u64) -> usize {
+    let robot = load(name).unwrap();
+    let home: SVector<f64, N> = vector(&robot.home);
+    let planner = Planner::new(
+        &robot.chain::<N>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<N>(),
+        robot.joint_names(),
+    );
+    let (mut state, mut both) = (seed, 0);
+    for round in 0..18 {
+        let tolerance = [0.0, 5e-5, 1e-3, 5e-3, 2e-2, 0.0][round % 6];
+        let first = planner.chain().forward(&home);
+        let poses = (0..3 + round % 4).map(|_| near(&first, (0.12, 0.3), &mut state));
+        let motion = Move {
+            shape: Shape::Smooth,
+            poses: poses.collect(),
+            tolerance,
+            limits: robot.motion_limits(),
+        };
+        let smooth = planner.plan(&motion, &home);
+        let (Ok(smooth), Some(straight)) = (smooth, straight_time(&planner, &motion, &home)) else {
+            continue;
+        };
+        both += 1;
+        let time = smooth.trajectory.duration();
+        assert!(
+            time <= straight * (1.0 + ROOM),
+            "{name} {round}, tolerance {tolerance} m: {time} s, straight moves {straight} s"
+        );
+    }
+    both
+}
+
+#[test]
+fn smooth_moves_are_never_slower_than_straight_ones() {
+    let both = compared::<6>("ur5e", 11) + compared::<7>("panda", 12);
+    assert!(both >= 24, "{both} of 36 planned");
+}

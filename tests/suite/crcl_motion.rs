@@ -109,7 +109,6 @@ fn judge(way: &[Point3<f64>], waypoints: &[[f64; 3]]) {
 }
 
 #[test]
-#[ignore = "does not pass yet: every waypoint is passed, but the arm rests once on the way"]
 fn two_hundred_waypoints_are_passed_without_a_stop() {
     let scene = Scene::new("through", &[]);
     let mut client = scene.connect();

@@ -70,22 +70,18 @@ impl<const N: usize> Planner<N> {
         Ok(self.slowed(draft, motion))
     }
 
-    pub(super) fn plan_smooth(
+    /// The joints follow a smooth path from `start`, slowed down where a joint needs it.
+    pub(super) fn follow_smooth(
         &self,
+        path: &SmoothPath,
         motion: &Move,
         start: &SVector<f64, N>,
-        fit: bool,
-    ) -> Result<(Draft<N>, Blend), MotionError> {
-        let mut poses = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
-        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
-        options.fit = fit;
-        let plan = smooth::plan(&poses, &options)?;
-        let blend = blend(&plan, motion.tolerance);
+    ) -> Result<Draft<N>, MotionError> {
+        let plan = &path.plan;
         let crossings: Vec<f64> = plan.crossings().iter().map(|pass| pass.time).collect();
-        if is_still(&poses) || plan.duration() <= 0.0 {
+        if path.still || plan.duration() <= 0.0 {
             let at_once = vec![0.0; crossings.len()];
-            return Ok((passing(Trajectory::new(Vec::new()), at_once), blend));
+            return Ok(passing(Trajectory::new(Vec::new()), at_once));
         }
         let towards = |u: f64| {
             1 + plan
@@ -95,21 +91,37 @@ impl<const N: usize> Planner<N> {
                 .count()
         };
         let points = self
-            .followed(&plan, true, start, &towards)
+            .followed(plan, true, start, &towards)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let direct = Trajectory::new(pieces(&points));
         let free = direct.duration();
         let direct = self.slowed(passing(direct, crossings.clone()), motion);
         if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
-            return Ok((direct, blend));
+            return Ok(direct);
         }
-        let path = joint_path(&plan, &points)?;
+        let path = joint_path(plan, &points)?;
         match self.retimed(&path, &crossings, motion) {
-            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => {
-                Ok((timed, blend))
-            }
-            _ => Ok((direct, blend)),
+            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => Ok(timed),
+            _ => Ok(direct),
         }
+    }
+
+    /// The smooth motion of the tool through the poses of a move that starts at `start`; `fit` says
+    /// whether a curve may be fitted through a dense list.
+    pub(super) fn smooth_path(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        fit: bool,
+    ) -> Result<SmoothPath, MotionError> {
+        let mut poses = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        options.fit = fit;
+        Ok(SmoothPath {
+            plan: smooth::plan(&poses, &options)?,
+            still: is_still(&poses),
+        })
     }
 
     /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
@@ -242,15 +254,29 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// What a smooth motion of the tool promises.
-fn blend(plan: &smooth::SmoothPlan, tolerance: f64) -> Blend {
-    let certificate = plan.certificate();
-    Blend {
-        tolerance,
-        exact_stop: plan.exact_stop(),
-        corridor_ratio: certificate.corridor.ratio,
-        jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
-        fallbacks: plan.fallbacks(),
+/// The smooth motion of the tool that the joints are to follow.
+pub(super) struct SmoothPath {
+    plan: smooth::SmoothPlan,
+    /// Whether all poses are where the arm is.
+    still: bool,
+}
+
+impl SmoothPath {
+    /// Whether it is along a curve fitted through a dense list.
+    pub(super) fn is_fitted(&self) -> bool {
+        self.plan.method() == smooth::Method::Fit
+    }
+
+    /// What it promises, planned with this tolerance (m).
+    pub(super) fn blend(&self, tolerance: f64) -> Blend {
+        let certificate = self.plan.certificate();
+        Blend {
+            tolerance,
+            exact_stop: self.plan.exact_stop(),
+            corridor_ratio: certificate.corridor.ratio,
+            jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
+            fallbacks: self.plan.fallbacks(),
+        }
     }
 }
 

@@ -22,6 +22,7 @@ mod motion_error;
 mod reach;
 mod screw;
 mod singular;
+mod smooth;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
@@ -69,7 +70,7 @@ pub struct Blend {
     pub corridor_ratio: f64,
     /// Greatest jerk of the tool / limit, linear or angular, before the joints slow it down.
     pub jerk_ratio: f64,
-    /// Parts that are not the time-optimal spline.
+    /// Rests between the start and the end.
     pub fallbacks: usize,
 }
 
@@ -209,46 +210,6 @@ impl<const N: usize> Planner<N> {
             Shape::Joint => self.certify(motion, start, self.plan_joint(motion, start)?),
             Shape::Straight => self.certify(motion, start, self.plan_straight(motion, start)?),
             Shape::Smooth => self.smooth_move(motion, start),
-        }
-    }
-
-    /// The smooth motion within the tolerance asked for. If its certificate with the joints fails,
-    /// a quarter of the tolerance is tried, then a stop at each pose. Never slower than with a stop
-    /// at each pose.
-    fn smooth_move(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-    ) -> Result<PlannedMove<N>, MotionError> {
-        let plan = |tolerance: f64, fit: bool| -> Result<_, MotionError> {
-            let tighter = Move {
-                tolerance,
-                ..motion.clone()
-            };
-            let (draft, blend) = self.plan_smooth(&tighter, start, fit)?;
-            let planned = self.certify(motion, start, draft)?;
-            Ok(PlannedMove {
-                blend: Some(blend),
-                ..planned
-            })
-        };
-        // An arm that cannot follow the curve fitted through a dense list may follow the spline.
-        let attempt = |tolerance: f64| plan(tolerance, true).or_else(|_| plan(tolerance, false));
-        let slower = |planned: &PlannedMove<N>, than: f64| planned.trajectory.duration() > than;
-        match attempt(motion.tolerance) {
-            Ok(planned) if slower(&planned, planned.blend.map_or(0.0, |b| b.exact_stop)) => {
-                let stops = attempt(0.0).ok();
-                let faster = stops.filter(|stops| slower(&planned, stops.trajectory.duration()));
-                Ok(faster.unwrap_or(planned))
-            }
-            Err(first)
-                if matches!(first, MotionError::Uncertified(_)) && motion.tolerance > 0.0 =>
-            {
-                attempt(0.25 * motion.tolerance)
-                    .or_else(|_| attempt(0.0))
-                    .map_err(|_| first)
-            }
-            other => other,
         }
     }
 

@@ -231,8 +231,9 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
         [Vector3::zeros(); 3],
         [Vector3::zeros(); 2],
     );
-    // Bounds of the angular velocity and its derivative of the factors before.
-    let (mut before, mut before2, mut rest) = (0.0, 0.0, [0.0_f64; 3]);
+    // Bounds of the angular velocity of the factors before, and of both parts of its derivative:
+    // along their axes, and from the turning of these.
+    let (mut before, mut along, mut across, mut rest) = (0.0, 0.0, 0.0, [0.0_f64; 3]);
     let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(span.turns.len());
     for turn in &span.turns {
         let [c0, c1, c2, c3, c4] = turn.angle;
@@ -255,8 +256,7 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
             (skew + 2.0 * before * half).min(1.0)
         };
         let axis1 = length * before * skew;
-        let axis2 =
-            length * before2 * skew.max(if skew > 0.0 { 1.0 } else { 0.0 }) + before * axis1;
+        let axis2 = length * (along * skew + across) + before * axis1;
         let drift = axis1 * half;
         for (sum, c) in rate.iter_mut().zip(first) {
             *sum += axis * c;
@@ -270,7 +270,8 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
         rest[0] += m1 * drift;
         rest[1] += m2 * drift + m1 * axis1;
         rest[2] += m3 * drift + 2.0 * m2 * axis1 + m1 * axis2;
-        before2 += length * m2 + axis1 * m1;
+        along += length * m2;
+        across += axis1 * m1;
         before += length * m1;
         axes.push(axis);
         rotation *= nalgebra::UnitQuaternion::from_scaled_axis(turn.axis * middle);

@@ -6,7 +6,9 @@ use super::certificate::{Certificate, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
+use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::rest::RestCause;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
 
@@ -15,7 +17,7 @@ const EFFORT: Effort = Effort {
     steps: 90,
     search: 72,
     spread: Some(1.0),
-    gap: 3e-3,
+    gap: 2.4e-3,
     most: f64::INFINITY,
 };
 
@@ -30,54 +32,6 @@ const SPREAD: f64 = 1.2;
 /// a bend is a little larger than the speed.
 const JOIN_SPEED: f64 = 0.998;
 
-/// A certified motion through a window.
-#[derive(Clone, Debug)]
-pub(crate) struct Motion {
-    pub(crate) spans: Vec<Span>,
-    /// How each part was made, and how many spans it has.
-    pub(crate) parts: Vec<(Method, usize)>,
-}
-
-impl Motion {
-    fn new(spans: Vec<Span>, method: Method) -> Self {
-        let parts = if spans.is_empty() {
-            Vec::new()
-        } else {
-            vec![(method, spans.len())]
-        };
-        Self { spans, parts }
-    }
-
-    /// Time of the motion, s.
-    pub(crate) fn duration(&self) -> f64 {
-        self.spans.last().map_or(0.0, Span::end)
-    }
-
-    /// The same way from its end to its start.
-    pub(crate) fn reversed(&self) -> Self {
-        let total = self.duration();
-        Self {
-            spans: self
-                .spans
-                .iter()
-                .rev()
-                .map(|span| span.reversed(total))
-                .collect(),
-            parts: self.parts.iter().rev().copied().collect(),
-        }
-    }
-
-    /// Adds a motion that starts where this one ends.
-    pub(crate) fn append(&mut self, other: Motion) {
-        let offset = self.duration();
-        self.spans.extend(other.spans.into_iter().map(|mut span| {
-            span.start += offset;
-            span
-        }));
-        self.parts.extend(other.parts);
-    }
-}
-
 /// What comes after a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
@@ -87,21 +41,45 @@ pub(crate) enum Then {
     More,
 }
 
+/// Poses that one spline is to pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window<'a> {
+    /// The poses; with `moving` the first is the one passed last.
+    pub(crate) poses: &'a [Isometry3<f64>],
+    pub(crate) options: &'a SmoothOptions,
+    /// State at the start; `None` at rest in the first pose.
+    pub(crate) moving: Option<&'a Moving>,
+    /// What comes after it.
+    pub(crate) then: Then,
+}
+
 /// Fastest certified motion from rest in the first pose to rest in the last.
 pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
+    let motion = in_parts(poses, options, then);
+    if motion.rests.is_empty() {
+        return motion;
+    }
+    // From a motion that rests, a search may find one that does not.
+    let window = Window::from_rest(poses, options, then);
+    let through = window.spline(Some(&motion.spans), motion.duration());
+    through.unwrap_or(motion)
+}
+
+/// The same, with stops where no spline is found.
+fn in_parts(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
     let stop = corners(poses, options);
-    if poses.len() < 3 {
+    if poses.len() < 3 || options.tolerance <= RESOLUTION {
         return stop;
     }
-    if let Some(spans) = spline(poses, options, (None, then), stop.duration())
-        && spans.last().map_or(0.0, Span::end) <= stop.duration()
-    {
-        return Motion::new(spans, Method::Spline);
+    let window = Window::from_rest(poses, options, then);
+    if let Some(motion) = window.spline(None, stop.duration()) {
+        return motion;
     }
     // A stop in the middle splits the window into two easier ones.
     let middle = poses.len() / 2;
-    let mut halves = from_rest(&poses[..=middle], options, Then::More);
-    halves.append(from_rest(&poses[middle..], options, then));
+    let mut halves = in_parts(&poses[..=middle], options, Then::More);
+    let second = in_parts(&poses[middle..], options, then);
+    halves.append(second, RestCause::Division);
     if halves.duration() < stop.duration() {
         halves
     } else {
@@ -117,83 +95,127 @@ pub(crate) fn corners(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Moti
     } else {
         exact_stop::plan(poses, &options.limits)
     };
-    Motion::new(spans, Method::ExactStop)
+    Motion::stops(spans)
 }
 
-/// Certified spline from a state in motion to rest in the last pose, if one is
-/// found that takes at most `most` seconds. The first pose is the one passed
-/// last.
-pub(crate) fn from_motion(
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
-    (moving, then): (&Moving, Then),
+/// What the attempts at one window have come to.
+struct Attempts<'a> {
+    window: Window<'a>,
+    /// A motion through the window that holds, to start from.
+    known: Option<&'a [Span]>,
+    /// Longest useful time, s.
     most: f64,
-) -> Option<Motion> {
-    let spans = spline(poses, options, (Some(moving), then), most)?;
-    (spans.last()?.end() <= most).then(|| Motion::new(spans, Method::Spline))
+    /// The options, narrowed by what was exceeded.
+    inner: SmoothOptions,
+    effort: Effort,
+    /// Whether the orientation has to be part of the optimum, once that is decided.
+    coupled: Option<bool>,
 }
 
-/// A certified spline of at most about `most` seconds; bounds that a first
-/// attempt breaks are narrowed for the next one.
-fn spline(
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
-    (moving, then): (Option<&Moving>, Then),
-    most: f64,
-) -> Option<Vec<Span>> {
-    if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
-        return None;
-    }
-    let mut inner = options.clone();
-    if then == Then::More {
-        inner.limits.speed *= JOIN_SPEED;
-        inner.limits.angular_speed *= JOIN_SPEED;
-    }
-    let full = Effort { most, ..EFFORT };
-    let (mut coupled, mut effort) = (None, full);
-    for attempt in 0..5_usize {
-        let narrowed = inner.clone();
-        let mut request = Request {
+impl<'a> Window<'a> {
+    /// A window that starts at rest.
+    fn from_rest(poses: &'a [Isometry3<f64>], options: &'a SmoothOptions, then: Then) -> Self {
+        Self {
             poses,
-            options: &narrowed,
-            moving,
-            effort,
-            coupled: false,
-        };
-        request.coupled = coupled.unwrap_or(!request.can_follow());
-        let Some(mut spans) = spline::plan(&request) else {
-            if moving.is_some() && effort.spread.is_some() {
-                effort.spread = effort.spread.filter(|x| *x < SPREAD).map(|_| SPREAD);
-            } else if !request.coupled && request.moves()[1] {
-                (coupled, effort) = (Some(true), full);
-            } else {
-                return None;
-            }
-            continue;
-        };
-        let (mut certificate, mut crossings) = certify(&spans, poses, options);
-        let over = certificate.worst_limit();
-        if over > 1.0 && over < 1.3 && moving.is_none() {
-            stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-            (certificate, crossings) = certify(&spans, poses, options);
+            options,
+            moving: None,
+            then,
         }
-        let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
-        if certificate.holds() && settled {
-            return Some(spans);
-        }
-        // Narrower bounds make it slower still.
-        let slow = spans.last().map_or(0.0, Span::end) > most;
-        let last = request.coupled || !request.moves()[1];
-        if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
+    }
+
+    /// A certified spline through the window that takes at most `most` seconds, if one is found.
+    ///
+    /// From a motion that is `known`, the search has a point that holds every bound, so a motion
+    /// that need not rest is found where the one that is known rests.
+    pub(crate) fn spline(&self, known: Option<&[Span]>, most: f64) -> Option<Motion> {
+        let options = self.options;
+        if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
             return None;
         }
-        narrow(&mut inner, &certificate, &crossings, request.coupled);
-        if certificate.in_order && !settled {
-            inner.tolerance *= 0.5;
+        let mut inner = options.clone();
+        if self.then == Then::More {
+            inner.limits.speed *= JOIN_SPEED;
+            inner.limits.angular_speed *= JOIN_SPEED;
         }
-        coupled = Some(request.coupled || ((attempt == 1 || over > 1.3) && request.moves()[1]));
+        let attempts = Attempts {
+            window: *self,
+            known,
+            most,
+            inner,
+            effort: Effort { most, ..EFFORT },
+            coupled: None,
+        };
+        let spans = attempts.run()?;
+        let soon = spans.last()?.end() <= most;
+        soon.then(|| Motion::new(spans, Method::Spline))
     }
-    None
+}
+
+impl Attempts<'_> {
+    /// A certified spline; bounds that one attempt breaks are narrowed for the next one.
+    fn run(mut self) -> Option<Vec<Span>> {
+        let Window {
+            poses,
+            options,
+            moving,
+            then,
+        } = self.window;
+        for attempt in 0..5_usize {
+            let narrowed = self.inner.clone();
+            let mut request = Request {
+                poses,
+                options: &narrowed,
+                moving,
+                effort: self.effort,
+                coupled: false,
+                known: self.known,
+            };
+            request.coupled = self.coupled.unwrap_or(!request.can_follow());
+            let turns = request.moves()[1];
+            let Some(mut spans) = spline::plan(&request) else {
+                self.otherwise(request.coupled || !turns)?;
+                continue;
+            };
+            let (mut certificate, mut crossings) = certify(&spans, poses, options);
+            let over = certificate.worst_limit();
+            if over > 1.0 && over < 1.3 && moving.is_none() {
+                stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
+                (certificate, crossings) = certify(&spans, poses, options);
+            }
+            let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
+            if certificate.holds() && settled {
+                return Some(spans);
+            }
+            // Narrower bounds make it slower still.
+            let slow = spans.last().map_or(0.0, Span::end) > self.most;
+            let last = request.coupled || !turns;
+            if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
+                return None;
+            }
+            narrow(&mut self.inner, &certificate, &crossings, request.coupled);
+            if certificate.in_order && !settled {
+                self.inner.tolerance *= 0.5;
+            }
+            let couple = (attempt == 1 || over > 1.3) && turns;
+            self.coupled = Some(request.coupled || couple);
+        }
+        None
+    }
+
+    /// Prepares the attempt after one that found no spline; `None` if there is no other way.
+    /// `last` says that the orientation was part of the optimum, or does not change.
+    fn otherwise(&mut self, last: bool) -> Option<()> {
+        let anchored = self.window.moving.is_some() && self.known.is_none();
+        if anchored && self.effort.spread.is_some() {
+            self.effort.spread = self.effort.spread.filter(|x| *x < SPREAD).map(|_| SPREAD);
+        } else if last {
+            return None;
+        } else {
+            let most = self.most;
+            (self.coupled, self.effort) = (Some(true), Effort { most, ..EFFORT });
+        }
+        Some(())
+    }
 }
 
 /// The greatest ratio of a quantity to its bound.

@@ -3,11 +3,13 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::certificate::{Certificate, certify};
-use super::choose::Motion;
 use super::crossing::Crossing;
 use super::lower_bound::lower_bound;
 use super::method::Method;
+use super::motion::Motion;
+use super::normal_form::NormalForm;
 use super::options::{SmoothError, SmoothOptions};
+use super::rest::Rest;
 use super::span::Span;
 use super::windows::Windows;
 use super::{dense, exact_stop};
@@ -26,6 +28,7 @@ pub struct SmoothPlan {
     crossings: Vec<Crossing>,
     certificate: Certificate,
     parts: Vec<(Method, usize)>,
+    rests: Vec<Rest>,
     exact_stop: f64,
 }
 
@@ -34,9 +37,10 @@ impl SmoothPlan {
     pub(crate) fn new(
         poses: &[Isometry3<f64>],
         motion: Motion,
-        (certificate, crossings): (Certificate, Vec<Crossing>),
+        whole: (Certificate, Vec<Crossing>),
         exact_stop: f64,
     ) -> Self {
+        let (certificate, crossings) = whole;
         let (start, goal) = (poses[0], poses[poses.len() - 1]);
         Self {
             start,
@@ -45,6 +49,7 @@ impl SmoothPlan {
             crossings,
             certificate,
             parts: motion.parts,
+            rests: motion.rests,
             exact_stop,
         }
     }
@@ -82,16 +87,17 @@ impl SmoothPlan {
         }
     }
 
-    /// Parts of the motion that are not the time-optimal spline, though they
-    /// have poses to pass.
+    /// The rests between the start and the end, in the order of time: where the way turns back,
+    /// at exact stops, and where a list was divided.
+    #[must_use]
+    pub fn rests(&self) -> &[Rest] {
+        &self.rests
+    }
+
+    /// Number of [`SmoothPlan::rests`].
     #[must_use]
     pub fn fallbacks(&self) -> usize {
-        let stops = self
-            .parts
-            .iter()
-            .filter(|part| part.0 == Method::ExactStop)
-            .count();
-        if self.crossings.is_empty() { 0 } else { stops }
+        self.rests.len()
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -161,41 +167,112 @@ impl ToolCurve for SmoothPlan {
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
     let finite = options.finite();
-    match options.fit.then(|| fitted(poses, &finite)).flatten() {
-        Some(fitted) if dense::suffices(poses, &finite) => Ok(fitted),
-        Some(fitted) => {
-            let plan = by_spline(poses, options)?;
-            let better = fitted.duration() < plan.duration();
-            Ok(if better { fitted } else { plan })
+    let list = List {
+        poses,
+        options: &finite,
+        exact_stop: exact_stop::duration(poses, &finite.limits),
+    };
+    let planned = NormalForm::new(poses, &finite).and_then(|form| list.fastest(&form));
+    match planned {
+        Some(mut plan) => {
+            plan.certificate.lower_bound = lower_bound(poses, &finite);
+            Ok(plan)
         }
-        None => by_spline(poses, options),
+        // Without a tolerance, or if the form was too coarse.
+        None => Ok(Windows::new(poses, options)?.finish()),
     }
 }
 
-/// The certified motion along a fitted curve, where the list is dense in poses.
-fn fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<SmoothPlan> {
-    let motion = dense::plan(poses, options)?;
-    let exact_stop = exact_stop::duration(poses, &options.limits);
-    let mut whole = certify(&motion.spans, poses, options);
-    whole.0.lower_bound = lower_bound(poses, options);
-    let good = whole.0.holds() && motion.duration() <= exact_stop;
-    good.then(|| SmoothPlan::new(poses, motion, whole, exact_stop))
+/// A list as it was given, with finite options, and the time with a stop at each pose (s).
+struct List<'a> {
+    poses: &'a [Isometry3<f64>],
+    options: &'a SmoothOptions,
+    exact_stop: f64,
 }
 
-/// The motion by time-optimal splines, window by window.
-fn by_spline(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
-    let plan = Windows::new(poses, options)?.finish();
-    // A motion within half of the tolerance is within all of it. A second motion is cheap if poses
-    // are close to each other and fit in one window.
-    let costly = plan.spans.len() > SPANS_PER_POSE * poses.len() || plan.parts.len() > 1;
-    if costly || poses.len() <= SHORT || plan.method() != Method::Spline {
-        return Ok(plan);
+impl List<'_> {
+    /// The fastest certified motion of the ways of planning that suit the list.
+    fn fastest(&self, form: &NormalForm) -> Option<SmoothPlan> {
+        let fitted = if self.options.fit {
+            self.fitted(form)
+        } else {
+            None
+        };
+        match fitted {
+            Some(fit) if !fit.eased && dense::suffices(&form.poses, &form.options) => {
+                Some(fit.plan)
+            }
+            fitted => faster(fitted.map(|fit| fit.plan), self.by_spline(form)),
+        }
     }
-    let mut half = options.clone();
-    half.tolerance *= 0.5;
-    let half = Windows::new(poses, &half)?.finish_for(options);
-    let better = half.certificate.holds() && half.duration() < plan.duration();
-    Ok(if better { half } else { plan })
+
+    /// The motion along a fitted curve, if the list is dense in poses: the faster one from both ends
+    /// if that from the first is slower than it might be.
+    fn fitted(&self, form: &NormalForm) -> Option<Fit> {
+        let fit = |form: &NormalForm| {
+            let motion = dense::plan(&form.poses, &form.options)?;
+            let eased = motion.eased;
+            let plan = self.certified(form, motion)?;
+            Some(Fit { plan, eased })
+        };
+        let first = fit(form);
+        if !dense::is_dense(&form.poses, &form.options)
+            || first.as_ref().is_some_and(|fit| !fit.eased)
+        {
+            return first;
+        }
+        let other = fit(&form.turned(self.poses, self.options));
+        match (first, other) {
+            (Some(first), Some(other)) => {
+                let better = other.plan.duration() < first.plan.duration();
+                Some(if better { other } else { first })
+            }
+            (first, other) => first.or(other),
+        }
+    }
+
+    /// The motion by time-optimal splines, window by window.
+    fn by_spline(&self, form: &NormalForm) -> Option<SmoothPlan> {
+        let within = |options| {
+            let windows = Windows::new(&form.poses, options).ok()?;
+            self.certified(form, windows.motion())
+        };
+        let plan = within(&form.options)?;
+        // A motion within half of the tolerance is within all of it. A second motion is cheap if
+        // poses are close to each other and fit in one window.
+        let costly = plan.spans.len() > SPANS_PER_POSE * self.poses.len() || plan.parts.len() > 1;
+        if costly || self.poses.len() <= SHORT || plan.method() != Method::Spline {
+            return Some(plan);
+        }
+        let mut half = form.options.clone();
+        half.tolerance *= 0.5;
+        faster(Some(plan), within(&half))
+    }
+
+    /// A motion through the normal form as a plan for the list, if its certificate holds.
+    fn certified(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
+        let motion = form.place(motion);
+        let whole = certify(&motion.spans, self.poses, self.options);
+        let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
+        let good = whole.0.holds() && soon;
+        good.then(|| SmoothPlan::new(self.poses, motion, whole, self.exact_stop))
+    }
+}
+
+/// A motion along a fitted curve.
+struct Fit {
+    plan: SmoothPlan,
+    /// Whether another way of planning may be faster.
+    eased: bool,
+}
+
+/// The faster of two plans, the first if they are equal.
+fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<SmoothPlan> {
+    match (first, second) {
+        (Some(first), Some(second)) if second.duration() < first.duration() => Some(second),
+        (Some(first), _) => Some(first),
+        (None, second) => second,
+    }
 }
 
 /// Lists up to this length are planned once.
@@ -208,6 +285,10 @@ const SPANS_PER_POSE: usize = 24;
 mod tests {
     use super::*;
     use crate::ToolLimits;
+    use crate::smooth::RestCause;
+    use nalgebra::UnitQuaternion;
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
 
     fn limits() -> ToolLimits {
         ToolLimits {
@@ -288,6 +369,79 @@ mod tests {
             plan(&bad[..1], &negative),
             Err(SmoothError::BadTolerance { .. })
         ));
+    }
+
+    /// Points of a circle of a radius (m), in another place.
+    fn circle(radius: f64, count: u32) -> Vec<Isometry3<f64>> {
+        let frame = Isometry3::new(Vector3::new(0.49, 0.13, 0.37), Vector3::new(3.1, 0.2, 0.1));
+        let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(count);
+        let place = |i: u32| Vector3::new(angle(i).cos() - 1.0, angle(i).sin(), 0.0) * radius;
+        let pose = |i| frame * Isometry3::from_parts(place(i).into(), UnitQuaternion::identity());
+        (0..=count).map(pose).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 32, rng_seed: RngSeed::Fixed(4), ..ProptestConfig::default()
+        })]
+
+        /// A list that can be passed without a rest has none inside, however it is divided into
+        /// windows: a circle, at speeds from where it takes many windows to where it takes one.
+        #[test]
+        fn a_circle_is_passed_without_a_rest(
+            radius in 0.02..0.1_f64, count in 60_u32..260, speed in 0.05..0.5_f64,
+            acceleration in 0.3..5.0_f64, share in -2.0..0.5_f64,
+        ) {
+            let limits = ToolLimits { speed, acceleration, ..limits() };
+            let leg = radius * std::f64::consts::TAU / f64::from(count);
+            let options = SmoothOptions::new(leg * 10_f64.powf(share), limits);
+            let plan = plan(&circle(radius, count), &options).unwrap();
+            prop_assert!(plan.certificate().holds());
+            prop_assert!(plan.rests().is_empty(), "{:?} of {}", plan.rests(), plan.duration());
+        }
+    }
+
+    /// Two hundred poses of a circle at a tenth of the speed of an arm: the second window starts
+    /// as close to the speed limit as the first one may be.
+    #[test]
+    fn windows_of_a_slow_circle_join_without_a_rest() {
+        let limits = ToolLimits {
+            speed: 0.1,
+            acceleration: 0.5,
+            jerk: 100.0,
+            ..limits()
+        };
+        let plan = plan(&circle(0.05, 200), &SmoothOptions::new(2e-3, limits)).unwrap();
+        assert!(
+            plan.certificate().holds() && plan.rests().is_empty(),
+            "{:?}",
+            plan.rests()
+        );
+        // 0.302 m inside the balls at 0.1 m/s, and 0.2 s to start and to stop.
+        assert!(plan.duration() < 3.35, "{}", plan.duration());
+    }
+
+    /// Rests are named, and the motion rests at no other time.
+    #[test]
+    fn rests_are_named() {
+        let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+        let corner = [at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.1)];
+        let stops = check(&corner, 0.0);
+        assert_eq!(stops.fallbacks(), 1);
+        let rest = stops.rests()[0];
+        assert_eq!(rest.cause, RestCause::Stop);
+        assert_eq!(rest.time, stops.crossings()[0].time);
+        assert!(check(&corner, 1e-3).rests().is_empty());
+        // There and back on the same way, dense: it rests where it turns back, and nowhere else.
+        let back: Vec<_> = (0..=400)
+            .map(|i| f64::from(200_i32 - (i - 200_i32).abs()) * 1e-3)
+            .map(|x| at(x, 4.0 * x * x))
+            .collect();
+        let back = check(&back, 1e-4);
+        let causes: Vec<_> = back.rests().iter().map(|rest| rest.cause).collect();
+        assert_eq!(causes, [RestCause::TurnsBack]);
+        let speed = back.at(back.rests()[0].time).linear[0].norm();
+        assert!(speed < 1e-9, "{speed}");
     }
 
     /// Three legs and more, then a turn on the spot at the last point: a part of a leg without

@@ -32,6 +32,11 @@ impl Span {
         self.start + self.duration
     }
 
+    /// Whether neither the controlled point nor the tool moves at its start.
+    pub(crate) fn starts_at_rest(&self) -> bool {
+        self.point[1] == Vector3::zeros() && self.turns.iter().all(|turn| turn.angle[1] == 0.0)
+    }
+
     /// Lays the span elsewhere: what it says is seen from `frame` until now.
     pub(crate) fn place(&mut self, frame: &Isometry3<f64>) {
         for coefficient in &mut self.point {

@@ -3,13 +3,15 @@
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::certificate::certify;
-use super::choose::{Motion, Then, corners, from_motion, from_rest};
+use super::choose::{Then, Window, corners, from_rest};
 use super::crossing::{RESOLUTION, crossings};
 use super::exact_stop;
 use super::lower_bound::lower_bound;
 use super::method::Method;
+use super::motion::Motion;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
+use super::rest::RestCause;
 use super::span::Span;
 use super::spline::Moving;
 use crate::ToolPoint;
@@ -78,16 +80,12 @@ impl Windows {
     pub fn new(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<Self, SmoothError> {
         options.check(poses)?;
         let options = options.finite();
-        let empty = Motion {
-            spans: Vec::new(),
-            parts: Vec::new(),
-        };
         Ok(Self {
             poses: divided(poses, &options),
             given: poses.to_vec(),
             options,
-            done: empty.clone(),
-            tail: empty,
+            done: Motion::default(),
+            tail: Motion::default(),
             passed: 0,
             end: 0,
         })
@@ -96,34 +94,22 @@ impl Windows {
     /// Plans the next window; false when the whole list is planned.
     pub fn advance(&mut self) -> bool {
         if self.end + 1 >= self.poses.len() {
-            let tail = std::mem::replace(
-                &mut self.tail,
-                Motion {
-                    spans: Vec::new(),
-                    parts: Vec::new(),
-                },
-            );
-            self.done.append(tail);
+            self.done.join(std::mem::take(&mut self.tail));
             return false;
         }
-        let end = self.window(if self.tail.spans.is_empty() {
+        let from = if self.tail.spans.is_empty() {
+            self.done.rest(RestCause::Division);
             self.end
         } else {
             self.passed
-        });
+        };
+        let end = self.window(from);
         self.tail = self.plan(end);
         self.end = end;
         if end + 1 < self.poses.len() {
             self.commit();
         } else {
-            let tail = std::mem::replace(
-                &mut self.tail,
-                Motion {
-                    spans: Vec::new(),
-                    parts: Vec::new(),
-                },
-            );
-            self.done.append(tail);
+            self.done.join(std::mem::take(&mut self.tail));
         }
         true
     }
@@ -150,15 +136,8 @@ impl Windows {
 
     /// Plans what is left and certifies the whole.
     #[must_use]
-    pub fn finish(self) -> SmoothPlan {
-        let options = self.options.clone();
-        self.finish_for(&options)
-    }
-
-    /// Plans what is left and certifies the whole for wider tolerances.
-    pub(crate) fn finish_for(mut self, options: &SmoothOptions) -> SmoothPlan {
+    pub fn finish(mut self) -> SmoothPlan {
         while self.advance() {}
-        self.options = options.finite();
         let stop = exact_stop::plan(&self.given, &self.options.limits);
         let exact_stop = stop.last().map_or(0.0, Span::end);
         let bound = lower_bound(&self.given, &self.options);
@@ -169,6 +148,12 @@ impl Windows {
         }
         whole.0.lower_bound = bound;
         SmoothPlan::new(&self.given, self.done, whole, exact_stop)
+    }
+
+    /// Plans what is left; the whole, uncertified.
+    pub(crate) fn motion(mut self) -> Motion {
+        while self.advance() {}
+        self.done
     }
 
     /// Braking time from full speed, s.
@@ -228,23 +213,22 @@ impl Windows {
         if self.tail.spans.is_empty() {
             return from_rest(more, options, then);
         }
-        let most = self.tail.duration() + corners(more, options).duration();
         let moving = self.tail.spans.first().map(|span| Moving {
             state: span.at(0.0),
             spacing: span.duration,
         });
-        let ahead = moving.and_then(|moving| {
-            from_motion(
-                &self.poses[self.passed..=end],
-                options,
-                (&moving, then),
-                most,
-            )
-        });
-        ahead.unwrap_or_else(|| {
-            let mut motion = self.tail.clone();
-            motion.append(from_rest(more, options, then));
-            motion
+        let window = Window {
+            poses: &self.poses[self.passed..=end],
+            options,
+            moving: moving.as_ref(),
+            then,
+        };
+        let most = self.tail.duration() + corners(more, options).duration();
+        window.spline(None, most).unwrap_or_else(|| {
+            let mut known = self.tail.clone();
+            known.append(from_rest(more, options, then), RestCause::Division);
+            let through = window.spline(Some(&known.spans), known.duration());
+            through.unwrap_or(known)
         })
     }
 
@@ -273,14 +257,7 @@ impl Windows {
             }
         }
         let Some((cut, passed)) = best else {
-            let tail = std::mem::replace(
-                &mut self.tail,
-                Motion {
-                    spans: Vec::new(),
-                    parts: Vec::new(),
-                },
-            );
-            self.done.append(tail);
+            self.done.join(std::mem::take(&mut self.tail));
             self.passed = self.end;
             return;
         };
@@ -290,9 +267,14 @@ impl Windows {
             span.start -= offset;
         }
         let parts = vec![(Method::Spline, rest.len())];
-        let mut head = std::mem::replace(&mut self.tail, Motion { spans: rest, parts });
+        let rest = Motion {
+            spans: rest,
+            parts,
+            ..Motion::default()
+        };
+        let mut head = std::mem::replace(&mut self.tail, rest);
         head.parts = vec![(Method::Spline, head.spans.len())];
-        self.done.append(head);
+        self.done.join(head);
         self.passed = passed;
     }
 }

@@ -5,6 +5,9 @@ mod invariance;
 mod lists;
 mod random;
 
+#[path = "../suite/mod.rs"]
+mod sparse;
+
 use lists::suite;
 use trajectory::smooth::{Method, SmoothOptions, plan};
 

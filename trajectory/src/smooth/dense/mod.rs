@@ -6,8 +6,8 @@
 //! those of any smooth motion. Where the way turns back the motion rests, and where a fit fails the
 //! list is divided at the pose that it misses most.
 //!
-//! All this happens in the frame of the first pose and in one of both directions, so a list that is
-//! laid elsewhere or reversed has the same motion.
+//! All this happens in the normal form of the list, so a list that is laid elsewhere or reversed has
+//! the same motion.
 
 mod basis;
 mod chords;
@@ -20,9 +20,10 @@ mod time_parameter;
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::choose::Motion;
 use super::crossing::RESOLUTION;
+use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::rest::RestCause;
 use crate::line::{Line, body_turn};
 use chords::Chords;
 use places::Units;
@@ -38,8 +39,6 @@ const LEG: f64 = 1.0 / 16.0;
 const LONGEST: f64 = 4.0;
 /// Dense lists up to this length are planned in both ways.
 const BOTH: usize = 64;
-/// Relative difference of leg lengths below which they tell no direction.
-const EVEN: f64 = 1e-6;
 
 /// A motion from rest in the first pose to rest in the last, through a dense list; `None` for other
 /// lists, and where a limit is missing. The options are finite.
@@ -49,39 +48,24 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
     if !limited || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
         return None;
     }
-    let frame = given[0];
-    let mut poses: Vec<Isometry3<f64>> = given.iter().map(|pose| frame.inv_mul(pose)).collect();
-    let backwards = is_better_reversed(&poses);
-    if backwards {
-        poses.reverse();
-        let last = poses[0].inverse();
-        poses.iter_mut().for_each(|pose| *pose = last * *pose);
-    }
-    let poses = moved(&poses);
+    let poses = moved(given);
     if !is_dense(&poses, options) {
         return None;
     }
     let far = |pair: &[Isometry3<f64>]| {
         body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION
     };
-    let mut motion = if !poses.windows(2).any(far) {
-        sections::<3>(&poses, options)?
+    if !poses.windows(2).any(far) {
+        sections::<3>(&poses, options)
     } else if options.angular_tolerance() > 1e3 * RESOLUTION {
-        sections::<7>(&poses, options)?
+        sections::<7>(&poses, options)
     } else {
-        return None;
-    };
-    let start = if backwards {
-        given[given.len() - 1]
-    } else {
-        frame
-    };
-    motion.spans.iter_mut().for_each(|span| span.place(&start));
-    Some(if backwards { motion.reversed() } else { motion })
+        None
+    }
 }
 
 /// Whether most legs are short beside the way of braking.
-fn is_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+pub(super) fn is_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
     let short = |pair: &&[Isometry3<f64>]| leg(pair, options) <= LEG;
     poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
 }
@@ -99,16 +83,6 @@ fn leg(pair: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
     let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
     let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
     (way / limits.speed).max(turn / limits.angular_speed) / brake
-}
-
-/// Whether the list is the other one of the two that are the same way there and back: the one that
-/// begins with the longer leg, of the first two that differ seen from both ends.
-fn is_better_reversed(poses: &[Isometry3<f64>]) -> bool {
-    let last = poses.len() - 1;
-    let leg = |i: usize| (poses[i + 1].translation.vector - poses[i].translation.vector).norm();
-    let pairs = (0..last / 2).map(|i| (leg(i), leg(last - 1 - i)));
-    let mut apart = pairs.filter(|(a, b)| (a - b).abs() > EVEN * (a + b));
-    apart.next().is_some_and(|(first, other)| first < other)
 }
 
 /// The poses without repeats, and with more of them where the tool turns far.
@@ -138,13 +112,11 @@ fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -
     let units = Units::new(options);
     let points = units.points::<D>(poses);
     let turning = Chords::new(&points).turning_points(&points);
-    let mut motion = Motion {
-        spans: Vec::new(),
-        parts: Vec::new(),
-    };
+    let mut motion = Motion::default();
     let mut from = 0;
     for to in turning.into_iter().chain([poses.len() - 1]) {
-        motion.append(Section::<D>::new(&poses[from..=to], options, units).motion()?);
+        let section = Section::<D>::new(&poses[from..=to], options, units);
+        motion.append(section.motion()?, RestCause::TurnsBack);
         from = to;
     }
     Some(motion)

@@ -9,10 +9,12 @@ use super::places::Units;
 use super::spans;
 use super::time_parameter::TimeParameter;
 use crate::smooth::certificate::{Certificate, certify};
-use crate::smooth::choose::{Motion, Then, corners, from_rest, stretch};
+use crate::smooth::choose::{Then, corners, from_rest, stretch};
 use crate::smooth::crossing::Crossing;
 use crate::smooth::method::Method;
+use crate::smooth::motion::Motion;
 use crate::smooth::options::SmoothOptions;
+use crate::smooth::rest::RestCause;
 use crate::smooth::span::Span;
 use crate::timing::Timed;
 use crate::{Boundary, JointLimits, TimingOptions, ToolLimits, time_path};
@@ -36,8 +38,13 @@ const FEW: usize = 12;
 const DEPTH: usize = 10;
 /// Poses around one that was missed whose balls become smaller.
 const NEAR: usize = 3;
-/// A ratio to a limit up to this is met by stretching time; more is not worth it.
+/// A ratio to a limit up to this is met by stretching time; for more a law is computed again with
+/// limits that are lower by the ratio, and by this factor, but not below this share.
 const STRETCH: f64 = 1.15;
+const LOWER: f64 = 0.98;
+const LEAST: f64 = 0.2;
+/// Factors on the number of knots, one after the other until a fit succeeds.
+const DENSITIES: [f64; 3] = [1.0, 1.6, 2.6];
 
 /// A part of a dense list that begins and ends at rest.
 #[derive(Clone, Copy, Debug)]
@@ -87,10 +94,7 @@ impl<'a, const D: usize> Section<'a, D> {
             return Some(corners(self.poses, self.options));
         }
         match self.fitted() {
-            Ok(spans) => {
-                let parts = vec![(Method::Fit, spans.len())];
-                Some(Motion { spans, parts })
-            }
+            Ok(motion) => Some(motion),
             Err(Failure::TooFast) => None,
             Err(_) if last < FEW => Some(from_rest(self.poses, self.options, Then::More)),
             Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
@@ -102,18 +106,18 @@ impl<'a, const D: usize> Section<'a, D> {
                     ..self
                 };
                 let mut motion = part(&self.poses[..=at]).motion()?;
-                motion.append(part(&self.poses[at..]).motion()?);
+                motion.append(part(&self.poses[at..]).motion()?, RestCause::Division);
+                motion.eased = true;
                 Some(motion)
             }
         }
     }
 
-    /// Certified spans along one curve.
-    fn fitted(&self) -> Result<Vec<Span>, Failure> {
-        let points = self.units.points::<D>(self.poses);
-        let mut radii = vec![1.0; points.len()];
-        let limits = self.limits();
-        let mut best = self.timed(&Chords::new(&points).parameters(&points), &radii, &limits)?;
+    /// A certified motion along one curve.
+    fn fitted(&self) -> Result<Motion, Failure> {
+        let (mut radii, mut eased) = (vec![1.0; self.poses.len()], false);
+        let mut limits = self.limits();
+        let mut best = self.first(&radii, &limits)?;
         for _ in 0..REFITS {
             let before = best.timed.certificate.duration;
             let next = self.timed(&self.time_parameters(&best), &radii, &limits);
@@ -128,7 +132,7 @@ impl<'a, const D: usize> Section<'a, D> {
                 break;
             }
         }
-        let mut worst = self.poses.len() / 2;
+        let mut failure = Failure::Missed(self.poses.len() / 2);
         for _ in 0..ATTEMPTS {
             let mut spans = self.spans(&best);
             let (mut certificate, mut crossings) = certify(&spans, self.poses, self.options);
@@ -138,17 +142,38 @@ impl<'a, const D: usize> Section<'a, D> {
                 (certificate, crossings) = certify(&spans, self.poses, self.options);
             }
             if certificate.holds() {
-                return Ok(spans);
+                return Ok(Motion {
+                    eased,
+                    ..Motion::new(spans, Method::Fit)
+                });
             }
             if certificate.worst_limit() > STRETCH {
-                return Err(Failure::TooFast);
+                (failure, eased) = (Failure::TooFast, true);
+                lower(&mut limits, &certificate);
+                best.timed = self.law(&best.curve, &limits)?;
+                continue;
             }
-            worst = self
-                .narrow(&mut radii, &certificate, &crossings)
-                .unwrap_or(worst);
+            if let Some(worst) = self.narrow(&mut radii, &certificate, &crossings) {
+                failure = Failure::Missed(worst);
+            }
             best = self.timed(&best.curve.fit.parameters, &radii, &limits)?;
         }
-        Err(Failure::Missed(worst))
+        Err(failure)
+    }
+
+    /// A first curve with its law; the knots are closer together if that fails.
+    fn first(&self, radii: &[f64], limits: &ToolLimits) -> Result<TimedCurve<D>, Failure> {
+        let points = self.units.points::<D>(self.poses);
+        let parameters = Chords::new(&points).parameters(&points);
+        let mut failure = Failure::Missed(self.poses.len() / 2);
+        for density in DENSITIES {
+            let closer = scaled(&parameters, density);
+            match self.timed(&closer, radii, limits) {
+                Ok(curve) => return Ok(curve),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
     }
 
     /// The limits of the tool that rule the time law.
@@ -173,22 +198,25 @@ impl<'a, const D: usize> Section<'a, D> {
         let points = self.units.points::<D>(self.poses);
         let fit = Fit::new(&points, parameters, radii).map_err(Failure::Missed)?;
         let curve = Curve::new(fit, self.units, &self.poses[0]);
+        let timed = self.law(&curve, limits)?;
+        Ok(TimedCurve { curve, timed })
+    }
+
+    /// The fastest law of a curve.
+    fn law(&self, curve: &Curve<D>, limits: &ToolLimits) -> Result<Timed<1>, Failure> {
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
             ..TimingOptions::default()
         };
         let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        match time_path(&curve, &free, limits, &options) {
-            Ok(timed) => Ok(TimedCurve { curve, timed }),
-            Err(_) => Err(Failure::Missed(self.poses.len() / 2)),
-        }
+        time_path(curve, &free, limits, &options).map_err(|_| Failure::Missed(self.poses.len() / 2))
     }
 
     /// Parameters for the poses that run like the time of a law.
     fn time_parameters(&self, best: &TimedCurve<D>) -> Vec<f64> {
         let ramp = self.options.limits.acceleration / self.options.limits.jerk;
-        TimeParameter::new(&best.curve, &best.timed.law, (ramp, ramp / FIT_KNOTS))
+        TimeParameter::new(&best.curve, &best.timed.law, ramp, FIT_KNOTS)
             .map(&best.curve.fit.parameters)
     }
 
@@ -235,4 +263,30 @@ impl<'a, const D: usize> Section<'a, D> {
         }
         worst.map(|(_, index)| index)
     }
+}
+
+/// Lowers the limits that a motion exceeds.
+fn lower(limits: &mut ToolLimits, certificate: &Certificate) {
+    for (limit, peak) in [
+        (&mut limits.speed, certificate.speed),
+        (&mut limits.acceleration, certificate.acceleration),
+        (&mut limits.jerk, certificate.jerk),
+        (&mut limits.angular_speed, certificate.angular_speed),
+        (
+            &mut limits.angular_acceleration,
+            certificate.angular_acceleration,
+        ),
+        (&mut limits.angular_jerk, certificate.angular_jerk),
+    ] {
+        if peak.ratio > 1.0 {
+            *limit *= (LOWER / peak.ratio).max(LEAST);
+        }
+    }
+}
+
+/// Parameters that have so many times the knots.
+fn scaled(parameters: &[f64], density: f64) -> Vec<f64> {
+    let end = parameters.last().copied().unwrap_or(1.0);
+    let factor = (density * end).round() / end;
+    parameters.iter().map(|x| x * factor).collect()
 }

@@ -21,13 +21,14 @@ pub(super) struct TimeParameter {
 }
 
 impl TimeParameter {
-    /// From a curve and its law, averaged over `ramp` (s), with `spacing` (s) from one unit to the
-    /// next. From either end, where the law rests, to the first place where it is fastest, the
+    /// From a curve and its law, averaged over a ramp of the acceleration, `ramp` (s), with so many
+    /// knots in one. From either end, where the law rests, to the first place where it is fastest, the
     /// speed of that place counts: a curve whose parameter rests would have no direction.
     pub(super) fn new<const D: usize>(
         curve: &Curve<D>,
         law: &Trajectory<1>,
-        (ramp, spacing): (f64, f64),
+        ramp: f64,
+        knots: f64,
     ) -> Self {
         let total = law.duration();
         let half = SAMPLES / 2;
@@ -59,7 +60,7 @@ impl TimeParameter {
             let slow = 0.5 * (1.0 / speed[k] + 1.0 / speed[k + 1]);
             to.push(to[k] + (way[k + 1] - way[k]) * slow);
         }
-        let whole = (to[steps] / spacing).round().max(FEWEST);
+        let whole = (knots * to[steps] / ramp).round().max(FEWEST);
         let scale = whole / to[steps];
         to.iter_mut().for_each(|x| *x *= scale);
         to[steps] = whole;

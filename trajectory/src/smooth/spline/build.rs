@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::basis::{self, START};
+use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
 use super::solve::{Effort, solve};
 use super::start;
@@ -41,6 +42,8 @@ pub(crate) struct Request<'a> {
     /// True: the orientation is part of the optimum. False: it follows the
     /// progress of the controlled point, which is faster to plan.
     pub(crate) coupled: bool,
+    /// A motion from the same start through the same poses that holds, to start the search from.
+    pub(crate) known: Option<&'a [Span]>,
 }
 
 impl Request<'_> {
@@ -196,12 +199,45 @@ impl Task<'_> {
             scale: 1.0,
             anchor: None,
         };
-        let spread = self
-            .moving
-            .map(|_| self.request.effort.spread.unwrap_or(1.0));
-        let mut point = start::first(&mut problem, spread);
-        solve::<D, B>(&mut problem, &mut point, self.request.effort)?;
+        let mut effort = self.request.effort;
+        let mut point = match self.request.known {
+            Some(spans) => {
+                effort.spread = None;
+                self.known(&mut problem, spans, used)
+            }
+            None => {
+                let spread = self.moving.map(|_| effort.spread.unwrap_or(1.0));
+                start::first(&mut problem, spread)
+            }
+        };
+        solve::<D, B>(&mut problem, &mut point, effort)?;
         Some(self.spans(&problem, &point, used))
+    }
+
+    /// First iterate from a known motion.
+    fn known<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        spans: &[Span],
+        used: [bool; 2],
+    ) -> Point<D> {
+        let known = Known::new(spans, self.poses, &self.vectors, self.options);
+        problem.scale = match self.moving {
+            Some(moving) => moving.spacing,
+            None => known.spacing(problem),
+        };
+        let (control, crossings) = known.control(problem.scale, self.moving.is_some());
+        let control = control.iter().map(|[p, r]| self.pack(used, p, r));
+        let mut point = Point {
+            control: control.collect(),
+            z: 1.0,
+            crossings,
+        };
+        let goal = problem.vertices[problem.vertices.len() - 1];
+        for c in point.control.iter_mut().rev().take(4) {
+            *c = goal;
+        }
+        point
     }
 
     /// Spans of a solution.

@@ -9,6 +9,7 @@
 mod band;
 mod basis;
 mod build;
+mod known;
 mod newton;
 mod problem;
 mod project;

@@ -146,11 +146,15 @@ impl<const D: usize, const B: usize> System<D, B> {
         self.band.clear();
         self.sides.fill([0.0; 2]);
         (self.gradient_z, self.hessian_z) = (t, 0.0);
-        Build::detect().run(Norms {
-            system: self,
+        let at = Iterate {
             problem,
             point,
             room,
+            pinned: problem.pinned(point.z),
+        };
+        Build::detect().run(Norms {
+            system: self,
+            at: &at,
         });
         self.balls(problem, point, room);
         self.solve()
@@ -190,20 +194,90 @@ impl<const D: usize, const B: usize> System<D, B> {
         })
     }
 
+    /// Speed, acceleration and jerk of one group.
+    #[inline(always)]
+    fn limits<S: Four>(&mut self, simd: S, at: &Iterate<'_, D>, g: usize) {
+        let last = at.point.control.len() - 1;
+        let caps = [1, 2, 3].map(|k| at.problem.cap(g, k, at.point.z, at.room));
+        for k in 0..last {
+            self.norm(simd, at, &Sum::new(k, &FIRST, g), &caps[0]);
+            if k + 2 <= last {
+                self.norm(simd, at, &Sum::new(k, &SECOND, g), &caps[1]);
+            }
+            if k + 3 <= last {
+                self.norm(simd, at, &Sum::new(k, &THIRD, g), &caps[2]);
+            }
+        }
+    }
+
+    /// One term `-log(R(z)^2 - |y|^2)`, `y` a difference of control points.
+    #[inline(always)]
+    fn norm<S: Four, const M: usize>(
+        &mut self,
+        simd: S,
+        at: &Iterate<'_, D>,
+        sum: &Sum<'_, M>,
+        [r, r1, r2]: &[f64; 3],
+    ) {
+        let Sum { first, w, g } = *sum;
+        let y = at.point.sum(first, w, g);
+        let slack = 1.0 / (r * r - square(&y));
+        let gradient = y.map(|x| 2.0 * x * slack);
+        let hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+        let cross = -4.0 * r * r1 * slack * slack;
+        let mut border = y.map(|x| x * cross);
+        self.gradient_z -= 2.0 * r * r1 * slack;
+        self.hessian_z += -2.0 * (r1 * r1 + r * r2) * slack + (2.0 * r * r1 * slack).powi(2);
+        if first < 4 {
+            // The pinned control points move with z.
+            let mut slide = [0.0; 3];
+            for (weight, pin) in w.iter().zip(&at.pinned[first..]) {
+                for d in 0..3 {
+                    slide[d] += weight * pin[1][3 * g + d];
+                }
+            }
+            for d in 0..3 {
+                let bent: f64 = (0..3).map(|e| hessian[d][e] * slide[e]).sum();
+                self.gradient_z += gradient[d] * slide[d];
+                self.hessian_z += slide[d] * (2.0 * border[d] + bent);
+                border[d] += bent;
+            }
+        }
+        self.add(simd, sum, [&gradient, &border], &hessian);
+    }
+
+    /// Corridor samples of one group.
+    #[inline(always)]
+    fn corridor<S: Four>(&mut self, simd: S, at: &Iterate<'_, D>, g: usize) {
+        let (problem, point, room) = (at.problem, at.point, at.room);
+        for k in 0..point.samples() {
+            let foot = problem.nearest(&point.sample(k, g), room.legs[k], g);
+            let (y, slide) = (foot.offset, problem.slide(&foot, g));
+            let width = room.widths[g][k];
+            let slack = 1.0 / (width * width - square(&y));
+            let gradient = y.map(|x| 2.0 * x * slack);
+            let mut hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+            for a in 0..3 {
+                for b in 0..3 {
+                    hessian[a][b] -= 2.0 * slack * slide[a] * slide[b];
+                }
+            }
+            let (first, w) = sample_weights(k);
+            let sum = Sum::new(first, w, g);
+            self.add(simd, &sum, [&gradient, &[0.0; 3]], &hessian);
+        }
+    }
+
     /// Adds a term in the weighted sum of consecutive control points.
     #[inline(always)]
     fn add<S: Four, const M: usize>(
         &mut self,
         simd: S,
-        sum: WeightedSum<'_, M>,
+        sum: &Sum<'_, M>,
         [gradient, border]: [&[f64; 3]; 2],
         h: &[[f64; 3]; 3],
     ) {
-        let WeightedSum {
-            first,
-            weights: w,
-            group: g,
-        } = sum;
+        let Sum { first, w, g } = *sum;
         // Columns of the symmetric block, whole and from the diagonal on.
         let whole = [0, 1, 2].map(|b| simd.load(&[h[b][0], h[b][1], h[b][2], 0.0]));
         let second = simd.load(&[h[1][1], h[1][2], 0.0, 0.0]);
@@ -302,12 +376,34 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 }
 
-/// The terms of limits and corridors of a system.
-struct Norms<'a, const D: usize, const B: usize> {
-    system: &'a mut System<D, B>,
+/// An iterate with what the terms of its barrier need.
+struct Iterate<'a, const D: usize> {
     problem: &'a Problem<D>,
     point: &'a Point<D>,
     room: &'a Room,
+    /// The control points that the start fixes, and their derivatives to `z`.
+    pinned: [[[f64; D]; 2]; 4],
+}
+
+/// A weighted sum of consecutive control points, of the coordinates of one group.
+#[derive(Clone, Copy)]
+struct Sum<'a, const M: usize> {
+    first: usize,
+    w: &'a [f64; M],
+    g: usize,
+}
+
+impl<'a, const M: usize> Sum<'a, M> {
+    #[inline(always)]
+    fn new(first: usize, w: &'a [f64; M], g: usize) -> Self {
+        Self { first, w, g }
+    }
+}
+
+/// The terms of limits and corridors of a system.
+struct Norms<'a, const D: usize, const B: usize> {
+    system: &'a mut System<D, B>,
+    at: &'a Iterate<'a, D>,
 }
 
 impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
@@ -315,114 +411,11 @@ impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) {
-        let mut norms = self;
         for g in 0..Problem::<D>::GROUPS {
-            norms.limits(simd, g);
-            if norms.problem.groups[g].width.is_finite() {
-                norms.corridor(simd, g);
+            self.system.limits(simd, self.at, g);
+            if self.at.problem.groups[g].width.is_finite() {
+                self.system.corridor(simd, self.at, g);
             }
-        }
-    }
-}
-
-impl<const D: usize, const B: usize> Norms<'_, D, B> {
-    /// Speed, acceleration and jerk of one group.
-    #[inline(always)]
-    fn limits<S: Four>(&mut self, simd: S, g: usize) {
-        let (problem, point) = (self.problem, self.point);
-        let pinned = problem.pinned(point.z);
-        let last = point.control.len() - 1;
-        let caps = [1, 2, 3].map(|k| problem.cap(g, k, point.z, self.room));
-        for k in 0..last {
-            self.norm(simd, &pinned, WeightedSum::new(k, &FIRST, g), &caps[0]);
-            if k + 2 <= last {
-                self.norm(simd, &pinned, WeightedSum::new(k, &SECOND, g), &caps[1]);
-            }
-            if k + 3 <= last {
-                self.norm(simd, &pinned, WeightedSum::new(k, &THIRD, g), &caps[2]);
-            }
-        }
-    }
-
-    /// One term `-log(R(z)^2 - |y|^2)`, `y` a difference of control points.
-    #[inline(always)]
-    fn norm<S: Four, const M: usize>(
-        &mut self,
-        simd: S,
-        pinned: &[[[f64; D]; 2]; 4],
-        sum: WeightedSum<'_, M>,
-        [r, r1, r2]: &[f64; 3],
-    ) {
-        let WeightedSum {
-            first,
-            weights: w,
-            group: g,
-        } = sum;
-        let system = &mut *self.system;
-        let y = self.point.sum(first, w, g);
-        let slack = 1.0 / (r * r - square(&y));
-        let gradient = y.map(|x| 2.0 * x * slack);
-        let hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
-        let cross = -4.0 * r * r1 * slack * slack;
-        let mut border = y.map(|x| x * cross);
-        system.gradient_z -= 2.0 * r * r1 * slack;
-        system.hessian_z += -2.0 * (r1 * r1 + r * r2) * slack + (2.0 * r * r1 * slack).powi(2);
-        if first < 4 {
-            // The pinned control points move with z.
-            let mut slide = [0.0; 3];
-            for (weight, pin) in w.iter().zip(&pinned[first..]) {
-                for d in 0..3 {
-                    slide[d] += weight * pin[1][3 * g + d];
-                }
-            }
-            for d in 0..3 {
-                let bent: f64 = (0..3).map(|e| hessian[d][e] * slide[e]).sum();
-                system.gradient_z += gradient[d] * slide[d];
-                system.hessian_z += slide[d] * (2.0 * border[d] + bent);
-                border[d] += bent;
-            }
-        }
-        system.add(simd, sum, [&gradient, &border], &hessian);
-    }
-
-    /// Corridor samples of one group.
-    #[inline(always)]
-    fn corridor<S: Four>(&mut self, simd: S, g: usize) {
-        let (problem, point, room) = (self.problem, self.point, self.room);
-        for k in 0..point.samples() {
-            let foot = problem.nearest(&point.sample(k, g), room.legs[k], g);
-            let (y, slide) = (foot.offset, problem.slide(&foot, g));
-            let width = room.widths[g][k];
-            let slack = 1.0 / (width * width - square(&y));
-            let gradient = y.map(|x| 2.0 * x * slack);
-            let mut hessian = outer(&y, 2.0 * slack, 4.0 * slack * slack);
-            for a in 0..3 {
-                for b in 0..3 {
-                    hessian[a][b] -= 2.0 * slack * slide[a] * slide[b];
-                }
-            }
-            let (first, w) = sample_weights(k);
-            let sum = WeightedSum::new(first, &w, g);
-            self.system.add(simd, sum, [&gradient, &[0.0; 3]], &hessian);
-        }
-    }
-}
-
-/// A weighted sum of consecutive control points: those of one group from `first` on.
-#[derive(Clone, Copy)]
-struct WeightedSum<'a, const M: usize> {
-    first: usize,
-    weights: &'a [f64; M],
-    group: usize,
-}
-
-impl<'a, const M: usize> WeightedSum<'a, M> {
-    #[inline(always)]
-    fn new(first: usize, weights: &'a [f64; M], group: usize) -> Self {
-        Self {
-            first,
-            weights,
-            group,
         }
     }
 }

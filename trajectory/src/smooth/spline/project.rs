@@ -10,6 +10,24 @@ const WIDEN: f64 = 1.03;
 /// Fraction of a bound up to which it need not be widened.
 const CLEAR: f64 = 0.99;
 
+/// The same in the first spans after a start in motion, so many: there an iterate can be no farther
+/// inside than the start is.
+const BESIDE: f64 = 1.0 - 1e-6;
+const FIRST_SPANS: f64 = 8.0;
+
+/// The fraction at a time in knots.
+fn clear(moving: bool, time: f64) -> f64 {
+    if moving && time < FIRST_SPANS {
+        BESIDE
+    } else {
+        CLEAR
+    }
+}
+
+/// The same for speed, acceleration and jerk, and what a start in motion may reach of them.
+const NEAR_CAP: f64 = 0.9999;
+const FIXED: f64 = 1.0 - 1e-6;
+
 /// First corridor samples of a start in motion, and their width: they cannot be moved, and are in
 /// the corridor, but not always as far inside as the others.
 const EASED: usize = 8;
@@ -96,20 +114,34 @@ pub(crate) fn miss<const D: usize>(
 
 /// Greatest ratio of the differences of order 1 to 3 to their bounds, by group.
 pub(crate) fn ratios<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[f64; 3]; 2] {
-    let mut worst = [[0.0_f64; 3]; 2];
-    let (last, h) = (point.control.len() - 1, problem.spacing(point.z));
-    for g in 0..Problem::<D>::GROUPS {
-        for k in 0..last {
-            worst[g][0] = worst[g][0].max(square(&point.sum(k, &FIRST, g)));
-            if k + 2 <= last {
-                worst[g][1] = worst[g][1].max(square(&point.sum(k, &SECOND, g)));
+    let all = ratios_of(problem, point);
+    [0, 1].map(|g| [0, 1, 2].map(|k| all[g][k][0].max(all[g][k][1])))
+}
+
+/// Control points that the start fixes.
+const PINNED: usize = 4;
+
+/// The same ratios, of differences of fixed control points only and of all others.
+fn ratios_of<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[[f64; 2]; 3]; 2] {
+    let mut worst = [[[0.0_f64; 2]; 3]; 2];
+    let (count, h) = (point.control.len(), problem.spacing(point.z));
+    for (g, worst) in worst.iter_mut().enumerate().take(Problem::<D>::GROUPS) {
+        let mut raise = |order: usize, first: usize, value: f64| {
+            let slot = &mut worst[order - 1][usize::from(first + order >= PINNED)];
+            *slot = slot.max(value);
+        };
+        for k in 0..count - 1 {
+            raise(1, k, square(&point.sum(k, &FIRST, g)));
+            if k + 2 < count {
+                raise(2, k, square(&point.sum(k, &SECOND, g)));
             }
-            if k + 3 <= last {
-                worst[g][2] = worst[g][2].max(square(&point.sum(k, &THIRD, g)));
+            if k + 3 < count {
+                raise(3, k, square(&point.sum(k, &THIRD, g)));
             }
         }
-        for k in 0..3 {
-            worst[g][k] = worst[g][k].sqrt() / (problem.groups[g].caps[k] * h.powi(k as i32 + 1));
+        for (k, both) in worst.iter_mut().enumerate() {
+            let bound = problem.groups[g].caps[k] * h.powi(k as i32 + 1);
+            *both = both.map(|square| square.sqrt() / bound);
         }
     }
     worst
@@ -136,7 +168,7 @@ impl Room {
         point: &Point<D>,
     ) -> bool {
         let mut tight = true;
-        for (g, ratios) in ratios(problem, point)
+        for (g, ratios) in ratios_of(problem, point)
             .iter()
             .enumerate()
             .take(Problem::<D>::GROUPS)
@@ -145,7 +177,12 @@ impl Room {
             let radius = problem.groups[g].radius;
             for i in 0..point.crossings.len() {
                 let far = miss(problem, point, i, g);
-                self.balls[g][i] = narrowed(self.balls[g][i], far, radius, CLEAR);
+                self.balls[g][i] = narrowed(
+                    self.balls[g][i],
+                    far,
+                    radius,
+                    clear(problem.moving(), point.crossings[i]),
+                );
                 tight &= self.balls[g][i] <= radius;
             }
         }
@@ -155,12 +192,18 @@ impl Room {
         tight
     }
 
-    fn tighten_caps(&mut self, ratios: &[f64; 3], g: usize) -> bool {
+    /// A start in motion may be as close to a limit as rounding allows, and stays there: only the
+    /// other control points have to be well inside.
+    fn tighten_caps(&mut self, ratios: &[[f64; 2]; 3], g: usize) -> bool {
         let mut tight = true;
-        for k in 0..3 {
-            // A start in motion may be close to a limit, and stays there.
-            self.caps[g][k] = narrowed(self.caps[g][k], ratios[k], 1.0, 0.9999);
-            tight &= self.caps[g][k] <= 1.0;
+        for (cap, [fixed, free]) in self.caps[g].iter_mut().zip(ratios) {
+            let value = if *fixed < FIXED {
+                *free
+            } else {
+                fixed.max(*free)
+            };
+            *cap = narrowed(*cap, value, 1.0, NEAR_CAP);
+            tight &= *cap <= 1.0;
         }
         tight
     }
@@ -195,7 +238,8 @@ impl Room {
                     1.0
                 };
                 let width = eased * problem.groups[g].width;
-                self.widths[g][k] = narrowed(self.widths[g][k], far, width, CLEAR);
+                self.widths[g][k] =
+                    narrowed(self.widths[g][k], far, width, clear(problem.moving(), time));
                 tight &= self.widths[g][k] <= width;
             }
         }

@@ -38,6 +38,12 @@ const LOW: f64 = 100.0;
 /// narrowing is large.
 const PATIENCE: usize = 4;
 
+/// More steps for a start in motion that a first iterate does not keep up with.
+const ANCHORED: usize = 40;
+
+/// Square of the Newton decrement that is near enough to a centre on the way to a first valid motion.
+const ROUGHLY: f64 = 30.0;
+
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
 
@@ -59,7 +65,12 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let (mut short, mut freed) = (0, false);
-    for count in 0..effort.steps {
+    let more = if problem.anchor.is_some() {
+        ANCHORED
+    } else {
+        0
+    };
+    for count in 0..effort.steps + more {
         since += 1;
         if tight || since > PATIENCE {
             tight = room.tighten(problem, point);
@@ -69,7 +80,8 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             point.z = problem.anchor.take().unwrap_or(point.z);
         }
         let done = tight && problem.anchor.is_none();
-        if !done && count >= effort.search {
+        // An iterate that is inside goes on until it is as fast as its start.
+        if !tight && count >= effort.search {
             return None;
         }
         let Some(step) = system.step(problem, point, &room, weight) else {
@@ -85,7 +97,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         if short == STUCK && !freed {
             (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
         }
-        let centred = step.decrement < 3.0;
+        let centred = step.decrement < if done { 3.0 } else { ROUGHLY };
         if !moved || centred {
             let least = (point.z - parameter / weight).max(0.0);
             if done && point.spans() as f64 * problem.spacing(least) > effort.most {
@@ -107,7 +119,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             }
         }
     }
-    (tight && problem.anchor.is_none()).then_some(effort.steps)
+    (tight && problem.anchor.is_none()).then_some(effort.steps + more)
 }
 
 /// Moves a first iterate to a point from which the descent can begin.

@@ -7,7 +7,7 @@ use super::problem::{Point, Problem, square};
 const SHARE: f64 = 0.6;
 
 /// Knot intervals in one time `A / J`.
-const KNOTS_PER_RAMP: f64 = 6.0;
+pub(super) const KNOTS_PER_RAMP: f64 = 6.0;
 
 /// Control points over which the offset of a start in motion fades out.
 const FADE: f64 = 16.0;
@@ -17,8 +17,8 @@ const ROUNDS: usize = 12;
 const HELD: f64 = 0.3;
 
 /// Least and most spans of one spline.
-const FEWEST: f64 = 12.0;
-const MOST: f64 = 700.0;
+pub(super) const FEWEST: f64 = 12.0;
+pub(super) const MOST: f64 = 700.0;
 
 /// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;
@@ -80,7 +80,7 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64
     let mut rates = junctions(problem, &legs, coarse);
     rates[0] = start[1];
     look_ahead(&legs, &mut rates);
-    let schedule = schedule(&legs, &rates, start);
+    let schedule = schedule(&legs, &rates, start[0]);
     let smoothing = ramp.min(0.5 * schedule.duration / (schedule.dips + 1) as f64);
     let total = schedule.duration + smoothing;
     let finest = total / (8 * (schedule.dips + 1)) as f64;
@@ -106,12 +106,13 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64
         0.5 * smoothing + 1.5 * problem.scale
     };
     let slower = spread.unwrap_or(1.0);
-    place(
-        problem,
-        &legs,
-        &schedule,
-        [spans as f64, lead, smoothing, slower],
-    )
+    let pace = Pace {
+        spans,
+        lead,
+        smoothing,
+        slower,
+    };
+    place(problem, &legs, &schedule, &pace)
 }
 
 /// Lowers the knot spacing until the pinned control points of a start in motion
@@ -238,7 +239,7 @@ fn look_ahead<const D: usize>(legs: &[Leg<D>], rates: &mut [f64]) {
     }
 }
 
-fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], [skip, _]: [f64; 2]) -> Schedule {
+fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], skip: f64) -> Schedule {
     let mut result = Schedule {
         records: Vec::with_capacity(3 * legs.len()),
         dips: 0,
@@ -278,16 +279,30 @@ fn schedule<const D: usize>(legs: &[Leg<D>], rates: &[f64], [skip, _]: [f64; 2])
     result
 }
 
-/// Control points at the smoothed progress; `[spans, lead, smoothing, slower]`.
+/// How control points follow a schedule.
+struct Pace {
+    spans: usize,
+    /// Time before it begins, s.
+    lead: f64,
+    /// Time over which progress is averaged, s.
+    smoothing: f64,
+    /// Factor on its time.
+    slower: f64,
+}
+
+/// Control points at the smoothed progress.
 fn place<const D: usize>(
     problem: &Problem<D>,
     legs: &[Leg<D>],
     schedule: &Schedule,
-    [spans, lead, smoothing, slower]: [f64; 4],
+    pace: &Pace,
 ) -> Point<D> {
-    let knots = spans as usize + 4;
+    let knots = pace.spans + 4;
     let h = problem.scale;
-    let progress = |k: usize| schedule.smooth(((k as f64 - 1.5) * h - lead) / slower, smoothing);
+    let progress = |k: usize| {
+        let time = ((k as f64 - 1.5) * h - pace.lead) / pace.slower;
+        schedule.smooth(time, pace.smoothing)
+    };
     let mut ends = vec![0.0];
     for leg in legs {
         ends.push(ends[ends.len() - 1] + leg.length);
@@ -321,7 +336,7 @@ fn place<const D: usize>(
         };
         point
             .crossings
-            .push((k as f64 + share - 1.5).clamp(0.0, spans));
+            .push((k as f64 + share - 1.5).clamp(0.0, pace.spans as f64));
     }
     blend_in(problem, &mut point);
     for c in point.control.iter_mut().rev().take(4) {
