@@ -41,7 +41,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The least time from rest to rest of the slowest joint, s.
-    fn least_of_joints(&self, start: &SVector<f64, N>, end: &SVector<f64, N>) -> f64 {
+    pub(super) fn least_of_joints(&self, start: &SVector<f64, N>, end: &SVector<f64, N>) -> f64 {
         let (way, limits) = ((end - start).abs(), self.limits());
         let time = |j: usize| {
             let all = [limits.velocity[j], limits.acceleration[j], limits.jerk[j]];

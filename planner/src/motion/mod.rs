@@ -21,6 +21,7 @@ mod motion_error;
 mod reach;
 mod screw;
 mod singular;
+mod soonest;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
