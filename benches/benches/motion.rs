@@ -2,13 +2,20 @@
 //! optimum. Budget: 2 ms for 3 poses, 5 ms for 5, 2.5 ms per pose in windows, 2 % of the motion
 //! time.
 //!
+//! Then random moves of two robots: the processor time of planning. Budget of MoveTo: 1.5 ms (median)
+//! and 5 ms (p99) with six joints, 3 and 10 ms with seven; of straight moves 1.5 and 3 ms. With the
+//! argument `moves` these alone, with one line for each move: how long it is, and how long it is
+//! planned.
+//!
 //! The reference is the minimum time found by IPOPT for piecewise constant
 //! jerk in a tube of the tolerance, same limits (500 mm/s, 5000 mm/s2,
 //! 1e5 mm/s3), computed once outside of this repository.
 #![allow(missing_docs, clippy::print_stdout, reason = "a benchmark prints")]
 
+use measure::RandomMoves;
 use measure::smooth::measure;
 use nalgebra::Isometry3;
+use planner::task::Shape;
 use trajectory::ToolLimits;
 use trajectory::smooth::{SmoothOptions, Windows};
 
@@ -20,6 +27,77 @@ mod suite;
 mod dense;
 
 fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if words.iter().any(|word| word == "moves") {
+        random_moves(&words);
+        return;
+    }
+    lists();
+    random_moves(&words);
+}
+
+/// Moves of each shape.
+const MOVES: [(Shape, &str, usize); 3] = [
+    (Shape::Joint, "moveto", 1000),
+    (Shape::Straight, "straight", 300),
+    (Shape::Smooth, "smooth", 100),
+];
+
+/// Processor time of planning random moves; refused moves count too. Words name the robots and
+/// shapes that are wanted; all, if none is named.
+fn random_moves(words: &[String]) {
+    let each = words.iter().any(|word| word == "moves");
+    let named = |all: &[&str]| words.iter().any(|word| all.contains(&word.as_str()));
+    let wanted = |name: &str, all: &[&str]| !named(all) || named(&[name]);
+    let mut lines = Vec::new();
+    const ROBOTS: [&str; 2] = ["ur5e", "panda"];
+    for name in ROBOTS.into_iter().filter(|name| wanted(name, &ROBOTS)) {
+        let Ok(robot) = planner::robot::load(name) else {
+            println!("the robot {name} is missing");
+            continue;
+        };
+        let suffix = if name == "ur5e" { "" } else { "-7" };
+        let words = MOVES.map(|(_, word, _)| word);
+        for (shape, word, count) in MOVES.into_iter().filter(|row| wanted(row.1, &words)) {
+            let moves = RandomMoves {
+                shape,
+                count,
+                seed: 12,
+                clock: || scheduling::thread_time_ns() as f64 * 1e-9,
+            };
+            let times = match moves.measure(&robot) {
+                Ok(times) => times,
+                Err(error) => {
+                    println!("{name}: {error}");
+                    continue;
+                }
+            };
+            if each {
+                for (i, time) in times.iter().enumerate() {
+                    let motion = time.motion.unwrap_or(f64::NAN);
+                    println!("{name} {word} {i} {motion:.6} {:.4}", time.planning * 1e3);
+                }
+            }
+            let planned = times.iter().filter_map(|time| time.motion);
+            let sum: f64 = planned.clone().sum();
+            println!(
+                "{name} {word}: {} of {count} planned, {sum:.3} s of motion",
+                planned.count()
+            );
+            let mut planning: Vec<f64> = times.iter().map(|time| time.planning * 1e3).collect();
+            planning.sort_by(f64::total_cmp);
+            for (name, share) in [("p50", 0.5), ("p99", 0.99)] {
+                let at = planning[((count - 1) as f64 * share) as usize];
+                lines.push(format!("ratio {word}{suffix}-planning-{name}-ms {at:.3}"));
+            }
+        }
+    }
+    for line in lines {
+        println!("{line}");
+    }
+}
+
+fn lists() {
     let limits = ToolLimits {
         speed: 0.5,
         acceleration: 5.0,

@@ -7,7 +7,7 @@ use simd::{Build, F4, Four, Op, Plain, transposed};
 
 /// `a x b` of vectors in the first three lanes.
 #[inline(always)]
-fn cross<A: Four>(a: F4<A>, b: F4<A>) -> F4<A> {
+pub(crate) fn cross<A: Four>(a: F4<A>, b: F4<A>) -> F4<A> {
     a.next().taken_from(b, a * b.next()).next()
 }
 
@@ -233,6 +233,12 @@ impl<const N: usize> Chain<N> {
             p: first(p),
         });
         Some((lines.collect(), reached.end.frame().isometry()))
+    }
+
+    /// Whether a joint slides.
+    #[inline(always)]
+    pub(crate) fn slides(&self, joint: usize) -> bool {
+        self.links.slides(joint)
     }
 
     /// Positions of the links with the joints at `q`.

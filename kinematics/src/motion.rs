@@ -4,6 +4,8 @@
 use nalgebra::{Isometry3, SVector, Vector3};
 
 use crate::Chain;
+use crate::chain::cross;
+use simd::{F4, Four, Op};
 
 /// Pose of the tool and its time derivatives, in the frame that poses are given in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,52 +34,14 @@ impl<const N: usize> Chain<N> {
     /// the joints (rad, rad/s, ...; metres for a joint that slides).
     ///
     /// # Source
-    /// H. Bruyninckx and J. De Schutter, "Symbolic differentiation of the velocity mapping for a
-    /// serial kinematic chain", Mech. Mach. Theory 31(2), 1996: a column of the Jacobian turns with
-    /// its link, and its lever changes with the joints after it. Applied here again for the second
-    /// derivative, with sums over the joints after it.
+    /// J. J. Craig, Introduction to Robotics, 2005, section 6.7: velocities and accelerations from
+    /// link to link, here once more differentiated.
     #[must_use]
-    pub fn motion(&self, [q, dq, ddq, dddq]: &[SVector<f64, N>; 4]) -> ToolMotion {
-        let (pose, jacobian) = self.jacobian(q);
-        let column = |i: usize, row: usize| {
-            Vector3::new(
-                jacobian[(row, i)],
-                jacobian[(row + 1, i)],
-                jacobian[(row + 2, i)],
-            )
-        };
-        let zero = Vector3::zeros();
-        // Angular velocity of each link, its derivatives, and the derivative of its axis.
-        let (mut turning, mut axes) = ([[zero; 2]; N], [[zero; 2]; N]);
-        let mut angular = [zero; 3];
-        for i in 0..N {
-            let axis = column(i, 3);
-            let first = angular[0].cross(&axis);
-            let second = angular[1].cross(&axis) + angular[0].cross(&first);
-            angular[2] += axis * dddq[i] + first * (2.0 * ddq[i]) + second * dq[i];
-            angular[1] += axis * ddq[i] + first * dq[i];
-            angular[0] += axis * dq[i];
-            (turning[i], axes[i]) = ([angular[0], angular[1]], [axis, first]);
-        }
-        // What the joints after the current one contribute to the tool.
-        let mut linear = [zero; 3];
-        for i in (0..N).rev() {
-            let (lever, [axis, axis_change]) = (column(i, 0), axes[i]);
-            let [w, w_change] = turning[i];
-            let first = w.cross(&lever) + axis.cross(&linear[0]);
-            let second = w_change.cross(&lever)
-                + w.cross(&first)
-                + axis_change.cross(&linear[0])
-                + axis.cross(&linear[1]);
-            linear[2] += lever * dddq[i] + first * (2.0 * ddq[i]) + second * dq[i];
-            linear[1] += lever * ddq[i] + first * dq[i];
-            linear[0] += lever * dq[i];
-        }
-        ToolMotion {
-            pose,
-            linear,
-            angular,
-        }
+    pub fn motion(&self, joints: &[SVector<f64, N>; 4]) -> ToolMotion {
+        self.build().run(Derivatives {
+            chain: self,
+            joints,
+        })
     }
 
     /// Bounds of the Taylor coefficients of the tool's motion over an interval of time of length
@@ -127,6 +91,66 @@ impl<const N: usize> Chain<N> {
         }
         growth
     }
+}
+
+/// Pose and derivatives of the tool, from link to link, compiled for both builds.
+struct Derivatives<'a, const N: usize> {
+    chain: &'a Chain<N>,
+    joints: &'a [SVector<f64, N>; 4],
+}
+
+impl<const N: usize> Op for Derivatives<'_, N> {
+    type Output = ToolMotion;
+
+    #[inline(always)]
+    fn run<A: Four>(self, a: A) -> ToolMotion {
+        let [q, dq, ddq, dddq] = self.joints;
+        let reached = self.chain.reach(a, q);
+        let zero = F4::splat(a, 0.0);
+        let (mut angular, mut linear) = ([zero; 3], [zero; 3]);
+        let mut before = reached.points[0];
+        for i in 0..N {
+            let [w, dw, ddw] = angular;
+            let axis = reached.axes[i];
+            let first = cross(w, axis);
+            let second = cross(dw, axis) + cross(w, first);
+            let (d, dd, ddd) = (dq[i], ddq[i], dddq[i]);
+            // What the joint adds to the motion of its point, or of its link.
+            let own = [
+                axis * d,
+                axis * dd + first * d,
+                axis * ddd + first * (2.0 * dd) + second * d,
+            ];
+            let slides = self.chain.slides(i);
+            let added = if slides { own } else { [zero; 3] };
+            let arm = carried(&angular, reached.points[i] - before, added);
+            linear = [0, 1, 2].map(|k| linear[k] + arm[k]);
+            before = reached.points[i];
+            if !slides {
+                angular = [w + own[0], dw + own[1], ddw + own[2]];
+            }
+        }
+        let arm = carried(&angular, reached.end.p - before, [zero; 3]);
+        let vector = |v: F4<A>| {
+            let [x, y, z, _] = v.array();
+            Vector3::new(x, y, z)
+        };
+        ToolMotion {
+            pose: reached.end.frame().isometry(),
+            linear: [0, 1, 2].map(|k| vector(linear[k] + arm[k])),
+            angular: angular.map(vector),
+        }
+    }
+}
+
+/// The first three derivatives of a vector that turns with a link, and to which derivatives are
+/// `added`.
+#[inline(always)]
+fn carried<A: Four>([w, dw, ddw]: &[F4<A>; 3], r: F4<A>, [s1, s2, s3]: [F4<A>; 3]) -> [F4<A>; 3] {
+    let r1 = cross(*w, r) + s1;
+    let r2 = cross(*dw, r) + cross(*w, r1) + s2;
+    let r3 = cross(*ddw, r) + cross(*dw, r1) * 2.0 + cross(*w, r2) + s3;
+    [r1, r2, r3]
 }
 
 /// The power series `exp(x)` of a power series without a constant term: from `y' = x' y`.

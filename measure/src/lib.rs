@@ -2,12 +2,13 @@
 //! times and the quality of the motions.
 //!
 //! [`otg`] plans random state-to-state problems, [`timing`] computes time laws of random paths,
-//! [`smooth`] plans lists of poses for a tool without an arm, and a [`Trial`] plans a list for a
-//! robot.
+//! [`smooth`] plans lists of poses for a tool without an arm, a [`Trial`] plans a list for a robot,
+//! and [`RandomMoves`] plans random moves of a robot.
 //!
 //! This crate only calls the public functions of the library crates.
 #![forbid(unsafe_code)]
 
+mod moves;
 pub mod otg;
 mod paths;
 mod problems;
@@ -15,6 +16,7 @@ pub mod smooth;
 pub mod timing;
 mod trial;
 
+pub use moves::{PlanningTime, RandomMoves};
 pub use paths::RandomPaths;
 pub use problems::{Ends, Problems};
 pub use trial::Trial;

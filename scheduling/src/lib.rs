@@ -6,6 +6,8 @@
 
 mod clock;
 mod real_time;
+mod turns;
 
-pub use clock::{now_ns, sleep_until_ns};
+pub use clock::{now_ns, sleep_until_ns, thread_time_ns};
 pub use real_time::{Granted, RealTimeRequest, request_real_time};
+pub use turns::Turns;

@@ -9,7 +9,7 @@ use std::time::Instant;
 use ipc::{
     Clock, DriverState, EngineLink, Greeted, Hello, Setpoint, SetpointFlags, State, text_of,
 };
-use scheduling::{Granted, now_ns, request_real_time, sleep_until_ns};
+use scheduling::{Granted, Turns, now_ns, request_real_time, sleep_until_ns};
 
 use super::config::{ExecutorConfig, ExecutorError};
 use super::event::{Fault, ShortText};
@@ -18,9 +18,6 @@ use super::runner::{Runner, Tick};
 
 /// How long a driver of a lock-step session may take for a period.
 const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
-
-/// How many times lock-step polls for a state before it sleeps between polls.
-const SPINS: u32 = 4000;
 
 /// Time between two signs of life while virtual time is stopped.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
@@ -49,6 +46,7 @@ struct Loop<'a, const N: usize> {
     asking: Option<[Instant; 2]>,
     /// What the driver waits for.
     waits: String,
+    turns: Turns,
 }
 
 /// Time between two requests for a new session.
@@ -74,6 +72,7 @@ pub(super) fn main<const N: usize>(
                 leaving: None,
                 asking: None,
                 waits: String::new(),
+                turns: Turns::new(),
             };
             all.greet().map(|driver| (all, driver))
         });
@@ -319,24 +318,19 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    /// The next state of the session; waits actively at first, then sleeps. `None` when none came
-    /// for a long time, when the thread should end, or when a new session is wanted.
-    fn wait_for_state(&self) -> Option<State> {
+    /// The next state of the session. `None` when none came for a long time, when the thread should
+    /// end, or when a new session is wanted.
+    fn wait_for_state(&mut self) -> Option<State> {
         let start = Instant::now();
-        let mut turns = 0_u32;
         loop {
             if let Some(state) = self.link.next_state() {
                 if state.session == self.runner.session() {
+                    self.turns.next();
                     return Some(state);
                 }
                 continue;
             }
-            turns = turns.saturating_add(1);
-            // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
-            if turns < SPINS {
-                core::hint::spin_loop();
-            } else {
-                thread::sleep(Duration::from_micros(20));
+            if self.turns.wait() {
                 let ends = self.shared.orders.is_shutting_down()
                     && start.elapsed() > Duration::from_millis(200);
                 if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ipc::{Arm, Clock, DriverLink};
-use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
+use scheduling::{RealTimeRequest, Turns, now_ns, request_real_time, sleep_until_ns};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -16,9 +16,6 @@ use crate::{Driver, DriverError, Robot};
 
 /// The period without a session (ns).
 const IDLE_NS: u64 = 2_000_000;
-
-/// How many times lock-step polls for a setpoint before it sleeps between polls.
-const SPINS: u32 = 4000;
 
 /// For how many periods a driver that ends reports it.
 const FAREWELL: u32 = 20;
@@ -220,8 +217,9 @@ fn lock_step<R: Robot>(
     if driver.last_setpoint().sequence == 0 {
         link.send(driver.step(0, period));
     }
+    let mut turns = Turns::new();
     for periods in 1..=4096 {
-        let Some(setpoint) = wait_for_setpoint(link, driver, stop) else {
+        let Some(setpoint) = wait_for_setpoint(link, driver, (&mut turns, stop)) else {
             return periods;
         };
         if let Some(state) = driver.sign_of_life(&setpoint) {
@@ -239,29 +237,23 @@ fn lock_step<R: Robot>(
     4096
 }
 
-/// Waits for the next setpoint, actively at first, then sleeping. If none comes, the driver stops
-/// the arm in virtual time and latches.
+/// Waits for the next setpoint. If none comes, the driver stops the arm in virtual time and latches.
 fn wait_for_setpoint<R: Robot>(
     link: &DriverLink,
     driver: &mut Driver<R>,
-    stop: &AtomicBool,
+    (turns, stop): (&mut Turns, &AtomicBool),
 ) -> Option<ipc::Setpoint> {
     let start = Instant::now();
-    let mut turns = 0_u32;
     loop {
         if let Some(setpoint) = link.next_setpoint() {
             // A setpoint that was sent before the session began releases no state.
             if driver.is_of_session(&setpoint) {
+                turns.next();
                 return Some(setpoint);
             }
             continue;
         }
-        turns = turns.saturating_add(1);
-        // Not by yielding: on a busy machine that costs a time slice, a sleep does not.
-        if turns < SPINS {
-            core::hint::spin_loop();
-        } else {
-            thread::sleep(Duration::from_micros(20));
+        if turns.wait() {
             let sessions = driver.sessions();
             answer_greeting(link, driver);
             if driver.sessions() != sessions || stop.load(Ordering::Relaxed) {

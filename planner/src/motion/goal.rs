@@ -2,16 +2,14 @@
 
 use kinematics::{IkFailure, IkReport};
 use nalgebra::{Isometry3, SVector};
-use trajectory::bounds::JointsToTool;
-use trajectory::otg::{self, Otg};
-use trajectory::{Boundary, JointLine, JointPoint, TimingOptions, Trajectory, time_path};
 
-use super::certificate::Arm;
 use super::{Draft, MotionError, Planner};
 use crate::task::Move;
 
-/// How many configurations are planned in full, the most promising first.
+/// How many configurations of a six-joint arm are compared, the most promising first.
 const TRIED: usize = 4;
+/// How many more of a seven-joint arm.
+const TRIED_REDUNDANT: usize = 12;
 /// Number of values of the free parameter of a seven-joint arm that are tried.
 const SWEEP: usize = 48;
 /// Configurations of a seven-joint arm count as equal if no joint differs by more, rad.
@@ -20,6 +18,25 @@ const ALIKE: f64 = 0.3;
 const ROOM: f64 = 0.35;
 /// Smallest singular value (lengths in units of 0.3 m) from which it can move on well.
 const NIMBLE: f64 = 0.15;
+/// A seven-joint arm goes to no configuration with less ease, if there is another.
+const EASY: f64 = 0.25;
+
+/// Adds goals to those chosen, up to a number, if a joint differs enough from all others.
+fn apart<const N: usize>(
+    mut chosen: Vec<SVector<f64, N>>,
+    goals: impl Iterator<Item = SVector<f64, N>>,
+    (most, least): (usize, f64),
+) -> Vec<SVector<f64, N>> {
+    for goal in goals {
+        if chosen.len() >= most {
+            break;
+        }
+        if chosen.iter().all(|other| (other - goal).amax() > least) {
+            chosen.push(goal);
+        }
+    }
+    chosen
+}
 
 impl<const N: usize> Planner<N> {
     pub(super) fn plan_joint(
@@ -28,46 +45,56 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<Draft<N>, MotionError> {
         let pose = motion.poses.first().copied().unwrap_or_default();
-        let mut goals = self.configurations(&pose, start)?;
-        goals.sort_by(|a, b| {
-            self.time_estimate(start, a)
-                .total_cmp(&self.time_estimate(start, b))
-        });
+        let goals = self.configurations(&pose, start)?;
         if N > 6 {
-            let mut apart: Vec<SVector<f64, N>> = Vec::new();
-            for goal in goals {
-                if apart.iter().all(|other| (other - goal).amax() > ALIKE) {
-                    apart.push(goal);
-                }
-            }
-            goals = apart;
+            let (goals, sure) = self.easy(goals, motion, start);
+            return self.soonest(motion, start, &goals, sure);
         }
+        let goals = self.promising(goals, start);
+        self.soonest(motion, start, &goals, goals.len())
+    }
+
+    /// The goals that need the least time at constant velocity.
+    fn promising(
+        &self,
+        mut goals: Vec<SVector<f64, N>>,
+        start: &SVector<f64, N>,
+    ) -> Vec<SVector<f64, N>> {
+        let way =
+            |goal: &SVector<f64, N>| (goal - start).abs().component_div(&self.limits.velocity);
+        goals.sort_by(|a, b| way(a).max().total_cmp(&way(b).max()));
         goals.truncate(TRIED);
-        let mut best: Option<(f64, Draft<N>)> = None;
-        let mut refusal = None;
-        for goal in &goals {
-            let ease = self.ease(goal);
-            let found = self.rest_to_rest(start, goal).and_then(|free| {
-                // No motion of these joints is shorter, whatever the tool may do.
-                let least = free.duration() / ease;
-                let hopeless = best.as_ref().is_some_and(|(time, _)| least >= *time);
-                (!hopeless)
-                    .then(|| self.within_tool(motion, (start, goal), free))
-                    .transpose()
-            });
-            match found {
-                Ok(Some(found)) => {
-                    let time = found.trajectory.duration() / ease;
-                    if best.as_ref().is_none_or(|(least, _)| time < *least) {
-                        best = Some((time, found));
-                    }
-                }
-                Ok(None) => {}
-                Err(error) => refusal = Some(error),
-            }
+        goals
+    }
+
+    /// First the goals with the least time at constant velocity for their ease, and their number;
+    /// then those with enough ease that need the least time, by a lower bound. Of goals that are
+    /// alike, the first.
+    fn easy(
+        &self,
+        goals: Vec<SVector<f64, N>>,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> (Vec<SVector<f64, N>>, usize) {
+        let rated = goals.into_iter().map(|goal| {
+            let way = (goal - start).abs().component_div(&self.limits.velocity);
+            (way.max() / self.ease(&goal), goal)
+        });
+        let mut rated: Vec<(f64, SVector<f64, N>)> = rated.collect();
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all = rated.iter().map(|(_, goal)| *goal);
+        let mut chosen = apart(Vec::new(), all, (TRIED, ALIKE));
+        let sure = chosen.len();
+        let most = |goal: &SVector<f64, N>| self.ease(goal);
+        let enough = chosen.iter().map(most).fold(EASY, f64::min);
+        rated.retain(|(_, goal)| self.ease(goal) >= enough);
+        for (least, goal) in &mut rated {
+            *least = self.least_of_line(start, goal, &motion.limits);
         }
-        best.map(|(_, found)| found)
-            .ok_or_else(|| refusal.unwrap_or(MotionError::NoWay))
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all = rated.into_iter().map(|(_, goal)| goal);
+        chosen = apart(chosen, all, (TRIED + TRIED_REDUNDANT, 0.5 * ALIKE));
+        (chosen, sure)
     }
 
     /// All known configurations that reach a pose within the joint limits.
@@ -96,19 +123,9 @@ impl<const N: usize> Planner<N> {
         Ok(goals)
     }
 
-    /// Time for the slowest joint at constant velocity, s: quick to compute, and a good order.
-    /// Longer for goals from which the arm cannot move on well.
-    fn time_estimate(&self, start: &SVector<f64, N>, goal: &SVector<f64, N>) -> f64 {
-        let way = (goal - start).abs().component_div(&self.limits.velocity);
-        way.max() / self.ease(goal)
-    }
-
     /// How well a seven-joint arm can move on from a configuration: 1 is well, near 0 at a limit or
-    /// a singular pose. 1 for other arms.
+    /// a singular pose.
     fn ease(&self, q: &SVector<f64, N>) -> f64 {
-        if N <= 6 {
-            return 1.0;
-        }
         let chain = self.chain();
         let room = (0..N)
             .map(|i| (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]))
@@ -124,63 +141,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         goal: &SVector<f64, N>,
     ) -> Result<Draft<N>, MotionError> {
-        let free = self.rest_to_rest(start, goal)?;
-        self.within_tool(motion, (start, goal), free)
-    }
-
-    /// The motion `free` that the joints alone allow, or a slower one where the tool is too fast.
-    fn within_tool(
-        &self,
-        motion: &Move,
-        (start, goal): (&SVector<f64, N>, &SVector<f64, N>),
-        free: Trajectory<N>,
-    ) -> Result<Draft<N>, MotionError> {
-        let alone = free.duration();
-        let free = self.slowed(Draft::of(free), motion);
-        if free.trajectory.duration() <= alone {
-            return Ok(free);
-        }
-        // The tool is too fast: the faster of two is used, the whole motion slowed down, or a line
-        // in joint space that is slow only where the tool is fast.
-        match self.timed_line(motion, start, goal) {
-            Ok(line) => {
-                let line = self.slowed(Draft::of(line), motion);
-                let faster = line.trajectory.duration() < free.trajectory.duration();
-                Ok(if faster { line } else { free })
-            }
-            Err(_) => Ok(free),
-        }
-    }
-
-    pub(super) fn rest_to_rest(
-        &self,
-        start: &SVector<f64, N>,
-        goal: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
-        let plan = Otg::plan(
-            &otg::State::rest(*start),
-            &otg::State::rest(*goal),
-            &otg::Limits::from(&self.limits),
-            &otg::Options::default(),
-        );
-        Ok(Trajectory::new(plan?.pieces()))
-    }
-
-    fn timed_line(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        goal: &SVector<f64, N>,
-    ) -> Result<Trajectory<N>, MotionError> {
-        let chain = self.chain();
-        let tool = |joint: &JointPoint<N>| Arm(chain).motion(joint);
-        let line = JointLine::new(*start, *goal, tool);
-        let options = TimingOptions {
-            start: Boundary::Rest,
-            end: Boundary::Rest,
-            ..Default::default()
-        };
-        Ok(time_path(&line, &self.limits, &motion.limits, &options)?.trajectory)
+        self.soonest(motion, start, &[*goal], 1)
     }
 
     /// The report of the solver as an error of the command.

@@ -23,6 +23,7 @@ mod reach;
 mod screw;
 mod singular;
 mod smooth;
+mod soonest;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};

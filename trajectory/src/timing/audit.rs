@@ -10,7 +10,7 @@ use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
 use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
-use crate::{Path, ToolLimits};
+use crate::{Path, ToolLimits, ToolPoint};
 use simd::Build;
 
 /// A limit counts as active from this ratio on.
@@ -57,10 +57,11 @@ impl Audit {
             let free = SVector::repeat(f64::INFINITY);
             JointBounds::new([SVector::repeat(cap), free, free])
         });
+        let mut seen = Seen::at(bounded.path, 0.0);
         for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
             joint.push(piece, &mut audit.ratios);
             if bounded.tool.limited() {
-                audit.push_tool(bounded.path, law, &tool);
+                audit.push_tool(bounded.path, law, (&tool, &mut seen));
             }
             if let Some(rate) = &rate {
                 rate.push(law, &mut audit.ratios);
@@ -75,12 +76,12 @@ impl Audit {
         &mut self,
         path: &dyn Path<N>,
         law: &Piece<1>,
-        tool: &[Option<(Limit, f64)>; 6],
+        (tool, seen): (&[Option<(Limit, f64)>; 6], &mut Seen),
     ) {
         let mut samples = [[0.0; 6]; TOOL_SAMPLES];
         for (i, sample) in samples.iter_mut().enumerate() {
             let t = law.duration * i as f64 / (TOOL_SAMPLES - 1) as f64;
-            *sample = tool_norms(path, law, t);
+            *sample = tool_norms(path, law, t, seen);
         }
         for (column, entry) in tool.iter().enumerate() {
             if let Some((_, limit)) = entry {
@@ -254,8 +255,27 @@ impl<const N: usize> JointBounds<N> {
     }
 }
 
+/// The tool at the place of the path that was looked at last: a piece starts where the one before it
+/// ends.
+struct Seen {
+    u: f64,
+    tool: ToolPoint,
+}
+
+impl Seen {
+    fn at<const N: usize>(path: &dyn Path<N>, u: f64) -> Self {
+        let tool = path.tool_at(u);
+        Self { u, tool }
+    }
+}
+
 /// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
-fn tool_norms<const N: usize>(path: &dyn Path<N>, law: &Piece<1>, t: f64) -> [f64; 6] {
+fn tool_norms<const N: usize>(
+    path: &dyn Path<N>,
+    law: &Piece<1>,
+    t: f64,
+    seen: &mut Seen,
+) -> [f64; 6] {
     let at = law.sample(t);
     let reparametrization = [
         at.position[0],
@@ -263,10 +283,18 @@ fn tool_norms<const N: usize>(path: &dyn Path<N>, law: &Piece<1>, t: f64) -> [f6
         at.acceleration[0],
         at.jerk[0],
     ];
-    let tool = path.tool_at(reparametrization[0].clamp(0.0, path.end()));
-    let local = ToolGridpoint::new(&tool, reparametrization);
+    let (u, end) = (at.position[0].clamp(0.0, path.end()), path.end());
+    // NaN is looked at again.
+    let same = (u - seen.u).abs() <= SAME * end;
+    if !same {
+        *seen = Seen::at(path, u);
+    }
+    let local = ToolGridpoint::new(&seen.tool, reparametrization);
     let norm = |v: Vector3<f64>| v.norm();
     let [l1, l2, l3] = local.linear.map(norm);
     let [a1, a2, a3] = local.angular.map(norm);
     [l1, l2, l3, a1, a2, a3]
 }
+
+/// Places that are nearer to each other than this fraction of the path are the same.
+const SAME: f64 = 1e-13;

@@ -16,8 +16,9 @@ pub struct TimeCertificate {
     /// How long the motion lasts (s).
     pub duration: f64,
     /// No motion along this path within these limits is shorter (s): the fastest without jerk limits
-    /// (less an error bar for its grid), or that of one joint or of the tool straight from end to
-    /// end with them, whichever is longer.
+    /// (less an error bar for its grid; with the joints' jerk limits at both ends if the path is
+    /// straight in joint space), or that of one joint or of the tool straight from end to end with
+    /// them, whichever is longer.
     pub lower_bound: f64,
     /// Largest distance of a joint from the path (rad), at the middle and the quarters of pieces.
     pub fit_error: f64,

@@ -27,6 +27,7 @@ mod problem;
 mod reach;
 mod reachability;
 mod reparametrization;
+mod rise;
 mod rows;
 mod search;
 
@@ -70,48 +71,114 @@ pub fn time_path<const N: usize>(
     tool: &ToolLimits,
     options: &TimingOptions,
 ) -> Result<Timed<N>, TimingError> {
-    check_joints(joint)?;
-    tool.check()?;
-    options.check()?;
-    let reachability = ReachabilityPass::new(path, joint, tool, options)?;
-    let bounded = Bounded {
-        path,
-        joint,
-        tool,
-        options,
-    };
-    let draft = draft(bounded, &reachability)?;
-    let tighten::Draft { pieces, audit, .. } = draft;
-    // A moving start fixes the law there, so it cannot be stretched and must hold as it is.
-    let moving = matches!(options.start, Boundary::Moving { .. });
-    let stretch = if moving {
-        1.0
-    } else {
-        audit.stretch * (1.0 + 1e-12)
-    };
-    let trajectory = Trajectory::new(pieces.joint).into_stretched(stretch);
-    let law = Trajectory::new(pieces.law).into_stretched(stretch);
-    let certificate = TimeCertificate {
-        peaks: audit.peaks(stretch),
-        active: audit.active(stretch),
-        duration: trajectory.duration(),
-        lower_bound: reachability.bound.max(least::chord_bound(bounded)),
-        fit_error: pieces.fit_error,
-        tool_margin: audit.tool_margin,
-        stretch,
-        given: if moving {
-            trajectory.pieces()[0].duration
+    PathTiming::new(path, joint, tool, options)?.solve()
+}
+
+/// A path whose fastest law without jerk limits is known: a tenth of the work of [`time_path`], and
+/// a bound that tells whether the rest is worth it.
+///
+/// ```
+/// # use nalgebra::{Isometry3, vector};
+/// # use trajectory::{JointLimits, JointLine, TimingOptions, ToolLimits, ToolPoint};
+/// use trajectory::timing::PathTiming;
+/// let still = |_: &trajectory::JointPoint<2>| ToolPoint::still(Isometry3::identity());
+/// let line = JointLine::new(vector![0.0, 0.0], vector![1.0, 0.5], still);
+/// let limits = JointLimits::uniform(2.0, 10.0, 100.0);
+/// let options = TimingOptions::default();
+/// let timing = PathTiming::new(&line, &limits, &ToolLimits::UNLIMITED, &options)?;
+/// let least = timing.lower_bound();
+/// let timed = timing.solve()?;
+/// assert!(timed.trajectory.duration() >= least && timed.trajectory.duration() < 1.02 * least);
+/// # Ok::<(), trajectory::TimingError>(())
+/// ```
+#[derive(Clone)]
+pub struct PathTiming<'a, const N: usize> {
+    bounded: Bounded<'a, N>,
+    reachability: ReachabilityPass,
+}
+
+impl<'a, const N: usize> PathTiming<'a, N> {
+    /// Checks the path and finds the fastest law without jerk limits.
+    ///
+    /// # Errors
+    /// As [`time_path`].
+    pub fn new(
+        path: &'a dyn Path<N>,
+        joint: &'a JointLimits<N>,
+        tool: &'a ToolLimits,
+        options: &'a TimingOptions,
+    ) -> Result<Self, TimingError> {
+        check_joints(joint)?;
+        tool.check()?;
+        options.check()?;
+        let bounded = Bounded {
+            path,
+            joint,
+            tool,
+            options,
+        };
+        let mut reachability = ReachabilityPass::new(path, joint, tool, options)?;
+        reachability.bound = reachability.bound.max(least::chord_bound(bounded));
+        Ok(Self {
+            bounded,
+            reachability,
+        })
+    }
+
+    /// No motion along this path within these limits is shorter (s): see
+    /// [`TimeCertificate::lower_bound`].
+    #[must_use]
+    pub fn lower_bound(&self) -> f64 {
+        self.reachability.bound
+    }
+
+    /// The fastest motion along the path.
+    ///
+    /// # Errors
+    /// As [`time_path`].
+    pub fn solve(&self) -> Result<Timed<N>, TimingError> {
+        self.solve_below(f64::INFINITY)
+    }
+
+    /// The fastest motion along the path; a slower one within the limits, for less work, where the
+    /// fastest is not shorter than `limit` (s).
+    ///
+    /// # Errors
+    /// As [`time_path`].
+    pub fn solve_below(&self, limit: f64) -> Result<Timed<N>, TimingError> {
+        let draft = draft(self.bounded, &self.reachability, limit)?;
+        let tighten::Draft { pieces, audit, .. } = draft;
+        // A moving start fixes the law there, so it cannot be stretched and must hold as it is.
+        let moving = matches!(self.bounded.options.start, Boundary::Moving { .. });
+        let stretch = if moving {
+            1.0
         } else {
-            0.0
-        },
-        cells: draft.cells,
-        iterations: draft.iterations,
-    };
-    Ok(Timed {
-        trajectory,
-        law,
-        certificate,
-    })
+            audit.stretch * (1.0 + 1e-12)
+        };
+        let trajectory = Trajectory::new(pieces.joint).into_stretched(stretch);
+        let law = Trajectory::new(pieces.law).into_stretched(stretch);
+        let certificate = TimeCertificate {
+            peaks: audit.peaks(stretch),
+            active: audit.active(stretch),
+            duration: trajectory.duration(),
+            lower_bound: self.lower_bound(),
+            fit_error: pieces.fit_error,
+            tool_margin: audit.tool_margin,
+            stretch,
+            given: if moving {
+                trajectory.pieces()[0].duration
+            } else {
+                0.0
+            },
+            cells: draft.cells,
+            iterations: draft.iterations,
+        };
+        Ok(Timed {
+            trajectory,
+            law,
+            certificate,
+        })
+    }
 }
 
 /// The best law after the reachability pass. A moving start near the limits may need finer cells
@@ -119,6 +186,7 @@ pub fn time_path<const N: usize>(
 fn draft<const N: usize>(
     bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
+    limit: f64,
 ) -> Result<tighten::Draft<N>, TimingError> {
     let mut options = *bounded.options;
     let mut refused = None;
@@ -129,14 +197,17 @@ fn draft<const N: usize>(
             bounded.path.end(),
             &options,
         );
-        match search::best(bounded, &Gridpoints::new(bounded, &grid)) {
+        match search::best(bounded, &Gridpoints::new(bounded, &grid), limit) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }
         options.cells = Some(2 * (grid.nodes.len() - 1));
     }
-    let limit = String::new();
-    Err(refused.unwrap_or(TimingError::StartTooFast { ratio: 1.0, limit }))
+    let unknown = String::new();
+    Err(refused.unwrap_or(TimingError::StartTooFast {
+        ratio: 1.0,
+        limit: unknown,
+    }))
 }
 
 /// Grids that are tried for a moving start, each twice as fine as the one before.

@@ -4,6 +4,7 @@
 use nalgebra::{SVector, Vector3};
 
 use super::reach::{self, ReachGrid};
+use super::rise::Rise;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
@@ -27,7 +28,8 @@ pub(super) struct ReachabilityPass {
     pub times: Vec<f64>,
     /// Time in which the accelerations of this law could build up within the jerk limits (s).
     pub ramp: f64,
-    /// Lower bound of the duration (s) by velocity and acceleration limits.
+    /// Lower bound of the duration (s) by velocity and acceleration limits, and by jerk limits at the
+    /// ends of a path that is straight in joint space.
     pub bound: f64,
 }
 
@@ -90,8 +92,13 @@ impl ReachabilityPass {
         }
         // The difference from a grid of half the points estimates the error of this one.
         let coarse = rows.grid(&at, &bends, 2);
-        let coarse = reach::duration(coarse.at(), &coarse.solve(first, last));
-        let bound = (total - 2.0 * (coarse - total).abs()).max(0.0);
+        let slow = coarse.solve(first, last);
+        let both = [(&at[..], &a[..]), (coarse.at(), &slow[..])];
+        let [fine, coarse] = match bends.rise(joint, options) {
+            Some(rise) => both.map(|(at, a)| risen(at, a, &rise)),
+            None => both.map(|(at, a)| reach::duration(at, a)),
+        };
+        let bound = (fine - 2.0 * (coarse - fine).abs()).max(0.0);
         let ramp = ramp(joint, tool, &at, &a, &bends);
         let times = clock(&at, &a);
         let rate = a.into_iter().map(f64::sqrt).collect();
@@ -112,6 +119,14 @@ fn first_value(options: &TimingOptions) -> f64 {
         Boundary::Free => FREE,
         Boundary::Moving { rate, .. } => rate * rate,
     }
+}
+
+/// Time of a law from rest to rest that is slowed down where it rises and falls too fast.
+fn risen(at: &[f64], a: &[f64], rise: &Rise) -> f64 {
+    let end = at.last().copied().unwrap_or(0.0);
+    let slower = |(u, a): (&f64, &f64)| a.min(rise.square(*u)).min(rise.square(end - u));
+    let slow: Vec<f64> = at.iter().zip(a).map(slower).collect();
+    reach::duration(at, &slow)
 }
 
 /// Time at each place.
@@ -187,6 +202,14 @@ impl<const N: usize> Bends<N> {
             }
         }
         Ok(bends)
+    }
+
+    /// How fast the law can rise, if the path is straight in joint space and both ends are at rest.
+    fn rise(&self, joint: &JointLimits<N>, options: &TimingOptions) -> Option<Rise> {
+        let rest = options.start == Boundary::Rest && options.end == Boundary::Rest;
+        let straight = self.sizes[2] == 0.0 && self.sizes[3] == 0.0;
+        let step = self.joints.first()?[0];
+        (rest && straight).then(|| Rise::new(&step, joint))
     }
 
     /// The tool at place `i`: position, then orientation.

@@ -15,10 +15,12 @@ const ROUNDS: usize = 2;
 /// Time that need not be gained back by another round.
 const ENOUGH: f64 = 1.0005;
 
-/// The fastest law found over `grid` once it is stretched to meet every bound.
+/// The fastest law found over `grid` once it is stretched to meet every bound. A law that cannot be
+/// shorter than `limit` (s) is not improved.
 pub(super) fn best<const N: usize>(
     bounded: Bounded<'_, N>,
     gridpoints: &Gridpoints<'_, N>,
+    limit: f64,
 ) -> Result<Draft<N>, TimingError> {
     let mut problem = bounded.problem(gridpoints);
     if problem.moving {
@@ -31,7 +33,8 @@ pub(super) fn best<const N: usize>(
     let mut last = Draft::new(bounded, gridpoints, &problem, &interior);
     let mut best = None;
     for _ in 0..ROUNDS {
-        if last.audit.stretch < ENOUGH {
+        // Tightened rows never make the law faster than it is now, up to the gap.
+        if last.audit.stretch < ENOUGH || interior.time() * (1.0 - 2.0 * gap) >= limit {
             break;
         }
         tighten(&mut problem, &last, 1.0);
