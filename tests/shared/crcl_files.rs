@@ -230,8 +230,10 @@ fn verdicts(stream: &str) -> BTreeMap<i64, String> {
 }
 
 /// What the simulator said was done and Canter refuses with a sentence: the simulator of 2017 said
-/// so of every program in a foreign language, and its arm reaches every pose.
-const REFUSED: [&str; 5] = [
+/// so of every program in a foreign language, its arm reaches every pose, and it leaves its tool
+/// anywhere.
+const REFUSED: [&str; 6] = [
+    "OpenToolChanger",
     "MoveScrew",
     "RunProgram",
     "MoveTo",
