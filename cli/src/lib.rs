@@ -39,6 +39,7 @@ mod samples;
 mod signals;
 mod simulation;
 mod table;
+mod tls_option;
 mod view_process;
 mod viewing;
 mod world_boxes;

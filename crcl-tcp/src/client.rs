@@ -1,6 +1,5 @@
 //! The other side: sends commands to any CRCL server and waits for each.
 
-use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -12,6 +11,7 @@ use crcl::xml::{
 use thiserror::Error;
 
 use crate::framing::{Frame, Frames};
+use crate::tls::{Stream, TlsClient};
 
 /// How long a server may take to answer.
 const ANSWER: Duration = Duration::from_secs(10);
@@ -82,7 +82,7 @@ pub struct Progress<'a> {
 #[derive(Debug)]
 pub struct Client {
     server: String,
-    stream: TcpStream,
+    stream: Box<dyn Stream>,
     frames: Frames,
     next: i64,
 }
@@ -93,6 +93,18 @@ impl Client {
     /// # Errors
     /// [`ClientError::Connection`].
     pub fn connect(server: &str) -> Result<Self, ClientError> {
+        Self::through(server, None)
+    }
+
+    /// Connects to `HOST:PORT` with TLS.
+    ///
+    /// # Errors
+    /// [`ClientError::Connection`].
+    pub fn connect_tls(server: &str, tls: &TlsClient) -> Result<Self, ClientError> {
+        Self::through(server, Some(tls))
+    }
+
+    fn through(server: &str, tls: Option<&TlsClient>) -> Result<Self, ClientError> {
         let failed = |cause| ClientError::Connection {
             server: server.to_owned(),
             cause,
@@ -104,6 +116,12 @@ impl Client {
         stream.set_nodelay(true).map_err(failed)?;
         stream.set_read_timeout(Some(ANSWER)).map_err(failed)?;
         stream.set_write_timeout(Some(ANSWER)).map_err(failed)?;
+        let host = server.rsplit_once(':').map_or(server, |(host, _)| host);
+        let host = host.trim_start_matches('[').trim_end_matches(']');
+        let stream = match tls {
+            Some(tls) => tls.wrap(host, stream).map_err(failed)?,
+            None => Box::new(stream),
+        };
         Ok(Self {
             server: server.to_owned(),
             stream,
@@ -231,6 +249,7 @@ impl Client {
     fn send(&mut self, instance: &Instance) -> Result<(), ClientError> {
         let text = write_instance(instance);
         let sent = self.stream.write_all(text.as_bytes());
+        let sent = sent.and_then(|()| self.stream.flush());
         sent.map_err(|cause| self.failed(cause))
     }
 

@@ -1,6 +1,6 @@
 //! One connection: reads documents, obeys them, answers.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::ErrorKind;
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -17,6 +17,7 @@ use crate::framing::{Frame, Frames, LONGEST_DOCUMENT};
 use crate::report::Choice;
 use crate::si::Units;
 use crate::stopper::Stop;
+use crate::tls::{Stream, TlsServer};
 
 /// How long a client may take to read a status before it is cut off.
 const SLOW: Duration = Duration::from_secs(2);
@@ -25,8 +26,10 @@ const SLOW: Duration = Duration::from_secs(2);
 const LOOK: Duration = Duration::from_millis(100);
 
 /// How connections behave.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Manners {
+    /// Who may speak, where everything is encrypted.
+    pub(crate) tls: Option<TlsServer>,
     /// The units of a connection that has not set its own.
     pub(crate) units: Units,
     /// Commands are executed one after the other instead of taking the place of each other.
@@ -51,7 +54,7 @@ pub(crate) struct Connection {
     choice: Choice,
     /// What is told on this connection only, and until which command.
     private: Option<(u64, Last)>,
-    stream: TcpStream,
+    stream: Box<dyn Stream>,
 }
 
 /// Why a connection ends.
@@ -66,15 +69,19 @@ impl Connection {
         id: ConnectionId,
         stream: TcpStream,
         ways: Ways,
-        manners: Manners,
+        manners: &Manners,
     ) -> std::io::Result<Self> {
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(SLOW))?;
         stream.set_read_timeout(Some(manners.push.map_or(LOOK, |push| push.min(LOOK))))?;
+        let stream = match &manners.tls {
+            Some(tls) => tls.wrap(stream)?,
+            None => Box::new(stream),
+        };
         Ok(Self {
             id,
             ways,
-            manners,
+            manners: manners.clone(),
             choice: Choice::new(manners.units.of_connection()),
             private: None,
             stream,
@@ -160,7 +167,8 @@ impl Connection {
             self.choice
                 .write(last, number, &inner.picture, &inner.parameters)
         };
-        match self.stream.write_all(text.as_bytes()) {
+        let sent = self.stream.write_all(text.as_bytes());
+        match sent.and_then(|()| self.stream.flush()) {
             Ok(()) => Ok(()),
             Err(error) if is_timeout(&error) => {
                 let limit = SLOW.as_secs();

@@ -21,9 +21,11 @@ mod report;
 mod server;
 mod si;
 mod stopper;
+mod tls;
 
 pub use allow::{AllowError, Network};
 pub use client::{Client, ClientError, Progress};
 pub use framing::{Frame, Frames, LONGEST_DOCUMENT};
 pub use server::{LARGEST_CROWD, Server, ServerConfig, ServerError, WhenGone};
 pub use si::Units;
+pub use tls::{TlsClient, TlsError, TlsFiles, TlsServer};

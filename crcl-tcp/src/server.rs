@@ -17,6 +17,7 @@ use crate::cell::{Cell, ConnectionId};
 use crate::connection::{Connection, Manners, Ways};
 use crate::si::Units;
 use crate::stopper::{self, Stop};
+use crate::tls::TlsServer;
 
 /// How many connections are served at once.
 pub const LARGEST_CROWD: usize = 64;
@@ -51,6 +52,8 @@ pub struct ServerConfig {
     pub push: Option<Duration>,
     /// What happens when a client goes away while its command is under way.
     pub when_gone: WhenGone,
+    /// Encrypts every connection, and lets in whose certificate is known.
+    pub tls: Option<TlsServer>,
 }
 
 /// Why a server cannot serve.
@@ -227,7 +230,10 @@ impl Crowd {
             threads.retain(|thread| !thread.is_finished());
             if let Err(why) = self.admit(peer.ip()) {
                 (self.log)(&format!("{peer} was sent away: {why}"));
-                send_away(&stream, &why);
+                // Without a handshake there are no words for a client with TLS.
+                if self.config.tls.is_none() {
+                    send_away(&stream, &why);
+                }
                 continue;
             }
             id += 1;
@@ -260,8 +266,9 @@ impl Crowd {
             units: self.config.units,
             queue: self.config.queue,
             push: self.config.push,
+            tls: self.config.tls.clone(),
         };
-        let mut connection = Connection::new(id, stream, self.ways.clone(), manners)?;
+        let mut connection = Connection::new(id, stream, self.ways.clone(), &manners)?;
         let (ends, log) = (Arc::clone(&self.ends), Arc::clone(&self.log));
         let (ways, when_gone) = (self.ways.clone(), self.config.when_gone);
         let place = Place::take(&self.count);

@@ -31,6 +31,8 @@ pub enum ArgumentKind {
     AngularAcceleration,
     /// A percentage from 0 to 100.
     Percent,
+    /// A share from 0 to 1.
+    Share,
     /// Length units, not negative.
     LengthTolerance,
     /// Angle units, not negative.
@@ -66,6 +68,7 @@ impl ArgumentKind {
             Self::AngularSpeed => "a speed of rotation",
             Self::AngularAcceleration => "an acceleration of rotation",
             Self::Percent => "a percentage",
+            Self::Share => "a share",
             Self::LengthTolerance | Self::AngleTolerance => "a tolerance",
             Self::LengthUnit => "a length unit",
             Self::AngleUnit => "an angle unit",
@@ -83,7 +86,7 @@ impl ArgumentKind {
         match self {
             Self::Reason | Self::Flag => "0",
             Self::Text => "\"text\"",
-            Self::Seconds => "0.5",
+            Self::Seconds | Self::Share => "0.5",
             Self::Speed | Self::Acceleration => "250",
             Self::Percent | Self::AngularSpeed | Self::AngularAcceleration => "50",
             Self::LengthTolerance | Self::AngleTolerance => "2",
@@ -105,6 +108,10 @@ impl ArgumentKind {
         match self {
             Self::Percent => value::percent(self.noun(), number),
             Self::Flag => value::finite(self.noun(), number),
+            Self::Share => {
+                let share = value::not_negative(self.noun(), number)?;
+                value::within(self.noun(), share, 1.0)
+            }
             Self::Seconds => {
                 let seconds = value::not_negative(self.noun(), number)?;
                 value::within(self.noun(), seconds, LONGEST_S)

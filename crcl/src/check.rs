@@ -210,8 +210,14 @@ fn tools(commands: &[Located]) -> Vec<Finding> {
     let (mut released, mut closed): (Option<&Located>, Option<&Located>) = (None, None);
     for located in commands {
         match (&located.command, released) {
-            (Command::OpenGripper | Command::CloseGripper, Some(released)) => {
+            (
+                Command::OpenGripper | Command::CloseGripper | Command::SetEndEffector { .. },
+                Some(released),
+            ) => {
                 findings.push(no_tool(located, released));
+            }
+            (Command::SetEndEffector { setting }, None) => {
+                closed = (*setting == 0.0).then_some(located);
             }
             (Command::OpenGripper, None) => closed = None,
             (Command::CloseGripper, None) => closed = Some(located),

@@ -79,6 +79,12 @@ pub enum Command {
     OpenGripper,
     /// Close the gripper.
     CloseGripper,
+    /// Extension: open the gripper to a share of its way.
+    SetEndEffector {
+        /// The share: 0 is closed, 1 is open.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        setting: f64,
+    },
     /// Extension: release the end effector.
     OpenToolChanger,
     /// Extension: take hold of an end effector.
@@ -229,6 +235,7 @@ impl Command {
             Self::MoveScrew { screw } => ("MoveScrew", Value::Screw(*screw)),
             Self::OpenGripper => ("OpenGripper", Value::None),
             Self::CloseGripper => ("CloseGripper", Value::None),
+            Self::SetEndEffector { setting } => ("SetEndEffector", Value::Number(*setting)),
             Self::OpenToolChanger => ("OpenToolChanger", Value::None),
             Self::CloseToolChanger => ("CloseToolChanger", Value::None),
             Self::SetAbsoluteSpeed { value } => ("SetAbsoluteSpeed", Value::Number(*value)),

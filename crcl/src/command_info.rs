@@ -237,6 +237,12 @@ pub static COMMANDS: &[CommandInfo] = {
             None,
         ),
         extension(
+            with("SetEndEffector", "setting", Kind::Share, |v| {
+                v.number().map(|setting| C::SetEndEffector { setting })
+            }),
+            None,
+        ),
+        extension(
             plain("OpenToolChanger", |v| v.none().map(|()| C::OpenToolChanger)),
             None,
         ),

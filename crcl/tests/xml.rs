@@ -446,6 +446,7 @@ fn shared_command() -> impl Strategy<Value = Command> {
         prop::sample::select(vec![
             Command::OpenGripper,
             Command::CloseGripper,
+            Command::SetEndEffector { setting: 0.375 },
             Command::OpenToolChanger,
             Command::CloseToolChanger,
             Command::StopMotion { emergency: 0 },

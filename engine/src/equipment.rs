@@ -45,6 +45,7 @@ pub fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanError> {
             gripper: Some(Gripper {
                 opening: NOMINAL_S,
                 closing: NOMINAL_S,
+                width: None,
             }),
             workstation_from_holder,
         });

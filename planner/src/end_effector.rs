@@ -9,6 +9,8 @@ pub struct Gripper {
     pub opening: f64,
     /// Time to close, s.
     pub closing: f64,
+    /// Opening when open, m; unknown where it only opens and closes.
+    pub width: Option<f64>,
 }
 
 /// Something that the flange can carry.

@@ -203,6 +203,11 @@ pub enum ToolAction {
     OpenGripper,
     /// Close the gripper of the mounted end effector.
     CloseGripper,
+    /// Open the gripper of the mounted end effector to a part of its way.
+    MoveGripper {
+        /// Opening, um.
+        opening_um: u32,
+    },
     /// Let go of the end effector.
     OpenToolChanger,
     /// Take the end effector in the holder at the arm's end.

@@ -53,8 +53,25 @@ impl Tooling {
         match action {
             ToolAction::OpenGripper => gripper.map_or(0.0, |gripper| gripper.opening),
             ToolAction::CloseGripper => gripper.map_or(0.0, |gripper| gripper.closing),
+            ToolAction::MoveGripper { .. } => {
+                gripper.map_or(0.0, |gripper| gripper.opening.max(gripper.closing))
+            }
             ToolAction::OpenToolChanger => self.changer.map_or(0.0, |changer| changer.opening),
             ToolAction::CloseToolChanger => self.changer.map_or(0.0, |changer| changer.closing),
+        }
+    }
+
+    /// The action that opens the gripper to a share of its way, 0 to 1. A gripper that only opens
+    /// and closes opens at any share above 0, as CRCL says.
+    #[must_use]
+    pub fn gripper_action(&self, share: f64) -> ToolAction {
+        let gripper = self.mounted_tool().and_then(|tool| tool.gripper);
+        match gripper.and_then(|gripper| gripper.width) {
+            _ if share <= 0.0 => ToolAction::CloseGripper,
+            Some(width) if share < 1.0 => ToolAction::MoveGripper {
+                opening_um: (share * width * 1e6).round() as u32,
+            },
+            _ => ToolAction::OpenGripper,
         }
     }
 
@@ -76,6 +93,7 @@ impl Tooling {
         match action {
             ToolAction::OpenGripper => self.set_gripper(true),
             ToolAction::CloseGripper => self.set_gripper(false),
+            ToolAction::MoveGripper { .. } => self.set_gripper(true),
             ToolAction::OpenToolChanger => self.release(workstation_from_flange),
             ToolAction::CloseToolChanger => self.take(workstation_from_flange),
         }
@@ -197,6 +215,7 @@ mod tests {
             gripper: Some(crate::end_effector::Gripper {
                 opening: 0.2,
                 closing: 0.2,
+                width: Some(0.08),
             }),
             workstation_from_holder: None,
         };
@@ -248,5 +267,23 @@ mod tests {
         let at = Isometry3::translation(1.0, 0.0, 0.0);
         tools.apply(ToolAction::CloseGripper, &at).unwrap();
         assert!(tools.apply(ToolAction::OpenToolChanger, &at).is_err());
+    }
+
+    #[test]
+    fn a_share_of_the_way_is_an_opening() {
+        let mut tools = tooling();
+        let action = |tools: &Tooling, share| tools.gripper_action(share);
+        assert_eq!(action(&tools, 0.0), ToolAction::CloseGripper);
+        assert_eq!(
+            action(&tools, 0.25),
+            ToolAction::MoveGripper { opening_um: 20_000 }
+        );
+        assert_eq!(action(&tools, 1.0), ToolAction::OpenGripper);
+        for effector in &mut tools.end_effectors {
+            if let Some(gripper) = &mut effector.gripper {
+                gripper.width = None;
+            }
+        }
+        assert_eq!(action(&tools, 0.25), ToolAction::OpenGripper);
     }
 }

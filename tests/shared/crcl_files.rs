@@ -108,8 +108,11 @@ pub(crate) fn has_validator() -> bool {
     run.is_ok_and(|output| output.status.success())
 }
 
-fn validate(schema: &str, documents: &[String]) {
-    let schema = folder("xsd/2021Apr28").join(schema);
+/// The newest version of the schema.
+const NEWEST: &str = "2021Apr28";
+
+fn validate(version: &str, schema: &str, documents: &[String]) {
+    let schema = folder("xsd").join(version).join(schema);
     let place = tempfile::tempdir().unwrap();
     let paths = documents.iter().enumerate().map(|(index, text)| {
         let path = place.path().join(format!("{index}.xml"));
@@ -157,8 +160,8 @@ pub(crate) fn what_is_written_is_valid() {
         }
     }
     assert!(programs.len() > 20 && instances.len() > 100);
-    validate("CRCLProgramInstance.xsd", &programs);
-    validate("CRCLCommandInstance.xsd", &instances);
+    validate(NEWEST, "CRCLProgramInstance.xsd", &programs);
+    validate(NEWEST, "CRCLCommandInstance.xsd", &instances);
     let statuses = files("status").into_iter().filter_map(|path| {
         let status = xml::read_status(&fs::read_to_string(path).unwrap()).ok()?;
         Some(xml::write_status(&status))
@@ -166,8 +169,7 @@ pub(crate) fn what_is_written_is_valid() {
     let mut statuses: Vec<_> = statuses.collect();
     let scene = Scene::new("valid", &[]);
     let mut client = scene.connect();
-    statuses.push(client.status().0);
-    statuses.push(client.done("InitCanon", 4, "").0);
+    let mut plain = vec![client.status().0, client.done("InitCanon", 4, "").0];
     let flags = [
         "JointStatuses",
         "PoseStatus",
@@ -177,13 +179,22 @@ pub(crate) fn what_is_written_is_valid() {
         "GuardsStatus",
     ]
     .map(|part| format!("<Report{part}>true</Report{part}>"));
-    statuses.push(client.done("ConfigureStatusReport", 5, &flags.concat()).0);
+    // The client of 2017 knows four flags.
+    let four = flags[..4].concat();
+    plain.push(client.done("ConfigureStatusReport", 5, &four).0);
+    let parameter = "<ParameterSetting><ParameterName>a</ParameterName><ParameterValue>1</ParameterValue></ParameterSetting>";
+    plain.push(client.done("SetRobotParameters", 6, parameter).0);
+    assert!(plain[3].contains("<RobotParameterSetting>"), "{}", plain[3]);
+    plain.push(client.done("SetEndEffectorParameters", 7, parameter).0);
+    validate("2017May01", "CRCLStatus.xsd", &plain);
+    statuses.extend(plain);
+    statuses.push(client.done("ConfigureStatusReport", 8, &flags.concat()).0);
     statuses.push(
         client
-            .failed("RunProgram", 6, "<ProgramText>x</ProgramText>")
+            .failed("RunProgram", 9, "<ProgramText>x</ProgramText>")
             .0,
     );
-    validate("CRCLStatus.xsd", &statuses);
+    validate(NEWEST, "CRCLStatus.xsd", &statuses);
 }
 
 /// The commands of a recorded stream, without GetStatus: kind, number, document.
@@ -219,8 +230,10 @@ fn verdicts(stream: &str) -> BTreeMap<i64, String> {
 }
 
 /// What the simulator said was done and Canter refuses with a sentence: the simulator of 2017 said
-/// so of every program in a foreign language, and its arm reaches every pose.
-const REFUSED: [&str; 5] = [
+/// so of every program in a foreign language, its arm reaches every pose, and it leaves its tool
+/// anywhere.
+const REFUSED: [&str; 6] = [
+    "OpenToolChanger",
     "MoveScrew",
     "RunProgram",
     "MoveTo",

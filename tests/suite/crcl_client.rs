@@ -38,13 +38,21 @@ fn start(arguments: &[&str], text: &str) -> (Killed, String) {
     }
 }
 
+/// Starts a server for an arm; gives where it listens.
+fn serve(arm: &str, options: &[&str]) -> (Killed, SocketAddr) {
+    let fixed = ["serve", "crcl", "--arm", arm, "--listen", "127.0.0.1:0"];
+    let (server, line) = start(&[&fixed, options].concat(), "serving CRCL at");
+    let address = line.trim().rsplit(' ').next().unwrap().parse().unwrap();
+    (server, address)
+}
+
 /// An engine with a simulated arm, and a CRCL server before it.
 pub(crate) struct Scene {
     address: SocketAddr,
     /// Name of the arm.
     pub(crate) arm: String,
-    _server: Killed,
-    _engine: Killed,
+    server: Option<Killed>,
+    engine: Option<Killed>,
 }
 
 impl Scene {
@@ -54,15 +62,26 @@ impl Scene {
             &["engine", "--robot", "ur5e", "--arm", &arm],
             "engine of ur5e",
         );
-        let fixed = ["serve", "crcl", "--arm", &arm, "--listen", "127.0.0.1:0"];
-        let (server, line) = start(&[&fixed, options].concat(), "serving CRCL at");
-        let address = line.trim().rsplit(' ').next().unwrap().parse().unwrap();
+        let (server, address) = serve(&arm, options);
         Self {
             address,
             arm,
-            _server: server,
-            _engine: engine,
+            server: Some(server),
+            engine: Some(engine),
         }
+    }
+
+    /// Kills the engine.
+    pub(crate) fn kill_engine(&mut self) {
+        self.engine = None;
+    }
+
+    /// Kills the server, and starts another for the same arm.
+    pub(crate) fn restart_server(&mut self) {
+        self.server = None;
+        let (server, address) = serve(&self.arm, &[]);
+        self.server = Some(server);
+        self.address = address;
     }
 
     pub(crate) fn connect(&self) -> Connection {

@@ -204,3 +204,30 @@ fn single_joints_go_where_they_are_told() {
             .contains('7')
     );
 }
+
+#[test]
+fn a_gripper_opens_to_a_part_of_its_way() {
+    let scene = Scene::new("gripper", &[]);
+    let mut client = scene.connect();
+    client.done("InitCanon", 1, "");
+    let flags = ["Joint", "Pose", "Gripper", "Settings"];
+    let flags = flags.map(|part| {
+        let part = match part {
+            "Joint" => "JointStatuses".to_owned(),
+            other => format!("{other}Status"),
+        };
+        format!("<Report{part}>true</Report{part}>")
+    });
+    client.done("ConfigureStatusReport", 2, &flags.concat());
+    for (id, setting, millimetres) in [
+        (3, 0.25, 20.0),
+        (4, 0.0, 0.0),
+        (5, 1.0, 80.0),
+        (6, 0.5, 40.0),
+    ] {
+        let inside = format!("<Setting>{setting}</Setting>");
+        client.done("SetEndEffector", id, &inside);
+        let open = client.status().number("Separation");
+        assert!((open - millimetres).abs() < 0.1, "{setting}: {open} mm");
+    }
+}

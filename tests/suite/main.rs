@@ -10,6 +10,7 @@ mod circles;
 mod command_line;
 mod control;
 mod crcl_client;
+mod crcl_faults;
 mod crcl_motion;
 mod crcl_server;
 mod documents;

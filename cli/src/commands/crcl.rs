@@ -8,6 +8,7 @@ use crcl_tcp::{Client, ClientError, Progress};
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::program::{Form, ProgramArgument};
+use crate::tls_option::TlsOption;
 
 /// Talk to CRCL servers of others
 #[derive(Args, Debug)]
@@ -35,6 +36,8 @@ pub(crate) struct CrclSend {
     /// Longest time that one command may take (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]
     limit: u64,
+    #[command(flatten)]
+    tls: TlsOption,
 }
 
 impl Crcl {
@@ -71,7 +74,11 @@ impl CrclSend {
                 return Ok(Exit::Unreadable);
             }
         };
-        let mut client = Client::connect(&self.server).map_err(failure)?;
+        let client = match self.tls.client()? {
+            Some(tls) => Client::connect_tls(&self.server, &tls),
+            None => Client::connect(&self.server),
+        };
+        let mut client = client.map_err(failure)?;
         let limit = Duration::from_secs(self.limit);
         client
             .run(&program, file.name(), limit, |progress| print(&progress))

@@ -13,6 +13,7 @@ use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output;
+use crate::tls_option::TlsOption;
 
 /// How often a running server looks for a signal.
 const LOOK: Duration = Duration::from_millis(20);
@@ -32,7 +33,7 @@ enum What {
 /// Let CRCL clients drive the arm of a running engine
 ///
 /// Speaks CRCL over TCP (port 64444), as NIST's clients do. The protocol has no authentication and
-/// no encryption: whoever can connect can move the arm. Without `--listen` only programs on this
+/// no encryption: whoever can connect can move the arm, unless `--tls` says whom to let in. Without `--listen` only programs on this
 /// machine can connect. Ctrl-C ends the server and stops a move that a client has begun.
 #[derive(Args, Debug)]
 pub(crate) struct ServeCrcl {
@@ -53,6 +54,8 @@ pub(crate) struct ServeCrcl {
     /// Send a status every so many ms instead of answering GetStatus
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..))]
     push: Option<u64>,
+    #[command(flatten)]
+    tls: TlsOption,
     /// What happens to the command under way when its client goes away
     #[arg(long, value_enum, default_value_t = Gone::Stop)]
     when_gone: Gone,
@@ -100,6 +103,7 @@ impl ServeCrcl {
             units: self.units(),
             queue: self.queue,
             push: self.push.map(Duration::from_millis),
+            tls: self.tls.server()?,
             when_gone: match self.when_gone {
                 Gone::Stop => WhenGone::Stop,
                 Gone::Finish => WhenGone::Finish,

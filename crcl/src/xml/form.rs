@@ -62,6 +62,7 @@ pub(super) fn form(
         Command::MoveScrew { screw } => plain(XmlCommand::MoveScrew(move_screw(screw, angle)?)),
         Command::OpenGripper => plain(XmlCommand::SetEndEffector(1.0)),
         Command::CloseGripper => plain(XmlCommand::SetEndEffector(0.0)),
+        Command::SetEndEffector { setting } => plain(XmlCommand::SetEndEffector(*setting)),
         Command::OpenToolChanger => plain(XmlCommand::OpenToolChanger),
         Command::CloseToolChanger => plain(XmlCommand::CloseToolChanger),
         Command::StopMotion { emergency: 0 } => {

@@ -56,10 +56,10 @@ impl Instruction {
             XmlCommand::Dwell(seconds) => one(Command::Dwell { seconds: *seconds }),
             XmlCommand::OpenToolChanger => one(Command::OpenToolChanger),
             XmlCommand::CloseToolChanger => one(Command::CloseToolChanger),
-            XmlCommand::SetEndEffector(setting) => one(if *setting > 0.0 {
-                Command::OpenGripper
-            } else {
-                Command::CloseGripper
+            XmlCommand::SetEndEffector(setting) => one(match *setting {
+                0.0 => Command::CloseGripper,
+                1.0 => Command::OpenGripper,
+                setting => Command::SetEndEffector { setting },
             }),
             XmlCommand::StopMotion(condition) => one(Command::StopMotion {
                 emergency: i64::from(*condition != StopCondition::Normal),

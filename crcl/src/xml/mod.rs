@@ -150,7 +150,6 @@ impl Blocks {
     ) {
         match instruction.meaning() {
             Ok(Meaning::Commands(commands)) => {
-                doubt(reader, node, &instruction.command);
                 for command in commands {
                     if let Some(info) = command.info().filter(|_| self.strict)
                         && let Some(finding) = refused_extension(info, opening(node))
@@ -241,18 +240,6 @@ impl Blocks {
             reader.findings.push(finding);
         }
         self.program
-    }
-}
-
-/// A command that is executed, but perhaps not as it is meant.
-fn doubt(reader: &mut Reader, node: Node, command: &XmlCommand) {
-    if let XmlCommand::SetEndEffector(setting) = command
-        && *setting > 0.0
-        && *setting < 1.0
-    {
-        let message = format!("the gripper opens whole, not to {setting} of its way");
-        let finding = Finding::warning(code::UNSUPPORTED, opening(node), message);
-        reader.findings.push(finding.help("1 is open, 0 is closed"));
     }
 }
 

@@ -383,11 +383,19 @@ impl<const N: usize> Worker<'_, N> {
 }
 
 fn tool_order(command: u32, action: ToolAction, nominal: f64) -> ToolOrder {
+    let position = match action {
+        ToolAction::MoveGripper { opening_um } => f64::from(opening_um) * 1e-6,
+        _ => 0.0,
+    };
     let (tool, action) = match action {
         ToolAction::OpenGripper => (ipc::GRIPPER, ipc::ToolAction::Open),
         ToolAction::CloseGripper => (ipc::GRIPPER, ipc::ToolAction::Close),
+        ToolAction::MoveGripper { .. } => (ipc::GRIPPER, ipc::ToolAction::Move),
         ToolAction::OpenToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Open),
         ToolAction::CloseToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Close),
     };
-    ToolOrder::new(command, tool, action, nominal + TOOL_PATIENCE)
+    ToolOrder {
+        position,
+        ..ToolOrder::new(command, tool, action, nominal + TOOL_PATIENCE)
+    }
 }

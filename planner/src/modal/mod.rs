@@ -136,6 +136,10 @@ impl Modal {
             }),
             Command::OpenGripper => self.tool(ToolAction::OpenGripper, workstation_from_flange),
             Command::CloseGripper => self.tool(ToolAction::CloseGripper, workstation_from_flange),
+            Command::SetEndEffector { setting } => {
+                let action = self.tooling.gripper_action(*setting);
+                self.tool(action, workstation_from_flange)
+            }
             Command::OpenToolChanger => {
                 self.tool(ToolAction::OpenToolChanger, workstation_from_flange)
             }

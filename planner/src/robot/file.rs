@@ -103,6 +103,7 @@ struct Effector {
     flange_from_tcp: Pose,
     opening_s: Option<Spanned<f64>>,
     closing_s: Option<Spanned<f64>>,
+    width_m: Option<Spanned<f64>>,
     workstation_from_holder: Option<Pose>,
 }
 
@@ -375,6 +376,10 @@ impl Files<'_> {
                 (Some(opening), Some(closing)) => Some(Gripper {
                     opening: self.time("end_effector.opening_s", opening)?,
                     closing: self.time("end_effector.closing_s", closing)?,
+                    width: match &effector.width_m {
+                        Some(width) => Some(self.time("end_effector.width_m", width)?),
+                        None => None,
+                    },
                 }),
                 (Some(one), None) | (None, Some(one)) => {
                     let expected = "both opening_s and closing_s, or neither";
