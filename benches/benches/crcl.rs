@@ -195,7 +195,8 @@ fn print(name: &str, times: &mut [u64]) {
 fn watch(arm: &Arm) -> (Vec<u64>, u64) {
     let observer = Observer::open(arm).unwrap();
     while observer.next_setpoint().is_some() {}
-    let (mut times, mut skipped, mut last) = (Vec::new(), 0, None);
+    let (mut times, mut skipped) = (Vec::new(), 0_u64);
+    let mut last: Option<(u64, u64)> = None;
     let end = Instant::now() + WATCH;
     while Instant::now() < end {
         while let Some(setpoint) = observer.next_setpoint() {

@@ -126,7 +126,7 @@ fn compared<const N: usize>(name: &str, seed: u64) -> usize {
     for round in 0..18 {
         let tolerance = [0.0, 5e-5, 1e-3, 5e-3, 2e-2, 0.0][round % 6];
         let first = planner.chain().forward(&home);
-        let poses = (0..3 + round % 4).map(|_| near(&first, (0.12, 0.3), &mut state));
+        let poses = (0..3 + round % 4).map(|_| near(&first, 0.12, 0.3, &mut state));
         let motion = Move {
             shape: Shape::Smooth,
             poses: poses.collect(),
