@@ -165,17 +165,15 @@ impl Modal {
                 self.legs(waypoints, workstation_from_flange)
             }
             Command::SaveSettings => self.save_settings(),
-            Command::RestoreSettings => match self.saved.pop() {
-                Some(settings) => {
-                    self.settings = settings;
-                    Ok(Task::Setting)
-                }
-                None => Err(CommandError::sequence(
-                    "RestoreSettings without SaveSettings before it",
-                )),
-            },
+            Command::RestoreSettings => self.restore_settings(),
             setting => self.set(setting),
         }
+    }
+
+    fn restore_settings(&mut self) -> Result<Task, CommandError> {
+        let refused = || CommandError::sequence("RestoreSettings without SaveSettings before it");
+        self.settings = self.saved.pop().ok_or_else(refused)?;
+        Ok(Task::Setting)
     }
 
     fn save_settings(&mut self) -> Result<Task, CommandError> {

@@ -65,11 +65,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let (mut short, mut freed) = (0, false);
-    let more = if problem.anchor.is_some() {
-        ANCHORED
-    } else {
-        0
-    };
+    let more = usize::from(problem.anchor.is_some()) * ANCHORED;
     for count in 0..effort.steps + more {
         since += 1;
         if tight || since > PATIENCE {
