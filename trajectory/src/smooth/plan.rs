@@ -383,7 +383,7 @@ mod tests {
     fn a_circle_is_passed_without_a_rest() {
         let at = |i: u32| std::f64::consts::TAU * f64::from(i) / 200.0;
         let place = |a: f64| Vector3::new(0.05 * a.cos() + 0.44, 0.05 * a.sin() + 0.13, 0.37);
-        let rotation = UnitQuaternion::from_euler_angles(3.14, 0.0, 0.3);
+        let rotation = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.3);
         let pose = |i| Isometry3::from_parts(place(at(i)).into(), rotation);
         let poses: Vec<_> = (0..=200).map(pose).collect();
         for (speed, acceleration) in [(0.1, 0.3), (0.1, 1.0), (0.1, 5.0), (0.35, 0.3), (0.35, 5.0)]
