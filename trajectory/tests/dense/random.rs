@@ -37,7 +37,7 @@ fn judged(seeds: std::ops::Range<u64>, most: f64) -> Vec<u64> {
 #[test]
 fn random_lists_are_certified() {
     // A sharp corner between long legs in a dense list may need a stop.
-    assert!(judged(0..24, 400.0).len() <= 2);
+    assert!(judged(0..24, 400.0).len() <= 4);
 }
 
 /// As above, 10 000 lists: `cargo test --release -p trajectory --test dense -- --ignored`. The goal

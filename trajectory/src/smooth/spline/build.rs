@@ -12,12 +12,10 @@ use crate::line::body_turn;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::{Span, Turn};
 
-/// The inner tolerance: a little smaller, so that rounding in sampling does not exceed the
-/// tolerance.
+/// The inner tolerance: a little smaller, so that rounding in sampling does not exceed it.
 const INSIDE: f64 = 0.9999;
 
-/// Fraction of the corridor that the samples use, since the curve between two samples may lie a
-/// little outside of them.
+/// Fraction of the corridor that samples use; the curve between two may lie a little outside.
 const CORRIDOR: f64 = 0.98;
 
 /// Fraction of the angular limits that is used; the rest is for rotations about changing axes.
