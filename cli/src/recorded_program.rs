@@ -44,7 +44,7 @@ impl RecordedFile {
         };
         let cause = anyhow!(
             "{}: the file was changed after it was written ({cause}); canter record --recover saves \
-             what stands before that place",
+             what can be read of it",
             self.name
         );
         Err(Failure::new(Exit::Unreadable, cause))

@@ -42,8 +42,9 @@ pub struct Recorded {
     pub messages: u64,
     /// Why the file ends before its end, if it does: it was cut off by a kill.
     pub cut: Option<String>,
-    /// Whether the file was finished and is not as it was written: a checksum does not fit. What
-    /// stands before the first such place is here, and [`Recorded::cut`] has the reason.
+    /// Whether the file was finished and is not as it was written: a checksum does not fit.
+    /// [`Recorded::cut`] has the reason. What could be read all the same is here; each period is as it
+    /// was written, and others may be missing.
     pub damaged: bool,
 }
 

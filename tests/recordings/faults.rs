@@ -8,6 +8,9 @@ use crate::canter::canter;
 use crate::{PATIENCE, arm, engine, send, wait_for};
 use system_tests::signal;
 
+/// How long the engine is stopped: longer than the watchdogs of engine and driver.
+const STOPPED: Duration = Duration::from_millis(600);
+
 /// Runs the program, stops the engine for longer than the watchdogs at `after_ms`, and reads the file
 /// that the fault names: seconds of it before the fault.
 fn fault_after(name: &str, after_ms: u64) -> f64 {
@@ -18,9 +21,8 @@ fn fault_after(name: &str, after_ms: u64) -> f64 {
     let _program = send(&arm);
     wait_for(&arm, |now| now["idle"] == false);
     std::thread::sleep(Duration::from_millis(after_ms));
-    // Longer than the watchdog of engine and driver.
     signal::send(&engine.0, libc::SIGSTOP);
-    std::thread::sleep(Duration::from_millis(600));
+    std::thread::sleep(STOPPED);
     signal::send(&engine.0, libc::SIGCONT);
     let end = Instant::now() + PATIENCE;
     let named = named_file(&arm, end);
@@ -43,8 +45,8 @@ fn fault_after(name: &str, after_ms: u64) -> f64 {
         .filter(|sample| sample.tick <= tick)
         .count();
     let seconds = before as f64 * 1e-3;
-    // All that the session had before it, but for periods that a loaded machine skips.
-    let lived = tick.min(60_000) as f64 * 1e-3;
+    // All that the session had before it was stopped, but for periods that a loaded machine skips.
+    let lived = tick.min(60_000) as f64 * 1e-3 - STOPPED.as_secs_f64();
     assert!(seconds > 0.5 * lived, "{seconds} s of {lived} s");
     let ran = canter(["replay", "--info", &named.display().to_string()]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);

@@ -196,7 +196,7 @@ export class Pendant {
     get('hand').disabled = !this.mayMove || (this.holder !== 0 && !has);
     get('hand').textContent = has ? 'Let go' : 'Take the hand';
     get('hand').classList.toggle('go', !has && this.mayMove);
-    const state = has ? 'you have the hand' : (this.holder !== 0 ? 'another page has it' : '');
+    const state = has ? 'you have it' : (this.holder !== 0 ? 'another page has it' : '');
     get('hand-state').textContent = this.mayMove ? state : 'watching';
   }
 
