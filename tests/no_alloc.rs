@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
-use servo::{Control, Event, Monitor, Runner, Tick};
+use servo::{Control, Event, FeedForward, Monitor, Runner, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
 
 thread_local! {
@@ -81,6 +81,13 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     let driver = DriverLink::open(&arm).unwrap();
     let mut config = executor_config(arm, Clock::LockStep);
     config.record = false;
+    // Every setpoint carries the efforts that the UR5e needs, by its inverse dynamics.
+    let robot = planner::robot::load("ur5e").unwrap();
+    let dynamics = robot.model.dynamics::<JOINTS>().unwrap();
+    config.feed_forward = Some(FeedForward::new(move |[q, dq, ddq]| {
+        dynamics.effort(q, dq, ddq)
+    }));
+    let weight = dynamics.effort(&home(), &home().map(|_| 0.0), &home().map(|_| 0.0));
     let (mut runner, mut sender, remote, mut monitor) = Runner::<JOINTS>::new(config);
     let ack = welcome();
     runner.open(&ack);
@@ -102,6 +109,9 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         let setpoint = runner.tick(engine.last_state(), tick);
         assert!(engine.send(setpoint));
         let received = driver.last_setpoint().unwrap();
+        if number == 0 {
+            assert_eq!(received.effort[..JOINTS], *weight.as_slice());
+        }
         state.position = received.position;
         state.sequence += 1;
         state.driver_state = DriverState::Active as u32;

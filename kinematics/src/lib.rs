@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`urdf`] | reads a URDF, checks it, finds the chain of joints from root to tip |
 //! | [`chain`] | [`Chain`]: flat data of a serial arm; forward kinematics, Jacobian and its derivative |
+//! | `dynamics` | [`Dynamics`]: the efforts of the joints that a motion needs |
 //! | [`ik`] | [`Solver`]: joint positions for a pose; all branches, or why there is none |
 //! | [`follow`](mod@follow) | joint path of a whole tool path, with derivatives, or where it breaks |
 //! | `motion` | the tool's motion when the joints move: derivatives, and bounds of them |
@@ -15,6 +16,7 @@
 //! | [`reach`] | how far the arm reaches |
 
 pub mod chain;
+mod dynamics;
 pub mod follow;
 pub mod ik;
 mod links;
@@ -24,6 +26,7 @@ pub mod reach;
 pub mod urdf;
 
 pub use chain::Chain;
+pub use dynamics::{Dynamics, Inertia};
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
 pub use ik::{Branches, Goal, IkFailure, IkReport, Solution, Solver};
 pub use motion::{ToolGrowth, ToolMotion};

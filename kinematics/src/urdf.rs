@@ -5,9 +5,11 @@
 //! that uses `k`.
 //!
 //! URDF 1.2 attributes `acceleration`, `deceleration` and `jerk` of `<limit>` are
-//! read. Joints off the chain (gripper fingers, mimic joints) are ignored.
+//! read. Joints off the chain (gripper fingers, mimic joints) are ignored; the masses behind them count
+//! as fixed at zero.
 
 mod error;
+mod inertia;
 mod limit;
 mod tree;
 
@@ -17,6 +19,8 @@ use k::nalgebra as k_nalgebra;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use std::fmt::Write as _;
 use tree::{Joint, Tree};
+
+use crate::dynamics::Inertia;
 
 /// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +75,8 @@ pub struct Model {
     pub axes: Vec<Unit<Vector3<f64>>>,
     /// Pose of the flange in the frame of the last joint at zero.
     pub last_from_flange: Isometry3<f64>,
+    /// What moves with each joint, in its frame; `None` where the file gives no inertia.
+    pub inertias: Vec<Option<Inertia>>,
 }
 
 /// Reads a URDF and follows its joints from the root to `tip`.
@@ -138,6 +144,9 @@ pub fn read(text: &str, tip: Option<&str>) -> Result<Model, UrdfError> {
             expected: infos.len(),
         });
     }
+    let movable = way.iter().filter(|joint| joint.kind != "fixed");
+    let movable: Vec<&str> = movable.map(|joint| joint.child).collect();
+    model.inertias = inertia::bodies(&tree, &movable);
     model.name = tree.name.to_owned();
     model.base_link = tree.root().to_owned();
     model.joints = infos;
@@ -215,6 +224,7 @@ fn through_k(text: &str, tip: &str) -> Result<Model, UrdfError> {
         frames: Vec::new(),
         axes: Vec::new(),
         last_from_flange: Isometry3::identity(),
+        inertias: Vec::new(),
     };
     // The chain is serial, so the nodes come in order, root first.
     let mut since_last = Isometry3::identity();

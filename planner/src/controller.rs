@@ -93,7 +93,8 @@ impl<const N: usize> Controller<N> {
             tooling.flange_from_tool(),
             limits,
             robot.joint_names(),
-        );
+        )
+        .with_efforts(robot.efforts());
         let modal = Modal::new(
             robot.motion_limits(),
             robot.workstation_from_base,
@@ -298,7 +299,8 @@ impl<const N: usize> Controller<N> {
                 flange_from_tool,
                 self.limits,
                 self.joint_names.clone(),
-            );
+            )
+            .with_efforts(self.planner.efforts().cloned());
         }
     }
 }

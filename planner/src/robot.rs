@@ -4,12 +4,14 @@
 //! Robots that come with Canter are part of the binary; [`load`] finds them by
 //! name, and any other by its folder.
 
+mod effort;
 mod error;
 mod file;
 mod import;
 mod meshes;
 mod shipped;
 
+pub use effort::EffortLimits;
 pub use error::RobotError;
 pub use import::{from_urdf, import};
 pub use meshes::{mesh_file, mesh_names};
@@ -20,6 +22,7 @@ use nalgebra::{Isometry3, SVector};
 use std::path::{Path, PathBuf};
 
 use crate::end_effector::{EndEffector, Gripper, ToolChanger};
+use crate::motion::Efforts;
 use crate::tooling::{Holder, Tooling};
 
 /// Shares of the maker's limits that are planned with, each above 0 and at most 1. An arm whose
@@ -129,6 +132,8 @@ pub struct Robot {
     pub joints: JointLimits,
     /// Limits of the controlled point.
     pub tool: ToolLimits,
+    /// Limits of the efforts of the joints, if the robot asks for them.
+    pub efforts: Option<EffortLimits>,
     /// Pose of the robot's base in the workstation.
     pub workstation_from_base: Isometry3<f64>,
     /// A ready position: well inside the limits and away from singular poses.
@@ -295,6 +300,20 @@ impl Robot {
             acceleration: vector(&joints.acceleration),
             jerk: vector(&joints.jerk),
         }
+    }
+
+    /// The limits of efforts with the masses of the arm and its payload; `None` if the robot does not
+    /// ask for them or does not have `N` joints.
+    #[must_use]
+    pub fn efforts<const N: usize>(&self) -> Option<Efforts<N>> {
+        let wanted = self.efforts.as_ref()?;
+        let dynamics = self.model.dynamics::<N>()?;
+        Some(Efforts {
+            dynamics: dynamics
+                .with_base(&self.workstation_from_base)
+                .with_payload(&wanted.payload),
+            limits: vector(&wanted.limits),
+        })
     }
 
     /// Whether each joint slides.

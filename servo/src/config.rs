@@ -7,6 +7,8 @@ use realtime::{Following, JointLimits};
 use scheduling::RealTimeRequest;
 use thiserror::Error;
 
+use super::feed_forward::FeedForward;
+
 /// When a command is done: the measured arm has arrived where the command ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrival {
@@ -61,6 +63,8 @@ pub struct ExecutorConfig<const N: usize> {
     pub wait_for_planner: bool,
     /// Whether each setpoint and measured position is recorded for [`super::Monitor::sample`].
     pub record: bool,
+    /// The efforts that setpoints carry as feed-forward; zeros without.
+    pub feed_forward: Option<FeedForward<N>>,
 }
 
 impl<const N: usize> ExecutorConfig<N> {
@@ -85,6 +89,7 @@ impl<const N: usize> ExecutorConfig<N> {
             real_time: RealTimeRequest::default(),
             wait_for_planner: false,
             record: false,
+            feed_forward: None,
         }
     }
 

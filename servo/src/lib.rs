@@ -21,6 +21,7 @@
 mod config;
 mod control;
 mod event;
+mod feed_forward;
 mod handle;
 mod histogram;
 mod monitor;
@@ -33,6 +34,7 @@ mod thread;
 pub use config::{Arrival, ExecutorConfig, ExecutorError};
 pub use control::Control;
 pub use event::{Event, Fault, Recorded, ShortText};
+pub use feed_forward::FeedForward;
 pub use handle::Executor;
 pub use histogram::Histogram;
 pub use monitor::Monitor;

@@ -1,5 +1,5 @@
 //! Tests with files from outside the repository: programs, plans and workstations of NIST, and
-//! programs that once broke a law.
+//! programs that once broke a law; and with Pinocchio, where Python has it.
 //!
 //! The files are in a folder beside the repository, `../shared`, which a clone does not have. If it
 //! is missing, these tests are reported as ignored; every property that they test is also tested on
@@ -14,6 +14,7 @@ mod canter;
 #[path = "../suite/crcl_client.rs"]
 mod crcl_client;
 mod crcl_files;
+mod dynamics;
 mod pddl;
 mod plans;
 mod programs;
@@ -55,6 +56,7 @@ macro_rules! trials {
 
 fn main() {
     let tests: Vec<(&str, fn())> = trials! {
+        dynamics::efforts_agree_with_pinocchio
         crcl_files::programs_are_read_or_refused_for_a_reason
         crcl_files::commands_are_read
         crcl_files::statuses_are_read
@@ -86,7 +88,10 @@ fn main() {
     let missing = !folder().is_dir();
     // Python with lxml validates what is written; where it is missing nobody else can.
     let alone = !crcl_files::has_validator();
+    let without_pinocchio = !dynamics::has_pinocchio();
     let run = |name: &str| match name {
+        // Its robots come with the repository; what it needs is Python with pin.
+        "dynamics::efforts_agree_with_pinocchio" => !without_pinocchio,
         "crcl_files::what_is_written_is_valid" => !alone,
         name => !NOT_YET.contains(&name),
     };
@@ -95,7 +100,7 @@ fn main() {
             test();
             Ok(())
         })
-        .with_ignored_flag(missing || !run(name))
+        .with_ignored_flag((missing && !name.starts_with("dynamics::")) || !run(name))
     };
     let trials = tests.into_iter().map(trial).collect();
     libtest_mimic::run(&arguments, trials).exit();

@@ -23,7 +23,10 @@ use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
-use servo::{Executor, ExecutorConfig, Monitor, Remote, SegmentSender, Steering, ToolOrder, Work};
+use servo::{
+    Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering, ToolOrder,
+    Work,
+};
 
 /// Largest number of commands in work, the one that moves among them.
 const AHEAD: usize = 8;
@@ -128,6 +131,9 @@ fn start<'a, const N: usize>(
     wanted.connect = config.connect;
     wanted.on_wait = config.on_wait;
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
+    wanted.feed_forward = robot
+        .efforts::<N>()
+        .map(|efforts| FeedForward::new(move |[q, dq, ddq]| efforts.dynamics.effort(q, dq, ddq)));
     let (executor, sender, monitor) = Executor::start(wanted)?;
     let remote = executor.remote();
     controller.set_joints(remote.measured().setpoint);

@@ -12,18 +12,59 @@ const ROOM: f64 = 0.1;
 /// Smallest singular value that counts as well away from singular poses.
 const NIMBLE: f64 = 0.05;
 
+/// A joint path with its quality, or why there is none.
+type Attempt<const N: usize> = (f64, Result<Vec<FollowPoint<N>>, FollowError>);
+
 /// Follows without null-space motion if the quality is good, otherwise along the polynomial that a
-/// search over the whole path finds.
+/// search over the whole path finds. The null-space motion is measured along the direction in which
+/// the arm can move at the start. Where that direction becomes one that moves the tool, the path
+/// seems singular though the arm is not; then single joints are tried as the measure.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
 ) -> Result<Vec<FollowPoint<N>>, FollowError> {
     let (_, jacobian) = task.solver.chain().jacobian(start);
     let directions = null_space(&jacobian);
+    let (mut best, mut answer) = along(task, start, &directions);
+    if answer.is_ok() {
+        return answer;
+    }
+    for joint in measures(&directions[0]) {
+        let mut single = directions;
+        single[0] = SVector::from_fn(|row, _| if row == joint { 1.0 } else { 0.0 });
+        let (found, points) = along(task, start, &single);
+        if points.is_ok() && found > best {
+            (best, answer) = (found, points);
+        }
+        if best >= ENOUGH {
+            break;
+        }
+    }
+    answer
+}
+
+/// A path of this quality ends the search along single joints.
+const ENOUGH: f64 = 0.2;
+/// Least share of a joint in the null-space motion at the start, if it is to measure it.
+const SHARE: f64 = 0.1;
+
+/// The joints that can measure the null-space motion, those that move most first.
+fn measures<const N: usize>(direction: &SVector<f64, N>) -> Vec<usize> {
+    let mut joints: Vec<usize> = (0..N).filter(|i| direction[*i].abs() >= SHARE).collect();
+    joints.sort_by(|a, b| direction[*b].abs().total_cmp(&direction[*a].abs()));
+    joints
+}
+
+/// The best path whose null-space motion is measured along the first direction.
+fn along<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+    directions: &[SVector<f64, N>; 2],
+) -> Attempt<N> {
     let (from, to) = (task.grid[0], task.grid[task.grid.len() - 1]);
     let polynomials = directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]);
     let still = NullSpace {
-        directions,
+        directions: *directions,
         polynomials,
         from,
         span: to - from,
@@ -35,7 +76,7 @@ pub(super) fn resolve<const N: usize>(
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
     // A path cannot be expected to be better than its start.
     if first.is_ok() && best >= 1.0 {
-        return first;
+        return (best, first);
     }
     let mut answer = first;
     for null_space_path in null_space_path::search(task, start, &still) {
@@ -51,7 +92,7 @@ pub(super) fn resolve<const N: usize>(
             }
         }
     }
-    answer
+    (best, answer)
 }
 
 /// How well a path stays inside limits and away from singular poses: 1 is good, or no worse than at

@@ -218,6 +218,20 @@ impl<'a> Tree<'a> {
         below
     }
 
+    /// The joints below a link.
+    pub(super) fn joints_of(&self, link: &str) -> impl Iterator<Item = Joint<'a>> {
+        self.joints
+            .iter()
+            .filter(move |joint| joint.parent == link)
+            .copied()
+    }
+
+    /// The element of a link.
+    pub(super) fn link(&self, name: &str) -> Option<Node<'a, 'a>> {
+        let mut nodes = self.robot.children().filter(Node::is_element);
+        nodes.find(|node| node.tag_name().name() == "link" && node.attribute("name") == Some(name))
+    }
+
     /// The joints from the root to a link, root first.
     pub(super) fn way_to(&self, link: &str) -> Vec<Joint<'a>> {
         let mut way = Vec::new();

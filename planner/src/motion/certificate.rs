@@ -41,6 +41,10 @@ pub struct Peaks {
     pub joint_acceleration: Vec<f64>,
     /// Joint jerk, one per joint.
     pub joint_jerk: Vec<f64>,
+    /// Joint effort, one per joint: from samples, with a margin for the times between them. Empty
+    /// where efforts are not limited.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub joint_effort: Vec<f64>,
     /// Speed of the controlled point.
     pub tool_speed: f64,
     /// Acceleration of the controlled point.
@@ -63,6 +67,7 @@ impl Peaks {
             joint_velocity: joints(Limit::JointVelocity),
             joint_acceleration: joints(Limit::JointAcceleration),
             joint_jerk: joints(Limit::JointJerk),
+            joint_effort: Vec::new(),
             tool_speed: bounds.ratio(Limit::ToolSpeed),
             tool_acceleration: bounds.ratio(Limit::ToolAcceleration),
             tool_jerk: bounds.ratio(Limit::ToolJerk),
@@ -78,6 +83,7 @@ impl Peaks {
         let joints = self.joint_velocity.iter().chain(&self.joint_acceleration);
         joints
             .chain(&self.joint_jerk)
+            .chain(&self.joint_effort)
             .copied()
             .chain([
                 self.tool_speed,

@@ -63,6 +63,7 @@ fn larger(a: &Peaks, b: &Peaks) -> Peaks {
         joint_velocity: joints(&a.joint_velocity, &b.joint_velocity),
         joint_acceleration: joints(&a.joint_acceleration, &b.joint_acceleration),
         joint_jerk: joints(&a.joint_jerk, &b.joint_jerk),
+        joint_effort: joints(&a.joint_effort, &b.joint_effort),
         tool_speed: a.tool_speed.max(b.tool_speed),
         tool_acceleration: a.tool_acceleration.max(b.tool_acceleration),
         tool_jerk: a.tool_jerk.max(b.tool_jerk),

@@ -9,6 +9,7 @@ mod blocked_cause;
 mod cartesian;
 mod certificate;
 mod draft;
+mod efforts;
 mod fault;
 mod figures;
 mod goal;
@@ -33,6 +34,7 @@ use trajectory::{JointLimits, MotionBounds, ToolLimits, Trajectory};
 pub use active::ActiveLimit;
 pub use blocked_cause::{BlockedCause, JogRefusal, JointAmount};
 pub use certificate::{CrossingReport, LimitReport, MoveCertificate, Peaks};
+pub use efforts::Efforts;
 pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
@@ -82,6 +84,7 @@ pub struct Planner<const N: usize> {
     limits: JointLimits<N>,
     joint_names: Vec<String>,
     flange_from_tool: Isometry3<f64>,
+    efforts: Option<Efforts<N>>,
     kernel: Kernel<N>,
 }
 
@@ -100,6 +103,7 @@ impl<const N: usize> Planner<N> {
             limits,
             joint_names,
             flange_from_tool,
+            efforts: None,
             kernel,
         }
     }
@@ -206,6 +210,15 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        let planned = self.plan_once(motion, start)?;
+        Ok(self.eased(motion, start, planned))
+    }
+
+    fn plan_once(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
         self.check_reach(motion, start)?;
         match motion.shape {
             Shape::Joint => self.certify(motion, start, self.plan_joint(motion, start)?),
@@ -272,14 +285,17 @@ impl<const N: usize> Planner<N> {
             ratio: peak.ratio,
             time_s: peak.time,
         });
+        let efforts = self.effort_reports(&draft.trajectory);
+        let mut peaks = Peaks::of(bounds);
+        peaks.joint_effort = efforts.iter().map(|report| report.ratio).collect();
         MoveCertificate {
             duration_s: draft.trajectory.duration(),
             lower_bound_s,
             active: active.collect(),
             poses: way.poses,
             in_order: way.in_order,
-            peaks: Peaks::of(bounds),
-            limits: limits.collect(),
+            peaks,
+            limits: limits.chain(efforts).collect(),
             straightness_m: way.straightness_m,
             corridor_m: way.corridor_m,
             end_deviation_m: way.end_deviation_m,
@@ -314,7 +330,7 @@ impl<const N: usize> Planner<N> {
             }
             None => {
                 let bounds = self.bounds(&draft.trajectory, motion);
-                draft.bounded(bounds)
+                self.within_efforts(draft.bounded(bounds))
             }
         }
     }

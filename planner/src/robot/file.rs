@@ -1,5 +1,6 @@
 //! Reads `robot.toml` and combines it with the URDF.
 
+use super::effort::{Limits, Payload};
 use super::error::RobotError;
 use super::{EndEffector, Gripper, JointLimits, Margin, Robot, ToolChanger, ToolLimits};
 use kinematics::{Model, urdf};
@@ -34,6 +35,8 @@ struct Document {
     #[serde(default)]
     end_effector: Vec<Effector>,
     mounted: Option<Spanned<String>>,
+    limits: Option<Limits>,
+    payload: Option<Payload>,
 }
 
 /// Limits that the URDF does not give, one per joint.
@@ -138,6 +141,7 @@ impl Files<'_> {
                 most: MOST_JOINTS,
             });
         }
+        let efforts = self.efforts(&model, document.limits.as_ref(), document.payload.as_ref())?;
         let margin = self.margin(document.joints.get_ref().margin.as_ref())?;
         let joints = self
             .joint_limits(&model, &document.joints)?
@@ -156,6 +160,7 @@ impl Files<'_> {
                 .optional_pose("base", document.base.as_ref())?
                 .unwrap_or_else(Isometry3::identity),
             home,
+            efforts,
             mounted: self.mounted(document.mounted.as_ref(), &end_effectors)?,
             end_effectors,
             tool_changer: self.changer(document.tool_changer.as_ref())?,
@@ -168,7 +173,7 @@ impl Files<'_> {
     }
 
     /// The error for a value that does not fit.
-    fn value(&self, span: Range<usize>, key: &str, expected: &str) -> RobotError {
+    pub(super) fn value(&self, span: Range<usize>, key: &str, expected: &str) -> RobotError {
         let (line, column) = position(self.toml, span.start);
         let found = self.toml.get(span).unwrap_or("").chars().take(80).collect();
         let (key, expected) = (key.to_owned(), expected.to_owned());

@@ -76,6 +76,15 @@ impl<const N: usize> Runner<N> {
         put(&mut setpoint.position, &published.position);
         put(&mut setpoint.velocity, &published.velocity);
         put(&mut setpoint.acceleration, &published.acceleration);
+        if let Some(feed_forward) = &self.config.feed_forward {
+            let joints = [
+                published.position,
+                published.velocity,
+                published.acceleration,
+            ];
+            put(&mut setpoint.effort, &feed_forward.efforts(&joints));
+            setpoint.flags |= SetpointFlags::EFFORT;
+        }
         setpoint
     }
 }
