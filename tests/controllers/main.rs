@@ -1,8 +1,9 @@
 //! Drivers of real arms against foreign controllers, as real processes.
 //!
 //! Where a controller is not installed, its tests are reported as ignored:
-//! `pip install franka-sim==1.1.7` brings the one of Franka arms. They need a machine that is
-//! nearly idle: the controller stops at the first step that is beyond its maker's limits.
+//! `pip install franka-sim==1.1.7` brings the one of Franka arms, and `CANTER_FRANKA_PYTHON` names the
+//! Python that has it. They need a machine that is nearly idle: the controller stops the arm at the
+//! first step that is beyond its maker's limits, and a machine that stalls brings such steps.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
 
