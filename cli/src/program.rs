@@ -146,14 +146,15 @@ impl ProgramFile {
     /// A program that came with a recording.
     pub(crate) fn given(given: &GivenProgram) -> Self {
         let bytes = given.text.as_bytes();
-        let (form, read): (Form, fn(&[u8], &ReadOptions) -> Reading) = match given.form.as_str() {
-            "json" => (Form::Json, crcl::json::read_bytes),
-            "xml" => (Form::Xml, crcl::xml::read_bytes),
-            _ => (Form::Text, crcl::text::read_bytes),
+        let options = ReadOptions::default();
+        let (form, reading) = match given.form.as_str() {
+            "json" => (Form::Json, crcl::json::read_bytes(bytes, &options)),
+            "xml" => (Form::Xml, crcl::xml::read_bytes(bytes, &options)),
+            _ => (Form::Text, crcl::text::read_bytes(bytes, &options)),
         };
         Self {
             source: Source::from_bytes(&given.name, bytes),
-            reading: read(bytes, &ReadOptions::default()),
+            reading,
             default_length: given.length(),
             form,
         }

@@ -19,6 +19,7 @@ pub mod chain;
 mod dynamics;
 pub mod follow;
 pub mod ik;
+mod inertia;
 mod links;
 pub mod measure;
 mod motion;
@@ -26,8 +27,9 @@ pub mod reach;
 pub mod urdf;
 
 pub use chain::Chain;
-pub use dynamics::{Dynamics, Inertia};
+pub use dynamics::Dynamics;
 pub use follow::{FollowCause, FollowError, FollowOptions, FollowPoint, TwistPoint, follow};
 pub use ik::{Branches, Goal, IkFailure, IkReport, Solution, Solver};
+pub use inertia::Inertia;
 pub use motion::{ToolGrowth, ToolMotion};
 pub use urdf::{Model, UrdfError};

@@ -20,7 +20,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector
 use std::fmt::Write as _;
 use tree::{Joint, Tree};
 
-use crate::dynamics::Inertia;
+use crate::inertia::Inertia;
 
 /// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

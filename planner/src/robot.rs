@@ -7,6 +7,7 @@
 mod effort;
 mod error;
 mod file;
+mod files;
 mod import;
 mod meshes;
 mod shipped;
@@ -168,7 +169,7 @@ pub fn load(name_or_folder: &str) -> Result<Robot, RobotError> {
     match shipped {
         Some((urdf, toml)) if !is_path => {
             let place = format!("robots/{name_or_folder}");
-            file::Files {
+            files::Files {
                 name: name_or_folder,
                 place: Path::new(&place),
                 urdf,
@@ -189,7 +190,7 @@ pub fn load(name_or_folder: &str) -> Result<Robot, RobotError> {
 /// # Errors
 /// [`RobotError`]; errors name file, line and column.
 pub fn parse(name: &str, urdf: &str, toml: &str) -> Result<Robot, RobotError> {
-    file::Files {
+    files::Files {
         name,
         place: Path::new(name),
         urdf,
@@ -227,7 +228,7 @@ fn load_folder(folder: &Path) -> Result<Robot, RobotError> {
     let (toml, urdf) = (read("robot.toml")?, read("robot.urdf")?);
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = whole.file_name().unwrap_or_default().to_string_lossy();
-    let robot = file::Files {
+    let robot = files::Files {
         name: &name,
         place: folder,
         urdf: &urdf,

@@ -120,15 +120,13 @@ struct Counts {
     samples: usize,
 }
 
-/// Plans one random move and holds its certificate against `samples` samples.
-fn one_move<const N: usize>(
+/// A random move of that shape, and where it begins.
+fn random_move<const N: usize>(
     planner: &Planner<N>,
     most: &ToolLimits,
-    task: Task,
+    shape: Shape,
     random: &mut Random,
-    seen: &mut Seen,
-) {
-    let Task { shape, samples } = task;
+) -> (SVector<f64, N>, Move) {
     let limits = planner.limits();
     let mut joints = || {
         SVector::<f64, N>::from_fn(|i, _| {
@@ -138,24 +136,22 @@ fn one_move<const N: usize>(
     };
     let (start, goal) = (joints(), joints());
     let mut poses = vec![planner.chain().forward(&start)];
-    match shape {
-        Shape::Joint => poses.push(planner.chain().forward(&goal)),
-        Shape::Straight | Shape::Smooth => {
-            let legs = if shape == Shape::Straight {
-                1
-            } else {
-                2 + (random.next() * 3.0) as usize
-            };
-            for _ in 0..legs {
-                let from = poses[poses.len() - 1];
-                let place = from.translation.vector + random.vector() * 0.12;
-                let turn = UnitQuaternion::from_scaled_axis(random.vector() * 0.3);
-                poses.push(Isometry3::from_parts(
-                    Translation3::from(place),
-                    from.rotation * turn,
-                ));
-            }
+    let legs = match shape {
+        Shape::Joint => {
+            poses.push(planner.chain().forward(&goal));
+            0
         }
+        Shape::Straight => 1,
+        Shape::Smooth => 2 + (random.next() * 3.0) as usize,
+    };
+    for _ in 0..legs {
+        let from = poses[poses.len() - 1];
+        let place = from.translation.vector + random.vector() * 0.12;
+        let turn = UnitQuaternion::from_scaled_axis(random.vector() * 0.3);
+        poses.push(Isometry3::from_parts(
+            Translation3::from(place),
+            from.rotation * turn,
+        ));
     }
     let part = [1.0, 1.0, 0.5, 0.2][(random.next() * 4.0) as usize];
     let tolerance = [0.0, 1e-3, 5e-3, 2e-2][(random.next() * 4.0) as usize];
@@ -173,6 +169,19 @@ fn one_move<const N: usize>(
             ..*most
         },
     };
+    (start, motion)
+}
+
+/// Plans one random move and holds its certificate against `samples` samples.
+fn one_move<const N: usize>(
+    planner: &Planner<N>,
+    most: &ToolLimits,
+    task: Task,
+    random: &mut Random,
+    seen: &mut Seen,
+) {
+    let Task { shape, samples } = task;
+    let (start, motion) = random_move(planner, most, shape, random);
     let clock = std::time::Instant::now();
     let found = planner.plan(&motion, &start);
     seen.planning.push(clock.elapsed().as_secs_f64() * 1e3);

@@ -11,6 +11,9 @@ use crate::arrays::{Numbers, joints, put, rows};
 use crate::error::{Field, Raise, argument};
 use crate::wait;
 
+/// Durations (k,) and coefficients (k, dof, 6) of pieces.
+type Pieces<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
+
 /// Motions that one thread plans at a time.
 const BATCH: usize = 64;
 
@@ -117,10 +120,7 @@ impl Motion {
     }
 
     /// Durations (k,) and coefficients (k, dof, 6) of its pieces, lowest power first.
-    fn pieces<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>)> {
+    fn pieces<'py>(&self, py: Python<'py>) -> PyResult<Pieces<'py>> {
         let (durations, numbers) = wait::short(py, "pieces", || self.0.pieces())?;
         let count = durations.len();
         let shape = [count, self.0.dof(), 6];

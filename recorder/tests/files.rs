@@ -259,7 +259,7 @@ fn one_changed_byte_is_found() {
         .collect::<Vec<_>>();
     for place in places.into_iter().chain(bytes.len() - 300..bytes.len()) {
         let mut copy = bytes.clone();
-        copy[place] ^= 1 << dice.0 % 8;
+        copy[place] ^= 1 << (dice.0 % 8);
         fs::write(&changed, &copy).unwrap();
         if let Ok(found) = read(&changed) {
             assert!(found.damaged, "byte {place} of {}", bytes.len());

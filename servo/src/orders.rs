@@ -364,7 +364,7 @@ mod tests {
         let hand = steering();
         hand.orders
             .word
-            .store(u64::MAX & !DEMAND & !ABORT_FAST, Ordering::Relaxed);
+            .store(!(DEMAND | ABORT_FAST), Ordering::Relaxed);
         assert_eq!(hand.orders.asked().order(), u32::MAX);
         assert_eq!(hand.control(Control::Abort), 0);
         let asked = hand.orders.asked();

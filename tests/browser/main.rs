@@ -3,6 +3,7 @@
 //! Without a browser these tests are reported as ignored: `apt-get install chromium-headless-shell`
 //! brings one. `UPDATE_EXPECT=1` renews the pictures of docs/view.md.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
 

@@ -2,6 +2,7 @@
 //! bits; a kill loses a second at most; a fault leaves the minute before it.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
 
 #[path = "../suite/canter.rs"]

@@ -6,6 +6,7 @@
 //! files of the repository. The separate test harness (`libtest-mimic`) is needed because an
 //! ordinary test cannot become ignored at run time.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
 

@@ -4,6 +4,7 @@
 //! stop acts. `cargo test -p system-tests --release --test stops -- --ignored --nocapture` prints a
 //! table; `CANTER_STOPS` says how many stops of each kind, 20 if it is not set.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 
 mod scene;

@@ -77,8 +77,8 @@ impl Watch {
         loop {
             let rests = {
                 let seen = self.seen.lock().unwrap();
-                let after = seen.iter().filter(|seen| seen.published_ns > called);
-                after.clone().count() > 5 && after.last().is_some_and(|seen| seen.resting)
+                let mut after = seen.iter().filter(|seen| seen.published_ns > called);
+                after.clone().count() > 5 && after.next_back().is_some_and(|seen| seen.resting)
             };
             if rests {
                 break;

@@ -1,7 +1,12 @@
 //! Random stalls and kills of engine and driver in motion, as real processes, checked at the
 //! driver's output. The long run: `STORM=1000 ARMS=8 cargo test --test storm -- --ignored
 //! --nocapture`; `SEED` sets the seed.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests"
+)]
 
 mod scene;
 

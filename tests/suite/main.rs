@@ -1,6 +1,7 @@
 //! All system tests as one binary: one link step instead of one per file.
 #![allow(clippy::too_many_lines, reason = "a test reads from top to bottom")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 
 mod arrows;
 mod bad_inputs;

@@ -129,8 +129,11 @@ fn a_flood_does_not_hold_the_engine() {
     });
 }
 
+/// A way to damage a file.
+type Damage = fn(&Path);
+
 /// What is done to segments.
-const DAMAGES: [(&str, fn(&std::path::Path)); 4] = [
+const DAMAGES: [(&str, Damage); 4] = [
     ("cut to nothing", |path| {
         OpenOptions::new()
             .write(true)

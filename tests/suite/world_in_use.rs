@@ -90,11 +90,14 @@ fn a_second_writer_is_refused_by_name() {
     assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
+/// How a database is lost.
+type Loss = fn(&Path);
+
 /// A database that is deleted, or replaced by another, ends the run with an error that says so.
 #[test]
 fn a_lost_world_ends_the_run() {
     let folder = tempfile::tempdir().unwrap();
-    let ways: [(&str, fn(&Path)); 2] = [
+    let ways: [(&str, Loss); 2] = [
         ("was deleted", |path| std::fs::remove_file(path).unwrap()),
         ("was replaced", |path| {
             let other = path.with_extension("other");

@@ -62,7 +62,7 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
         "handshake",
         Ok(format!("session {:#x}", player.ack.session)),
     )];
-    let requests: [(&str, fn(&mut Hello)); 5] = [
+    let requests: [(&str, Change); 5] = [
         ("wrong protocol is refused", |hello| hello.protocol += 1),
         ("protocol 1 is refused", |hello| hello.protocol = 1),
         ("wrong layout is refused", |hello| hello.schema ^= 1),
@@ -80,6 +80,9 @@ pub fn test_driver(arm: &Arm) -> Result<ConformanceReport, IpcError> {
         clauses,
     })
 }
+
+/// What makes a request wrong.
+type Change = fn(&mut Hello);
 
 /// Converts what was observed into a verdict.
 fn judge(name: &'static str, seen: Seen) -> Clause {

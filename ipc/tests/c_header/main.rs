@@ -17,6 +17,7 @@ mod messages;
 use messages::{Message, messages};
 
 /// The header's constants: name and value.
+#[allow(clippy::too_many_lines, reason = "a table")]
 fn constants() -> Vec<(&'static str, u64)> {
     let number = |name, value: u32| (name, u64::from(value));
     vec![

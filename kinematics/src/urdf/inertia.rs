@@ -5,7 +5,7 @@ use roxmltree::Node;
 
 use super::limit;
 use super::tree::{Joint, Tree, child};
-use crate::dynamics::Inertia;
+use crate::inertia::Inertia;
 
 /// One finite number of an attribute.
 fn number(node: Node<'_, '_>, attribute: &str) -> Option<f64> {

@@ -18,6 +18,10 @@ use crate::with_dof;
 
 type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
 
+/// Finds postures at a pose, the easiest near the given one first.
+type Postures<const N: usize> =
+    fn(&Planner<N>, &Isometry3<f64>, &SVector<f64, N>) -> Vec<SVector<f64, N>>;
+
 /// What a planner of `N` joints calls.
 #[derive(Clone, Copy)]
 pub(super) struct Kernel<const N: usize> {
@@ -27,7 +31,7 @@ pub(super) struct Kernel<const N: usize> {
     pub actuate: fn(&Planner<N>, &JointMove, &SVector<f64, N>) -> Planned<N>,
     pub legs: fn(&Planner<N>, &LegsMove, &SVector<f64, N>) -> Planned<N>,
     pub screw: fn(&Planner<N>, &ScrewMove, &SVector<f64, N>) -> Planned<N>,
-    pub postures: fn(&Planner<N>, &Isometry3<f64>, &SVector<f64, N>) -> Vec<SVector<f64, N>>,
+    pub postures: Postures<N>,
 }
 
 impl<const N: usize> std::fmt::Debug for Kernel<N> {

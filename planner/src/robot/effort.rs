@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::RobotError;
-use super::file::Files;
+use super::files::Files;
 
 /// Which further limits hold.
 #[derive(Deserialize)]

@@ -2,24 +2,16 @@
 
 use super::effort::{Limits, Payload};
 use super::error::RobotError;
+use super::files::Files;
 use super::{EndEffector, Gripper, JointLimits, Margin, Robot, ToolChanger, ToolLimits};
 use kinematics::{Model, urdf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use std::ops::Range;
-use std::path::Path;
 use toml::Spanned;
 
 /// Most joints that the engine drives.
 pub(super) const MOST_JOINTS: usize = 8;
-
-/// The two texts of a robot folder.
-pub(super) struct Files<'a> {
-    pub(super) name: &'a str,
-    pub(super) place: &'a Path,
-    pub(super) urdf: &'a str,
-    pub(super) toml: &'a str,
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

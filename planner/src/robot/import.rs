@@ -2,7 +2,7 @@
 
 use super::Robot;
 use super::error::RobotError;
-use super::file::Files;
+use super::files::Files;
 use super::meshes::copy_meshes;
 use kinematics::{Model, urdf};
 use std::fmt::Write as _;

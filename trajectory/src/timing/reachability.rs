@@ -4,7 +4,7 @@
 use nalgebra::{SVector, Vector3};
 
 use super::reach::{self, ReachGrid};
-use super::rise::Rise;
+use super::rise::{Rise, joint_ratio};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
@@ -43,11 +43,6 @@ pub(super) fn speed_cap<const N: usize>(
         .max(linear / limits.speed)
         .max(angular / limits.angular_speed);
     1.0 / (ratio * ratio).max(rate * rate)
-}
-
-/// The largest `|d_j| / limit_j`.
-pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f64, N>) -> f64 {
-    d.component_div(limit).amax()
 }
 
 impl ReachabilityPass {

@@ -2,8 +2,12 @@
 
 use nalgebra::SVector;
 
-use super::reachability::joint_ratio;
 use crate::JointLimits;
+
+/// The largest `|d_j| / limit_j`.
+pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f64, N>) -> f64 {
+    d.component_div(limit).amax()
+}
 
 /// Bounds of the second and third derivative of `u(t)` along a path that is straight in joint space
 /// and even in `u`: there `q'` is constant, so that each limit of a joint bounds `u` alone.

@@ -6,7 +6,8 @@ use super::block::{LANE, Lane};
 use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
-use super::reachability::{joint_ratio, speed_cap};
+use super::reachability::speed_cap;
+use super::rise::joint_ratio;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, ToolLimits};
 

@@ -1,4 +1,5 @@
 //! Properties of state-to-state moves, and agreement with rsruckig.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod laws;
 mod peer;
