@@ -421,8 +421,9 @@ mod tests {
             "{:?}",
             plan.rests()
         );
-        // 0.302 m inside the balls at 0.1 m/s, and 0.2 s to start and to stop.
-        assert!(plan.duration() < 3.35, "{}", plan.duration());
+        // The exact circle is 0.314 m long: 3.34 s at 0.1 m/s, 0.2 s to start and to stop among them.
+        // Windows lose up to 1 % of that; with a rest it was 3.42 s.
+        assert!(plan.duration() < 3.38, "{}", plan.duration());
     }
 
     /// Rests are named, and the motion rests at no other time.
