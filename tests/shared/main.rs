@@ -42,12 +42,8 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Ignored because they do not hold yet for these programs of seven-joint arms and of smooth moves.
-const NOT_YET: [&str; 3] = [
-    "repro::tolerance_zero_is_not_slower_than_straight_moves",
-    "repro::more_tolerance_is_not_slower",
-    "repro::lines_that_can_be_followed_are_not_refused",
-];
+/// Ignored because it does not hold yet: a seven-joint arm takes longer with 20 mm than with 5 mm.
+const NOT_YET: [&str; 1] = ["repro::more_tolerance_is_not_slower"];
 
 macro_rules! trials {
     ($($module:ident::$name:ident)*) => {
