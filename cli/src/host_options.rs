@@ -12,6 +12,7 @@ use crate::failure::Failure;
 use crate::recorder_options::RecorderOptions;
 use crate::simulation::{Kind, Simulation};
 use crate::view_process::ViewProcess;
+use crate::wall::WallOption;
 
 /// An engine that ends its simulated driver, if it has one.
 pub(crate) type Host = engine::host::Host<Company>;
@@ -39,6 +40,8 @@ pub(crate) struct HostOptions {
     /// Python that runs the MuJoCo driver
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: String,
+    #[command(flatten)]
+    wall: WallOption,
     #[command(flatten)]
     pub(crate) recorder: RecorderOptions,
     /// Show the arm in the browser: prints the address of a live view, see `canter view`
@@ -110,11 +113,17 @@ impl HostOptions {
         default_length: crcl::LengthUnit,
         on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
+        if self.wall.text().is_some() && self.driver != DriverChoice::Sim {
+            let cause = anyhow::anyhow!("--wall is for --driver sim");
+            return Err(Failure::new(Exit::Usage, cause));
+        }
         let arm = self.arm.open()?;
         // Before the driver: a second engine must not disturb the arm of the first.
         let channels = ClientChannels::open(&arm)?;
         let simulation = match self.driver {
-            DriverChoice::Sim => Some(Kind::Servos),
+            DriverChoice::Sim => Some(Kind::Servos {
+                wall: self.wall.text(),
+            }),
             DriverChoice::Mujoco => Some(Kind::Mujoco {
                 python: &self.python,
             }),

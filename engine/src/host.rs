@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crcl::ReadOptions;
+use crcl::{Located, ReadOptions};
 use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
 use serde_json::{Value, json};
@@ -297,15 +297,27 @@ impl<D> Host<D> {
                     }
                     answer
                 }
-                jog @ Verb::Jog { .. } => self::jog(session, jog),
-                Verb::SingleStep { on } => {
-                    session.set_single_step(on);
-                    Answer::accept(Value::Null)
-                }
-                Verb::Next => done(session.step_on()),
-                _ => Answer::refuse("this engine cannot do that"),
+                other => asked(session, other),
             }
         })
+    }
+}
+
+/// Asks the session for what concerns it alone.
+fn asked(session: &Session, verb: Verb) -> Answer {
+    match verb {
+        Verb::Replace {
+            format,
+            name,
+            program,
+        } => replace(session, &format, &name, &program),
+        jog @ Verb::Jog { .. } => jog_for(session, jog),
+        Verb::SingleStep { on } => {
+            session.set_single_step(on);
+            Answer::accept(Value::Null)
+        }
+        Verb::Next => done(session.step_on()),
+        _ => Answer::refuse("this engine cannot do that"),
     }
 }
 
@@ -367,11 +379,30 @@ fn cut(note: &Value) -> Value {
 
 /// Takes a program of a client: all its commands or none.
 fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    match read(format, name, program) {
+        Ok(commands) => taken(session.submit(commands)),
+        Err(refusal) => refusal,
+    }
+}
+
+/// Executes a move in the place of the one that moves.
+fn replace(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    match read(format, name, program) {
+        Ok(commands) => taken(session.replace(commands)),
+        Err(refusal) => refusal,
+    }
+}
+
+/// The commands of a program, or the answer that says what is wrong with it.
+fn read(format: &str, name: &str, program: &str) -> Result<Vec<Located>, Answer> {
     let read = match format {
         "text" => crcl::text::read,
         "json" => crcl::json::read,
         "xml" => crcl::xml::read,
-        other => return Answer::refuse(format!("a program is text, json or xml, not {other:?}")),
+        other => {
+            let why = format!("a program is text, json or xml, not {other:?}");
+            return Err(Answer::refuse(why));
+        }
     };
     let reading = read(program, &ReadOptions::default());
     if reading.has_errors() {
@@ -382,20 +413,25 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
             &source,
             (crcl::Look::Plain, 100),
         );
-        return Answer::refuse(text.trim_end());
+        return Err(Answer::refuse(text.trim_end()));
     }
-    match session.submit(reading.program.commands) {
+    Ok(reading.program.commands)
+}
+
+/// The numbers of commands that were taken, as an answer.
+fn taken(ids: Result<Vec<u32>, impl std::fmt::Display>) -> Answer {
+    match ids {
         Ok(ids) => Answer::accept(json!({
             "first": ids.first(),
             "last": ids.last(),
             "commands": ids.len(),
         })),
-        Err(full) => Answer::refuse(full.to_string()),
+        Err(refusal) => Answer::refuse(refusal.to_string()),
     }
 }
 
 /// Jogs for as long as the client sends requests.
-fn jog(session: &Session, verb: Verb) -> Answer {
+fn jog_for(session: &Session, verb: Verb) -> Answer {
     let Verb::Jog {
         space,
         speeds,

@@ -85,6 +85,13 @@ impl Queue {
         Ok(id)
     }
 
+    /// Numbers for commands that do not wait: as many as asked for.
+    pub fn number(&mut self, count: usize) -> Vec<u32> {
+        let first = self.next_id;
+        self.next_id += u32::try_from(count).unwrap_or(0);
+        (first..self.next_id).collect()
+    }
+
     /// Takes the oldest command.
     pub fn pop(&mut self) -> Option<Queued> {
         self.commands.pop_front()

@@ -23,6 +23,16 @@ pub enum Verb {
         /// The program.
         program: String,
     },
+    /// Execute a move in the place of the one that moves now, in the same state of motion and without
+    /// a stop; refused where that is not possible, and the old move goes on.
+    Replace {
+        /// `text`, `json` or `xml`.
+        format: String,
+        /// The program's name, for messages.
+        name: String,
+        /// The program: one move, with settings before and behind it.
+        program: String,
+    },
     /// Jog; the arm stops when no further request comes in time.
     Jog {
         /// `joint`, `tool`, `workstation` or `goal`.
@@ -71,6 +81,7 @@ impl Verb {
     pub fn commands(&self) -> bool {
         match self {
             Self::Submit { .. }
+            | Self::Replace { .. }
             | Self::Jog { .. }
             | Self::SingleStep { .. }
             | Self::Next

@@ -5,6 +5,7 @@ use std::any::Any;
 use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
+use realtime::Sample;
 use trajectory::JointLimits;
 
 use crate::command_error::{CommandError, ErrorClass};
@@ -22,6 +23,8 @@ pub struct Step<const N: usize> {
     pub planned: Option<PlannedMove<N>>,
     /// Nominal length in servo ticks, without the time until a driver's answer.
     pub ticks: u64,
+    /// Conditions on sensors that end it before its time; their limits are SI.
+    pub guards: Vec<crcl::Guard>,
 }
 
 /// A step that was planned ahead, with the state it was planned for and the state after it.
@@ -165,10 +168,47 @@ impl<const N: usize> Controller<N> {
     /// Resolves a command with the present settings and plans it as a whole.
     ///
     /// # Errors
-    /// A [`CommandError`]; the controller is then unchanged.
+    /// A [`CommandError`]; the controller is then unchanged, but for guards of the command.
     pub fn step(&mut self, command: &crcl::Command) -> Result<Step<N>, CommandError> {
         let flange = self.workstation_from_flange.forward(&self.joints);
         let task = self.modal.resolve(command, &flange)?;
+        let guards = if command.takes_guards() {
+            self.modal.take_guards()
+        } else {
+            Vec::new()
+        };
+        let step = self.plan(task)?;
+        Ok(Step { guards, ..step })
+    }
+
+    /// As [`Self::step`], for a move that begins in a state of motion: it takes the place of one that
+    /// is under way.
+    ///
+    /// # Errors
+    /// A [`CommandError`] for a command that is no single move without guards, or that cannot begin
+    /// in that state.
+    pub fn step_moving(
+        &mut self,
+        command: &crcl::Command,
+        start: &Sample<N>,
+    ) -> Result<Step<N>, CommandError> {
+        let flange = self.workstation_from_flange.forward(&start.position);
+        let task = self.modal.resolve(command, &flange)?;
+        let guards = self.modal.take_guards();
+        let Task::Move(motion) = task else {
+            return Err(CommandError::motion(
+                "only a single move begins while the arm moves",
+            ));
+        };
+        if !guards.is_empty() {
+            return Err(CommandError::motion("a guarded move begins at rest"));
+        }
+        let planned = self.planner.moving(&motion, start);
+        self.moved(motion, planned)
+    }
+
+    /// The step of a task, from where the arm is.
+    fn plan(&mut self, task: Task) -> Result<Step<N>, CommandError> {
         let (planner, start) = (&self.planner, &self.joints);
         match task {
             Task::Move(motion) => {
@@ -193,6 +233,7 @@ impl<const N: usize> Controller<N> {
             Task::Dwell { seconds } => Ok(Step {
                 ticks: self.ticks(seconds),
                 planned: None,
+                guards: Vec::new(),
                 task,
             }),
             Task::Tool(action) => {
@@ -201,12 +242,14 @@ impl<const N: usize> Controller<N> {
                 Ok(Step {
                     ticks: self.ticks(time),
                     planned: None,
+                    guards: Vec::new(),
                     task,
                 })
             }
             _ => Ok(Step {
                 ticks: 0,
                 planned: None,
+                guards: Vec::new(),
                 task,
             }),
         }
@@ -227,6 +270,7 @@ impl<const N: usize> Controller<N> {
             ticks: self.ticks(planned.trajectory.duration()),
             task: Task::Move(motion),
             planned: Some(planned),
+            guards: Vec::new(),
         })
     }
 

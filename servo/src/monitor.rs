@@ -3,12 +3,14 @@
 use rtrb::Consumer;
 
 use super::event::{Event, Recorded};
+use super::guard::Guarded;
 
 /// The reader of events and of published and measured samples.
 #[derive(Debug)]
 pub struct Monitor<const N: usize> {
     pub(super) events: Consumer<Event>,
     pub(super) samples: Consumer<Recorded<N>>,
+    pub(super) guarded: Consumer<Guarded<N>>,
     pub(super) seen: u64,
 }
 
@@ -18,6 +20,12 @@ impl<const N: usize> Monitor<N> {
         let event = self.events.pop().ok();
         self.seen += u64::from(event.is_some());
         event
+    }
+
+    /// What became of the oldest guarded command that was not read yet; it is there when the
+    /// [`Event::Finished`] of the command comes.
+    pub fn guarded(&mut self) -> Option<Guarded<N>> {
+        self.guarded.pop().ok()
     }
 
     /// How many events were read, for [`super::SegmentSender::settle`].

@@ -72,6 +72,11 @@ impl Inbox {
         Ok(ids)
     }
 
+    /// Numbers for commands that take the place of the one that moves.
+    pub(super) fn number(&mut self, count: usize) -> Vec<u32> {
+        self.queue.number(count)
+    }
+
     /// Takes the oldest command off the queue, if it was given at `epoch`.
     pub(super) fn take(&mut self, epoch: u32) -> Option<Queued> {
         if !self.has(epoch) {

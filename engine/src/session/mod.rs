@@ -24,7 +24,7 @@ use thiserror::Error;
 
 pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
-pub use status::{Cycles, Largest, Status};
+pub use status::{Cycles, Largest, Spread, Status, Timing};
 
 use crate::queue::{Full, Given};
 use inbox::Inbox;
@@ -136,6 +136,11 @@ pub enum SubmitError {
     Closed,
 }
 
+/// Why a move cannot take the place of the one that moves.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("the move cannot take the place of the one before without a stop: {0}")]
+pub struct ReplaceError(pub(crate) String);
+
 /// Why no command is let go in single step.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
@@ -163,6 +168,7 @@ enum Order {
     /// There is something new in the inbox.
     Look,
     Jog(Jog, Sender<Result<(), JogError>>),
+    Replace(Vec<Located>, Sender<Result<Vec<u32>, ReplaceError>>),
     Close,
 }
 
@@ -306,6 +312,20 @@ impl Session {
             return Err(SubmitError::Closed);
         }
         Ok(ids)
+    }
+
+    /// Has a move take the place of the one that moves now, in the same state of motion and without
+    /// a stop. The move may have settings before and behind it. The old move never becomes done.
+    ///
+    /// # Errors
+    /// [`ReplaceError`], and the old move goes on: stop it and give the new one as any other.
+    pub fn replace(&self, commands: Vec<Located>) -> Result<Vec<u32>, ReplaceError> {
+        let (answer, answered) = mpsc::channel();
+        if self.orders.send(Order::Replace(commands, answer)).is_err() {
+            return Err(ReplaceError("the session has ended".to_owned()));
+        }
+        let closed = || ReplaceError("the session has ended".to_owned());
+        answered.recv().unwrap_or_else(|_| Err(closed()))
     }
 
     /// Executes commands one by one from now on, or all again. In single step each command waits for

@@ -1,6 +1,8 @@
 //! The worker: takes commands, plans ahead, feeds the executor, reports in order.
 
+mod guarding;
 mod jogging;
+mod replacing;
 mod reports;
 
 use std::collections::VecDeque;
@@ -11,14 +13,16 @@ use std::time::Duration;
 use ipc::Clock;
 use kinematics::Chain;
 use realtime::{Piece, Segment};
-use trajectory::ToolLimits;
+use trajectory::{ToolLimits, Trajectory};
 
+use guarding::Guarding;
 use jogging::Jogging;
 
 use super::note::Note;
 use super::status::state_name;
-use super::{Begun, Live, Order, SessionConfig, SessionError, Shared, Status};
+use super::{Begun, Live, Order, SessionConfig, SessionError, Shared, Status, Timing};
 use crate::queue::Given;
+use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
@@ -53,6 +57,12 @@ pub(super) struct InFlight<const N: usize> {
     says: Option<Note>,
     /// A refused command is reported as such and not as done.
     refused: bool,
+    /// Number of the newest order when it was taken.
+    newest: u32,
+    /// The guards of a guarded command: where it ends is not known before.
+    guarding: Option<Guarding<N>>,
+    /// The motion of a move.
+    motion: Option<Trajectory<N>>,
 }
 
 pub(super) struct Worker<'a, const N: usize> {
@@ -79,6 +89,9 @@ pub(super) struct Worker<'a, const N: usize> {
     /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
+    /// Whether the last command that was to take the place of another has done so; nothing as long
+    /// as there is no answer.
+    spliced: Option<(u32, bool)>,
     closing: bool,
     ends: Ends,
 }
@@ -154,6 +167,7 @@ fn start<'a, const N: usize>(
         jogging: None,
         held: None,
         fault: None,
+        spliced: None,
         closing: false,
         ends,
     };
@@ -184,6 +198,8 @@ impl<const N: usize> Worker<'_, N> {
             && !self.is_held()
             && self.fault.is_none()
             && self.jogging.is_none()
+            // Where a guarded command ends is not known before.
+            && self.flight.iter().all(|flight| flight.guarding.is_none())
             // During an abort it is not known where the next command begins.
             && self.steering.aborts() == self.epoch
             && self.ends.shared.inbox().has(self.epoch)
@@ -221,6 +237,11 @@ impl<const N: usize> Worker<'_, N> {
                 // The caller may have ended; the dead man's switch ends the jog.
                 let _ = answer.send(result);
             }
+            Order::Replace(commands, answer) => {
+                let result = self.replace(commands);
+                // The caller may have ended; then the move goes on to its end.
+                let _ = answer.send(result);
+            }
             Order::Close => self.closing = true,
         }
     }
@@ -249,6 +270,9 @@ impl<const N: usize> Worker<'_, N> {
             finished: None,
             says: None,
             refused: false,
+            newest,
+            guarding: None,
+            motion: None,
         };
         let planned = planned
             .and_then(AnyStep::into_step::<N>)
@@ -263,35 +287,41 @@ impl<const N: usize> Worker<'_, N> {
                 self.enlist(&mut flight, step);
             }
             Err(error) => {
-                let dropped = match self.config.on_refusal {
-                    FailurePolicy::Abort => {
-                        self.controller.abort();
-                        self.ends.shared.inbox().drop_all(None)
-                    }
-                    FailurePolicy::Hold => {
-                        self.held = Some(newest);
-                        0
-                    }
-                    FailurePolicy::Skip => 0,
-                };
-                let (id, line, name) = (flight.id, flight.line, flight.name);
-                flight.says = Some(Note::Refused {
-                    id,
-                    line,
-                    name,
-                    error,
-                    dropped,
-                });
-                flight.refused = true;
+                self.refuse(&mut flight, error);
                 flight.finished = Some(0);
             }
         }
         self.flight.push_back(flight);
     }
 
+    /// A command has failed: says so when its turn comes, and does what is to be done then.
+    fn refuse(&mut self, flight: &mut InFlight<N>, error: CommandError) {
+        let dropped = match self.config.on_refusal {
+            FailurePolicy::Abort => {
+                self.controller.abort();
+                self.ends.shared.inbox().drop_all(None)
+            }
+            FailurePolicy::Hold => {
+                self.held = Some(flight.newest);
+                0
+            }
+            FailurePolicy::Skip => 0,
+        };
+        let (id, line, name) = (flight.id, flight.line, flight.name);
+        flight.says = Some(Note::Refused {
+            id,
+            line,
+            name,
+            error,
+            dropped,
+        });
+        flight.refused = true;
+    }
+
     /// The work of one step; a command without work is finished at once.
     fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>) {
         let command = flight.id;
+        self.enlist_guards(flight, &step);
         match step.task {
             Task::Message { text } => flight.says = Some(Note::Message { text }),
             Task::End { reason } => flight.says = Some(Note::Ended { reason }),
@@ -323,7 +353,19 @@ impl<const N: usize> Worker<'_, N> {
                 last,
             }));
         }
-        if pieces.is_empty() {
+        if !pieces.is_empty() {
+            flight.motion = step.planned.map(|planned| planned.trajectory);
+            return;
+        }
+        if flight.guarding.is_some() {
+            // The guards are looked at for a period, although nothing moves.
+            let piece = Piece::hold(*self.controller.joints(), 1.0 / self.config.rate_hz);
+            self.work.push_back(Work::Motion(Segment {
+                piece,
+                command,
+                last: true,
+            }));
+        } else {
             flight.finished = Some(0);
         }
     }
@@ -379,6 +421,10 @@ impl<const N: usize> Worker<'_, N> {
             let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
             status.set_pose(&chain.forward(&now.position));
             status.cycles = remote.counters().into();
+            status.timing = Timing {
+                wake_up: remote.latency().into(),
+                work: remote.work().into(),
+            };
         }))
     }
 

@@ -9,6 +9,7 @@ use std::any::Any;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
+use realtime::Sample;
 use trajectory::ToolLimits;
 
 use super::jog::Direction;
@@ -31,6 +32,7 @@ pub(super) struct Kernel<const N: usize> {
     pub actuate: fn(&Planner<N>, &JointMove, &SVector<f64, N>) -> Planned<N>,
     pub legs: fn(&Planner<N>, &LegsMove, &SVector<f64, N>) -> Planned<N>,
     pub screw: fn(&Planner<N>, &ScrewMove, &SVector<f64, N>) -> Planned<N>,
+    pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
     pub postures: Postures<N>,
 }
 
@@ -61,6 +63,7 @@ fn table(dof: usize) -> &'static dyn Any {
             actuate: Planner::plan_joints,
             legs: Planner::plan_legs,
             screw: Planner::plan_screw,
+            moving: Planner::plan_moving,
             postures: Planner::find_postures,
         };
         &KERNEL

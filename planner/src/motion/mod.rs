@@ -20,6 +20,7 @@ mod least;
 mod least_turn;
 mod legs;
 mod motion_error;
+mod moving;
 mod reach;
 mod screw;
 mod singular;
@@ -28,6 +29,7 @@ mod soonest;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
+use realtime::Sample;
 use trajectory::bounds::Held;
 use trajectory::{JointLimits, MotionBounds, ToolLimits, Trajectory};
 
@@ -187,6 +189,16 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         (self.kernel.screw)(self, motion, start)
+    }
+
+    /// Plans a move that begins in a state of motion, to rest: any way in joint space, or straight on
+    /// along the line that the controlled point moves on.
+    ///
+    /// # Errors
+    /// [`MotionError`] when the move cannot begin in that state, or cannot be made; it may still be
+    /// possible from rest.
+    pub fn moving(&self, motion: &Move, start: &Sample<N>) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.moving)(self, motion, start)
     }
 
     /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the

@@ -88,6 +88,9 @@ pub enum MotionError {
     /// The joint path has fewer than two points.
     #[error("the motion cannot be timed: its path has fewer than two points")]
     NoWay,
+    /// The move cannot begin in the state of motion that the arm is in.
+    #[error("the move cannot begin while the arm moves: {0}")]
+    FromMotion(&'static str),
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]
     Uncertified(#[from] Fault),
@@ -110,6 +113,7 @@ impl MotionError {
                 "stay within the range that `canter robots show` tells"
             }
             Self::Jog(_) => "go the other way",
+            Self::FromMotion(_) => "stop first",
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
             Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
                 "please report this with the program: it is a fault of the planner"

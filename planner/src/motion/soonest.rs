@@ -147,7 +147,7 @@ impl<const N: usize> Planner<N> {
 
     /// A factor by which time has to be stretched at least so that the tool keeps its limits, from
     /// samples.
-    fn least_stretch(&self, motion: &Trajectory<N>, limits: &ToolLimits) -> f64 {
+    pub(super) fn least_stretch(&self, motion: &Trajectory<N>, limits: &ToolLimits) -> f64 {
         let mut most = [0.0_f64; 6];
         for piece in motion.pieces() {
             for share in [0.0, 0.5, 1.0] {

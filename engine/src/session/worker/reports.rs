@@ -45,6 +45,7 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Finished { command, .. } if self.jog_finished(command) => {}
             Event::Finished { command, tick } => {
+                self.end_guards(command);
                 if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
                     flight.finished = Some(tick);
                 }
@@ -60,6 +61,7 @@ impl<const N: usize> Worker<'_, N> {
                 joint: joint + 1,
                 error,
             }),
+            Event::Spliced { by, accepted, .. } => self.spliced = Some((by, accepted)),
             Event::SpeedAsked { share, .. } => self.say(Note::SpeedAsked { share }),
             Event::Stopped { .. } => self.say(Note::Stopped),
             Event::Aborted { aborts, .. } => {
