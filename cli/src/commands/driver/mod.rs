@@ -4,6 +4,7 @@ mod franka;
 mod mujoco;
 mod sim;
 mod test;
+mod ur;
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -38,6 +39,7 @@ enum What {
     Sim(sim::Sim),
     Mujoco(mujoco::Mujoco),
     Franka(franka::Franka),
+    Ur(ur::Ur),
     Test(test::Test),
 }
 
@@ -48,6 +50,7 @@ impl Driver {
             What::Sim(sim) => sim.run(),
             What::Mujoco(mujoco) => mujoco.run(),
             What::Franka(franka) => franka.run(),
+            What::Ur(ur) => ur.run(),
             What::Test(test) => test.run(),
         }
     }
