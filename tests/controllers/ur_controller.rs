@@ -115,7 +115,7 @@ fn run(state: &Mutex<State>, ends: &AtomicBool) {
             let mut state = state.lock().unwrap();
             state.cycle();
             servers::send_states(&mut state);
-            if state.cycles % (state.setting.rate as u64 / 10) == 0 {
+            if state.cycles.is_multiple_of(state.setting.rate as u64 / 10) {
                 // The states of the primary interface, which nobody needs here.
                 state.send_primary(&[16]);
             }

@@ -150,7 +150,7 @@ impl Link {
         Err(Refusal::lost(&format!("no answer to the request {name}")))
     }
 
-    fn first(&self) -> Result<Option<(u8, &[u8], usize)>, Refusal> {
+    fn first(&self) -> Result<Option<rtde::Package<'_>>, Refusal> {
         rtde::first(&self.bytes[..self.filled]).map_err(|reason| Refusal::lost(&reason))
     }
 

@@ -33,6 +33,9 @@ pub(crate) mod kind {
     pub(crate) const DATA: u8 = b'U';
 }
 
+/// The kind of a package, its payload, and its length with the header.
+pub(crate) type Package<'a> = (u8, &'a [u8], usize);
+
 /// The version of a controller's software.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
@@ -93,7 +96,7 @@ pub(crate) fn names() -> String {
 ///
 /// # Errors
 /// A header that cannot be one.
-pub(crate) fn first(bytes: &[u8]) -> Result<Option<(u8, &[u8], usize)>, String> {
+pub(crate) fn first(bytes: &[u8]) -> Result<Option<Package<'_>>, String> {
     let [high, low, kind, ..] = *bytes else {
         return Ok(None);
     };

@@ -73,7 +73,8 @@ pub(crate) fn rtde(mut stream: TcpStream, state: &Arc<Mutex<State>>) {
                 let rate = f64::from_be_bytes(*rate);
                 every = (state.setting.rate / rate).round().max(1.0) as u64;
                 let names = String::from_utf8_lossy(names);
-                fields = names.split(',').map(str::to_owned).collect();
+                let named = names.split(',').filter(|name| !name.is_empty());
+                fields = named.map(str::to_owned).collect();
                 let kinds = fields.iter().map(|name| {
                     let found = state.field(name);
                     found.map_or("NOT_FOUND", |(kind, _)| kind)
@@ -110,7 +111,7 @@ pub(crate) fn send_states(state: &mut State) {
     let cycles = state.cycles;
     let mut listeners = std::mem::take(&mut state.listeners);
     listeners.retain_mut(|listener| {
-        if cycles % listener.every != 0 {
+        if !cycles.is_multiple_of(listener.every) {
             return true;
         }
         let mut payload = vec![1];

@@ -144,7 +144,7 @@ fn tokens(line: &str, number: usize) -> Result<Vec<Token>, SyntaxError> {
 /// How a block ended.
 #[derive(PartialEq)]
 enum End {
-    End,
+    Whole,
     Elif(Expression),
     Else,
 }
@@ -168,7 +168,7 @@ impl Reader {
                 line,
             };
             match words.word() {
-                Some("end") => return Ok((body, End::End)),
+                Some("end") => return Ok((body, End::Whole)),
                 Some("else") => return Ok((body, End::Else)),
                 Some("elif") => {
                     words.at = 1;
@@ -211,7 +211,7 @@ impl Reader {
             let (body, end) = self.block()?;
             cases.push((condition, body));
             condition = match end {
-                End::End => return Ok(What::If(cases, Vec::new())),
+                End::Whole => return Ok(What::If(cases, Vec::new())),
                 End::Elif(next) => next,
                 End::Else => return Ok(What::If(cases, self.block()?.0)),
             };

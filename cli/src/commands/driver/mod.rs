@@ -1,6 +1,7 @@
 //! Drivers: one file per kind of driver, and the test of any driver.
 
 mod franka;
+mod kuka;
 mod mujoco;
 mod sim;
 mod test;
@@ -40,6 +41,7 @@ enum What {
     Mujoco(mujoco::Mujoco),
     Franka(franka::Franka),
     Ur(ur::Ur),
+    Kuka(kuka::Kuka),
     Test(test::Test),
 }
 
@@ -51,6 +53,7 @@ impl Driver {
             What::Mujoco(mujoco) => mujoco.run(),
             What::Franka(franka) => franka.run(),
             What::Ur(ur) => ur.run(),
+            What::Kuka(kuka) => kuka.run(),
             What::Test(test) => test.run(),
         }
     }
