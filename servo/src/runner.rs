@@ -66,6 +66,9 @@ struct Working {
     left: u64,
 }
 
+/// The largest delay of a driver that following errors are forgiven for (s).
+const LARGEST_DELAY: f64 = 0.2;
+
 /// The work of the real-time thread in a period: it gets states and planned work, and returns
 /// setpoints and events. After [`Runner::open`] nothing allocates or waits.
 #[derive(Debug)]
@@ -88,6 +91,8 @@ pub struct Runner<const N: usize> {
     ready: bool,
     /// What is reported when the measured arm has arrived, in order.
     awaited: VecDeque<Awaited<N>>,
+    /// How late the arm is by the driver's own delay (s).
+    delay: f64,
     /// Whether the arm asks for less speed.
     slowed: bool,
     asked: Asked,
@@ -136,6 +141,7 @@ impl<const N: usize> Runner<N> {
             blind: 0,
             ready: false,
             awaited: VecDeque::with_capacity(WAITING),
+            delay: 0.0,
             slowed: false,
             asked: shared.orders.asked(),
             aborting: None,
@@ -182,6 +188,7 @@ impl<const N: usize> Runner<N> {
         };
         (self.quiet, self.blind) = (0, 0);
         self.ready = false;
+        self.delay = (ack.delay_ns as f64 * 1e-9).min(LARGEST_DELAY);
         self.slowed = false;
         self.awaited.clear();
         self.fault = None;

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 21] = [
+const ARROWS: [(&str, &[&str]); 23] = [
     (
         "cli",
         &[
@@ -27,6 +27,8 @@ const ARROWS: [(&str, &[&str]); 21] = [
             "scheduling",
             "driver-sim",
             "driver-franka",
+            "driver-ur",
+            "driver-kuka",
             "driver-conformance",
         ],
     ),
@@ -67,6 +69,8 @@ const ARROWS: [(&str, &[&str]); 21] = [
     ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
     ("driver-franka", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-ur", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-kuka", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
     ("kinematics", &["simd"]),
@@ -92,7 +96,10 @@ const FENCES: [(&str, &[&str]); 14] = [
     ("httparse", &["view"]),
     ("pyo3", &["canter-python"]),
     ("numpy", &["canter-python"]),
-    ("rtrb", &["servo", "driver-franka"]),
+    (
+        "rtrb",
+        &["servo", "driver-franka", "driver-ur", "driver-kuka"],
+    ),
     ("libc", &["ipc", "scheduling"]),
 ];
 

@@ -28,8 +28,8 @@ use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
-    Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering, ToolOrder,
-    Work,
+    Arrival, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering,
+    ToolOrder, Work,
 };
 
 /// Largest number of commands in work, the one that moves among them.
@@ -143,6 +143,10 @@ fn start<'a, const N: usize>(
     wanted.record = config.record;
     wanted.connect = config.connect;
     wanted.on_wait = config.on_wait;
+    wanted.arrival = Arrival {
+        tolerance: robot.arrival.tolerance,
+        patience: Duration::from_secs_f64(robot.arrival.patience),
+    };
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
     wanted.feed_forward = robot
         .efforts::<N>()
