@@ -4,15 +4,19 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crcl::ReadOptions;
-use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
+use ipc::{
+    Answer, Arm, ClientServer, FollowPoint, Identity, IpcError, Ownership, StatusWriter, Verb,
+};
 use planner::robot::Robot;
+use planner::timed::{TimedPoint, TimedTrajectory};
 use serde_json::{Value, json};
 use servo::ExecutorError;
 
 use crate::control::ControlThread;
 use crate::flight::{Flight, FlightOptions, Recorded};
+use crate::queue::Given;
 use crate::session::{
-    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
+    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status, SubmitError,
 };
 use crate::texts::Texts;
 pub use crate::texts::{GivenProgram, length_word};
@@ -298,6 +302,15 @@ impl<D> Host<D> {
                     answer
                 }
                 jog @ Verb::Jog { .. } => self::jog(session, jog),
+                Verb::Follow {
+                    joints,
+                    points,
+                    retime,
+                } => given(session.give(vec![Given::Timed(TimedTrajectory {
+                    joints,
+                    points: points.into_iter().map(timed_point).collect(),
+                    retime,
+                })])),
                 Verb::SingleStep { on } => {
                     session.set_single_step(on);
                     Answer::accept(Value::Null)
@@ -384,13 +397,28 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
         );
         return Answer::refuse(text.trim_end());
     }
-    match session.submit(reading.program.commands) {
+    given(session.submit(reading.program.commands))
+}
+
+/// The answer to what was given to the queue: the numbers of the commands.
+fn given(result: Result<Vec<u32>, SubmitError>) -> Answer {
+    match result {
         Ok(ids) => Answer::accept(json!({
             "first": ids.first(),
             "last": ids.last(),
             "commands": ids.len(),
         })),
         Err(full) => Answer::refuse(full.to_string()),
+    }
+}
+
+/// A point as the planner takes it.
+fn timed_point(point: FollowPoint) -> TimedPoint {
+    TimedPoint {
+        time: point.time_s,
+        positions: point.positions,
+        velocities: point.velocities,
+        accelerations: point.accelerations,
     }
 }
 

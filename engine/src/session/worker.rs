@@ -19,6 +19,7 @@ use super::note::Note;
 use super::status::state_name;
 use super::{Begun, Live, Order, SessionConfig, SessionError, Shared, Status};
 use crate::queue::Given;
+use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
@@ -237,12 +238,12 @@ impl<const N: usize> Worker<'_, N> {
         };
         // Read before the command is planned: a later resume comes after the refusal was visible.
         let newest = self.steering.newest();
-        let Given { located, planned } = queued.given;
-        let command = &located.command;
+        let given = queued.given;
+        let language = matches!(given, Given::Command { .. });
         let mut flight = InFlight {
             id: queued.id,
-            line: located.line,
-            name: command.name(),
+            line: given.line(),
+            name: given.name(),
             planned_s: 0.0,
             chain: *self.controller.chain(),
             started: None,
@@ -250,14 +251,7 @@ impl<const N: usize> Worker<'_, N> {
             says: None,
             refused: false,
         };
-        let planned = planned
-            .and_then(AnyStep::into_step::<N>)
-            .filter(|planned| self.controller.follow(planned));
-        let step = match planned {
-            Some(planned) => Ok(planned.step),
-            None => self.controller.step(command),
-        };
-        match step {
+        match self.step(given) {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
                 self.enlist(&mut flight, step);
@@ -265,7 +259,9 @@ impl<const N: usize> Worker<'_, N> {
             Err(error) => {
                 let dropped = match self.config.on_refusal {
                     FailurePolicy::Abort => {
-                        self.controller.abort();
+                        if language {
+                            self.controller.abort();
+                        }
                         self.ends.shared.inbox().drop_all(None)
                     }
                     FailurePolicy::Hold => {
@@ -287,6 +283,21 @@ impl<const N: usize> Worker<'_, N> {
             }
         }
         self.flight.push_back(flight);
+    }
+
+    /// The step of what left the queue: planned before, or planned now.
+    fn step(&mut self, given: Given) -> Result<Step<N>, CommandError> {
+        let (located, planned) = match given {
+            Given::Command { located, planned } => (located, planned),
+            Given::Timed(timed) => return self.controller.step_timed(&timed, &self.most),
+        };
+        let planned = planned
+            .and_then(AnyStep::into_step::<N>)
+            .filter(|planned| self.controller.follow(planned));
+        match planned {
+            Some(planned) => Ok(planned.step),
+            None => self.controller.step(&located.command),
+        }
     }
 
     /// The work of one step; a command without work is finished at once.
@@ -352,6 +363,7 @@ impl<const N: usize> Worker<'_, N> {
         robot.name.clone_into(&mut status.robot);
         if status.sliding.is_empty() {
             status.sliding = robot.sliding();
+            status.joint_names = robot.joint_names();
         }
         driver.clone_into(&mut status.driver);
         status.state = state_name(self.controller.modal().state());
