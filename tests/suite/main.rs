@@ -18,6 +18,7 @@ mod documents;
 mod domains;
 mod drivers;
 mod faults;
+mod follow;
 mod killed_plans;
 mod kitting_end_to_end;
 mod operators;
