@@ -3,6 +3,7 @@
 `CANTER_ROS2_GOALS` is the number of goals that are followed one after the other (default 12).
 """
 
+import json
 import os
 import signal
 import sys
@@ -244,10 +245,27 @@ def fault(peer, processes):
     peer.hear("a fault is latched", "goal rejected")
 
 
-def other_distribution(folder):
+def killed(peer, processes):
+    """Without the bridge the engine follows the trajectory to its end."""
+    start = at_rest(peer)
+    _, accepted = peer.send(bend(start.position, -0.3, 30.0, 10, start.name))
+    assert accepted
+    processes.bridge.kill()
+
+    def look():
+        status = json.loads(processes.run("status", "--json").stdout)
+        return status if status["idle"] else None
+
+    end = wait("rest", look)["setpoint"]
+    assert near(end, [q - 0.3 for q in start.position]), end
+    print("killed: the trajectory came to its end")
+
+
+def other_distribution():
     """Feedback of Kilted has the number of the point; with --retime the time law is the engine's."""
     domain = DOMAIN + 1
-    with Processes(f"ros{os.getpid()}/kilted", domain, "--distro", "kilted", "--retime"):
+    options = ["--distro", "kilted", "--retime"]
+    with Processes(f"ros{os.getpid()}/kilted", domain, *options) as processes:
         peer = Peer(domain, kilted=True)
         start = at_rest(peer)
         name, accepted = peer.send(bend(start.position, 0.3, 30.0, 10, start.name))
@@ -260,6 +278,7 @@ def other_distribution(folder):
         assert feedback and all(message.multi_dof_index == 0 for message in feedback)
         assert all(list(message.joint_names) == list(start.name) for message in feedback)
         print(f"kilted, retimed: {took:.2f} s instead of 30 s, {len(feedback)} feedbacks")
+        killed(peer, processes)
 
 
 def main():
@@ -279,7 +298,7 @@ def main():
         program(peer)
         goals_in_a_row(peer, processes)
         fault(peer, processes)
-    other_distribution(folder)
+    other_distribution()
 
 
 if __name__ == "__main__":

@@ -6,16 +6,23 @@
 
 use std::fs;
 use std::os::unix::fs::symlink;
+use std::path::Path;
 use std::process::Command;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use system_tests::domain;
 use system_tests::repository::root;
 
-/// Scripts of `ros2/tests` with their arguments, and the package that each needs.
-const SCRIPTS: [(&str, &[&str], &str); 2] = [
-    ("golden", &["check"], "rosbags"),
-    ("cyclone", &[], "cyclonedds"),
+/// Scripts of `ros2/tests` with their arguments, and the Python package and the header that each needs.
+const SCRIPTS: [(&str, &[&str], &str, &str); 3] = [
+    ("golden", &["check"], "rosbags", ""),
+    ("cyclone", &[], "cyclonedds", ""),
+    (
+        "fastdds",
+        &[],
+        "rosbags",
+        "fastdds/dds/domain/DomainParticipant.hpp",
+    ),
 ];
 
 fn main() {
@@ -27,8 +34,8 @@ fn main() {
         Trial::test("arguments_reach_the_program", arguments_reach_the_program),
         Trial::test("without_an_engine", without_an_engine),
     ];
-    for (script, words, needs) in SCRIPTS {
-        let missing = has(needs).err();
+    for (script, words, package, header) in SCRIPTS {
+        let missing = has(package).and_then(|()| has_header(header)).err();
         if let Some(reason) = &missing {
             eprintln!("{reason}: ros2/tests/{script}.py is ignored");
         }
@@ -50,6 +57,18 @@ fn has(package: &str) -> Result<(), String> {
             "python3 cannot import {package} (pip install {package})"
         )),
     }
+}
+
+/// Whether a header of Fast DDS is installed, where one is needed; the reason if not.
+fn has_header(header: &str) -> Result<(), String> {
+    let path = Path::new("/usr/include").join(header);
+    if header.is_empty() || path.is_file() {
+        return Ok(());
+    }
+    Err(format!(
+        "there is no {} (apt-get install libfastrtps-dev)",
+        path.display()
+    ))
 }
 
 fn run(script: &str, words: &[&str]) -> Result<(), Failed> {
@@ -84,7 +103,7 @@ fn run(script: &str, words: &[&str]) -> Result<(), Failed> {
 }
 
 /// `canter serve ros2` with these folders as its path.
-fn serve(path: &std::path::Path, words: &[&str]) -> std::process::Output {
+fn serve(path: &Path, words: &[&str]) -> std::process::Output {
     let folder = tempfile::tempdir().unwrap();
     // Not beside a canter-ros2 that cargo may have built.
     let canter = folder.path().join("canter");
