@@ -302,15 +302,7 @@ impl<D> Host<D> {
                     answer
                 }
                 jog @ Verb::Jog { .. } => self::jog(session, jog),
-                Verb::Follow {
-                    joints,
-                    points,
-                    retime,
-                } => given(session.give(vec![Given::Timed(TimedTrajectory {
-                    joints,
-                    points: points.into_iter().map(timed_point).collect(),
-                    retime,
-                })])),
+                follow @ Verb::Follow { .. } => self::follow(session, follow),
                 Verb::SingleStep { on } => {
                     session.set_single_step(on);
                     Answer::accept(Value::Null)
@@ -410,6 +402,23 @@ fn given(result: Result<Vec<u32>, SubmitError>) -> Answer {
         })),
         Err(full) => Answer::refuse(full.to_string()),
     }
+}
+
+/// Takes a trajectory with times of its own into the queue.
+fn follow(session: &Session, verb: Verb) -> Answer {
+    let Verb::Follow {
+        joints,
+        points,
+        retime,
+    } = verb
+    else {
+        return Answer::refuse("this is no trajectory");
+    };
+    given(session.give(vec![Given::Timed(TimedTrajectory {
+        joints,
+        points: points.into_iter().map(timed_point).collect(),
+        retime,
+    })]))
 }
 
 /// A point as the planner takes it.

@@ -1,4 +1,5 @@
 //! Joint trajectories with times of others: passed as they are within all limits, or refused.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use nalgebra::SVector;
 use planner::controller::Controller;

@@ -1,4 +1,5 @@
 //! The bytes are those that `rosbags` makes of ROS's definitions: see `ros2/tests/golden.py`.
+#![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::fs;
 use std::path::Path;

@@ -2,6 +2,7 @@
 //!
 //! Without Python, Cyclone DDS or rosbags these tests are reported as ignored, with the reason. The
 //! scripts are in `ros2/tests`; engines, arms and bridges are processes of their own.
+#![allow(clippy::print_stdout, reason = "measured values are printed")]
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::fs;

@@ -15,6 +15,8 @@ const LEAST_TIME: f64 = 1e-6;
 const LONGEST: f64 = 86_400.0;
 /// A velocity that counts as rest at the first and the last point (rad/s, m/s).
 const REST: f64 = 1e-4;
+/// How far beyond its range a joint may be by rounding (rad, m).
+const ROUNDED: f64 = 1e-9;
 /// A jump of the velocity that is none (rad/s, m/s).
 const SMOOTH: f64 = 1e-9;
 
@@ -256,10 +258,25 @@ fn sample<const N: usize>(
         }
     }
     let [position, velocity, acceleration] = read;
+    check_range(planner, number, &position)?;
+    Ok(Sample {
+        position,
+        velocity,
+        acceleration,
+        jerk: SVector::zeros(),
+    })
+}
+
+/// Whether a point is within the range of every joint.
+fn check_range<const N: usize>(
+    planner: &Planner<N>,
+    number: usize,
+    position: &SVector<f64, N>,
+) -> Result<(), TimedRefusal> {
     for joint in 0..N {
         let (lower, upper) = (planner.limits.lower[joint], planner.limits.upper[joint]);
         let beyond = (position[joint] - upper).max(lower - position[joint]);
-        if beyond > 0.0 {
+        if beyond > ROUNDED {
             return Err(TimedRefusal::Beyond {
                 point: number,
                 joint: planner.joint_name(joint),
@@ -267,10 +284,5 @@ fn sample<const N: usize>(
             });
         }
     }
-    Ok(Sample {
-        position,
-        velocity,
-        acceleration,
-        jerk: SVector::zeros(),
-    })
+    Ok(())
 }
