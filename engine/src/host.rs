@@ -4,15 +4,19 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crcl::{Located, ReadOptions};
-use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
+use ipc::{
+    Answer, Arm, ClientServer, FollowPoint, Identity, IpcError, Ownership, StatusWriter, Verb,
+};
 use planner::robot::Robot;
+use planner::timed::{TimedPoint, TimedTrajectory};
 use serde_json::{Value, json};
 use servo::ExecutorError;
 
 use crate::control::ControlThread;
 use crate::flight::{Flight, FlightOptions, Recorded};
+use crate::queue::Given;
 use crate::session::{
-    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
+    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status, SubmitError,
 };
 use crate::texts::Texts;
 pub use crate::texts::{GivenProgram, length_word};
@@ -312,6 +316,7 @@ fn asked(session: &Session, verb: Verb) -> Answer {
             program,
         } => replace(session, &format, &name, &program),
         jog @ Verb::Jog { .. } => jog_for(session, jog),
+        follow @ Verb::Follow { .. } => self::follow(session, follow),
         Verb::SingleStep { on } => {
             session.set_single_step(on);
             Answer::accept(Value::Null)
@@ -427,6 +432,33 @@ fn taken(ids: Result<Vec<u32>, impl std::fmt::Display>) -> Answer {
             "commands": ids.len(),
         })),
         Err(refusal) => Answer::refuse(refusal.to_string()),
+    }
+}
+
+/// Takes a trajectory with times of its own into the queue.
+fn follow(session: &Session, verb: Verb) -> Answer {
+    let Verb::Follow {
+        joints,
+        points,
+        retime,
+    } = verb
+    else {
+        return Answer::refuse("this is no trajectory");
+    };
+    taken(session.give(vec![Given::Timed(TimedTrajectory {
+        joints,
+        points: points.into_iter().map(timed_point).collect(),
+        retime,
+    })]))
+}
+
+/// A point as the planner takes it.
+fn timed_point(point: FollowPoint) -> TimedPoint {
+    TimedPoint {
+        time: point.time_s,
+        positions: point.positions,
+        velocities: point.velocities,
+        accelerations: point.accelerations,
     }
 }
 

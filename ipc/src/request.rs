@@ -50,6 +50,18 @@ pub enum Verb {
         #[serde(default)]
         goal: Vec<f64>,
     },
+    /// Follow a joint trajectory with the times of its points. It goes into the queue like a
+    /// command; a note tells when it begins, or why it is refused as a whole.
+    Follow {
+        /// Names of the joints, in the order of the numbers in each point: every joint of the arm
+        /// once.
+        joints: Vec<String>,
+        /// The points in the order of time.
+        points: Vec<FollowPoint>,
+        /// Whether only the way is kept, and the engine makes the time law.
+        #[serde(default)]
+        retime: bool,
+    },
     /// Execute commands one by one, or all again.
     SingleStep {
         /// Whether each command waits for [`Verb::Next`].
@@ -83,12 +95,29 @@ impl Verb {
             Self::Submit { .. }
             | Self::Replace { .. }
             | Self::Jog { .. }
+            | Self::Follow { .. }
             | Self::SingleStep { .. }
             | Self::Next
             | Self::Shutdown => true,
             Self::Status | Self::Notes { .. } | Self::Text { .. } => false,
         }
     }
+}
+
+/// A point of [`Verb::Follow`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FollowPoint {
+    /// When (s after the start of the trajectory).
+    pub time_s: f64,
+    /// Joint positions (rad, m).
+    pub positions: Vec<f64>,
+    /// Joint velocities (rad/s, m/s); empty: not given. For all points or for none.
+    #[serde(default)]
+    pub velocities: Vec<f64>,
+    /// Joint accelerations (rad/s², m/s²); empty: not given. For all points or for none.
+    #[serde(default)]
+    pub accelerations: Vec<f64>,
 }
 
 /// Who asks.

@@ -6,13 +6,14 @@ use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use realtime::Sample;
-use trajectory::JointLimits;
+use trajectory::{JointLimits, ToolLimits};
 
 use crate::command_error::{CommandError, ErrorClass};
 use crate::modal::Modal;
 use crate::motion::{MotionError, PlannedMove, Planner};
 use crate::robot::{Robot, RobotError, vector};
-use crate::task::{Move, Task};
+use crate::task::{Move, Shape, Task};
+use crate::timed::TimedTrajectory;
 
 /// A command that has left the queue: its task and, for a move, its trajectory.
 #[derive(Clone, Debug)]
@@ -253,6 +254,27 @@ impl<const N: usize> Controller<N> {
                 task,
             }),
         }
+    }
+
+    /// Plans a joint trajectory whose times are given, as a whole, within the limits `most` of the
+    /// controlled point. It needs no InitCanon and changes no mode.
+    ///
+    /// # Errors
+    /// A [`CommandError`]; the controller is then unchanged.
+    pub fn step_timed(
+        &mut self,
+        timed: &TimedTrajectory,
+        most: &ToolLimits,
+    ) -> Result<Step<N>, CommandError> {
+        let planned = self.planner.timed(timed, &self.joints, most);
+        let end = planned.as_ref().map_or(self.joints, |planned| planned.end);
+        let motion = Move {
+            shape: Shape::Joint,
+            poses: vec![self.chain().forward(&end)],
+            tolerance: 0.0,
+            limits: *most,
+        };
+        self.moved(motion, planned)
     }
 
     /// The step of a motion that was planned; the joints are then where it ends.

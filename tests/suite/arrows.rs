@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 23] = [
+const ARROWS: [(&str, &[&str]); 24] = [
     (
         "cli",
         &[
@@ -48,6 +48,7 @@ const ARROWS: [(&str, &[&str]); 23] = [
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
+    ("canter-ros2", &["ipc", "scheduling"]),
     (
         "engine",
         &[
@@ -83,19 +84,21 @@ const ARROWS: [(&str, &[&str]); 23] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 14] = [
+const FENCES: [(&str, &[&str]); 16] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
-    ("clap", &["cli"]),
+    ("clap", &["cli", "canter-ros2"]),
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
     ("pyo3", &["canter-python"]),
     ("numpy", &["canter-python"]),
+    ("ros2-client", &["canter-ros2"]),
+    ("socket2", &["canter-ros2"]),
     (
         "rtrb",
         &["servo", "driver-franka", "driver-ur", "driver-kuka"],

@@ -22,6 +22,7 @@ mod documents;
 mod domains;
 mod drivers;
 mod faults;
+mod follow;
 mod guards;
 mod killed_plans;
 mod kitting_end_to_end;

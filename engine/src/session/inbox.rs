@@ -60,7 +60,8 @@ impl Inbox {
         let epoch = steering.aborts();
         let mut ids = Vec::with_capacity(commands.len());
         for given in commands {
-            if let Command::StopMotion { emergency } = given.located.command
+            if let Given::Command { located, .. } = &given
+                && let Command::StopMotion { emergency } = located.command
                 && self.flying > 0
             {
                 steering.control(Control::Stop {

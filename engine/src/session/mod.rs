@@ -293,7 +293,7 @@ impl Session {
             .commands
             .iter()
             .enumerate()
-            .map(|(index, located)| Given {
+            .map(|(index, located)| Given::Command {
                 located: located.clone(),
                 planned: planned
                     .next_if(|planned| planned.index == index)

@@ -38,6 +38,8 @@ pub struct Status {
     pub joints: Vec<f64>,
     /// Joint positions of the last setpoint, rad or m.
     pub setpoint: Vec<f64>,
+    /// Name of each joint.
+    pub joint_names: Vec<String>,
     /// Whether each joint slides.
     pub sliding: Vec<bool>,
     /// Measured position of the controlled point in the workstation, m.

@@ -262,12 +262,12 @@ impl<const N: usize> Worker<'_, N> {
         };
         // Read before the command is planned: a later resume comes after the refusal was visible.
         let newest = self.steering.newest();
-        let Given { located, planned } = queued.given;
-        let command = &located.command;
+        let given = queued.given;
+        let language = matches!(given, Given::Command { .. });
         let mut flight = InFlight {
             id: queued.id,
-            line: located.line,
-            name: command.name(),
+            line: given.line(),
+            name: given.name(),
             planned_s: 0.0,
             chain: *self.controller.chain(),
             started: None,
@@ -278,31 +278,27 @@ impl<const N: usize> Worker<'_, N> {
             guarding: None,
             motion: None,
         };
-        let planned = planned
-            .and_then(AnyStep::into_step::<N>)
-            .filter(|planned| self.controller.follow(planned));
-        let step = match planned {
-            Some(planned) => Ok(planned.step),
-            None => self.controller.step(command),
-        };
-        match step {
+        match self.step(given) {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
                 self.enlist(&mut flight, step);
             }
             Err(error) => {
-                self.refuse(&mut flight, error);
+                self.refuse(&mut flight, error, language);
                 flight.finished = Some(0);
             }
         }
         self.flight.push_back(flight);
     }
 
-    /// A command has failed: says so when its turn comes, and does what is to be done then.
-    fn refuse(&mut self, flight: &mut InFlight<N>, error: CommandError) {
+    /// A command of the language or a trajectory has failed: says so when its turn comes, and does
+    /// what is to be done then.
+    fn refuse(&mut self, flight: &mut InFlight<N>, error: CommandError, language: bool) {
         let dropped = match self.config.on_refusal {
             FailurePolicy::Abort => {
-                self.controller.abort();
+                if language {
+                    self.controller.abort();
+                }
                 self.ends.shared.inbox().drop_all(None)
             }
             FailurePolicy::Hold => {
@@ -320,6 +316,21 @@ impl<const N: usize> Worker<'_, N> {
             dropped,
         });
         flight.refused = true;
+    }
+
+    /// The step of what left the queue: planned before, or planned now.
+    fn step(&mut self, given: Given) -> Result<Step<N>, CommandError> {
+        let (located, planned) = match given {
+            Given::Command { located, planned } => (located, planned),
+            Given::Timed(timed) => return self.controller.step_timed(&timed, &self.most),
+        };
+        let planned = planned
+            .and_then(AnyStep::into_step::<N>)
+            .filter(|planned| self.controller.follow(planned));
+        match planned {
+            Some(planned) => Ok(planned.step),
+            None => self.controller.step(&located.command),
+        }
     }
 
     /// The work of one step; a command without work is finished at once.
@@ -398,6 +409,7 @@ impl<const N: usize> Worker<'_, N> {
         robot.name.clone_into(&mut status.robot);
         if status.sliding.is_empty() {
             status.sliding = robot.sliding();
+            status.joint_names = robot.joint_names();
         }
         driver.clone_into(&mut status.driver);
         status.state = state_name(self.controller.modal().state());

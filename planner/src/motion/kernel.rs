@@ -15,6 +15,7 @@ use trajectory::ToolLimits;
 use super::jog::Direction;
 use super::{MotionError, PlannedMove, Planner};
 use crate::task::{JointMove, LegsMove, Move, ScrewMove};
+use crate::timed::TimedTrajectory;
 use crate::with_dof;
 
 type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
@@ -22,6 +23,10 @@ type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
 /// Finds postures at a pose, the easiest near the given one first.
 type Postures<const N: usize> =
     fn(&Planner<N>, &Isometry3<f64>, &SVector<f64, N>) -> Vec<SVector<f64, N>>;
+
+/// Plans a trajectory whose times are given.
+type Timed<const N: usize> =
+    fn(&Planner<N>, &TimedTrajectory, &SVector<f64, N>, &ToolLimits) -> Planned<N>;
 
 /// What a planner of `N` joints calls.
 #[derive(Clone, Copy)]
@@ -33,6 +38,7 @@ pub(super) struct Kernel<const N: usize> {
     pub legs: fn(&Planner<N>, &LegsMove, &SVector<f64, N>) -> Planned<N>,
     pub screw: fn(&Planner<N>, &ScrewMove, &SVector<f64, N>) -> Planned<N>,
     pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
+    pub timed: Timed<N>,
     pub postures: Postures<N>,
 }
 
@@ -64,6 +70,7 @@ fn table(dof: usize) -> &'static dyn Any {
             legs: Planner::plan_legs,
             screw: Planner::plan_screw,
             moving: Planner::plan_moving,
+            timed: Planner::plan_timed,
             postures: Planner::find_postures,
         };
         &KERNEL

@@ -22,7 +22,7 @@ const CHORDS: usize = 8;
 const GAIN: f64 = 0.015;
 
 /// A line in joint space is timed from rest to rest.
-const RESTING: TimingOptions = TimingOptions {
+pub(super) const RESTING: TimingOptions = TimingOptions {
     start: Boundary::Rest,
     end: Boundary::Rest,
     rate_cap: None,

@@ -63,7 +63,7 @@ impl<const N: usize> Worker<'_, N> {
                 self.controller.set_joints(self.remote.measured().setpoint);
             }
             if let Some(error) = self.judge(&flight, &guarding, &report) {
-                self.refuse(&mut flight, error);
+                self.refuse(&mut flight, error, true);
             }
         }
         self.flight.insert(at, flight);
