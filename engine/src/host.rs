@@ -410,10 +410,11 @@ fn jog(session: &Session, verb: Verb) -> Answer {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
         "workstation" => JogSpace::Workstation,
+        "base" => JogSpace::Base,
         "goal" => JogSpace::Goal,
         other => {
             return Answer::refuse(format!(
-                "a jog is in joint, tool or workstation space or towards a goal, not {other:?}"
+                "a jog is in joint, tool, workstation or base space or towards a goal, not {other:?}"
             ));
         }
     };

@@ -37,7 +37,7 @@ pub use event::{Event, Fault, Recorded, ShortText};
 pub use feed_forward::FeedForward;
 pub use handle::Executor;
 pub use histogram::Histogram;
-pub use monitor::Monitor;
+pub use monitor::{Events, Monitor, Samples};
 pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};

@@ -2,6 +2,7 @@
 
 mod jogging;
 mod reports;
+mod sampling;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -14,6 +15,7 @@ use realtime::{Piece, Segment};
 use trajectory::ToolLimits;
 
 use jogging::Jogging;
+use sampling::Sampling;
 
 use super::note::Note;
 use super::status::state_name;
@@ -24,8 +26,8 @@ use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
-    Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering, ToolOrder,
-    Work,
+    Events, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering,
+    ToolOrder, Work,
 };
 
 /// Largest number of commands in work, the one that moves among them.
@@ -41,12 +43,11 @@ pub(super) struct Ends {
 }
 
 /// A command that left the queue and is not yet reported.
-pub(super) struct InFlight<const N: usize> {
+pub(super) struct InFlight {
     id: u32,
     line: usize,
     name: &'static str,
     planned_s: f64,
-    chain: Chain<N>,
     started: Option<u64>,
     finished: Option<u64>,
     /// What is reported beside `Done` when its turn comes.
@@ -61,7 +62,8 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) most: ToolLimits,
     pub(super) controller: Controller<N>,
     pub(super) sender: SegmentSender<N>,
-    monitor: Monitor<N>,
+    events: Events,
+    sampling: Arc<Mutex<Sampling<N>>>,
     pub(super) remote: Remote<N>,
     steering: Steering,
     /// How many aborts were carried out: commands of another epoch wait or are dropped.
@@ -72,10 +74,8 @@ pub(super) struct Worker<'a, const N: usize> {
     seen: Arc<Mutex<Chain<N>>>,
     /// What still has to go through the ring.
     pub(super) work: VecDeque<Work<N>>,
-    pub(super) flight: VecDeque<InFlight<N>>,
+    pub(super) flight: VecDeque<InFlight>,
     jogging: Option<Jogging>,
-    /// Chains of the last reported commands, for recorded samples.
-    chains: VecDeque<(u32, Chain<N>)>,
     /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
@@ -135,16 +135,17 @@ fn start<'a, const N: usize>(
         .efforts::<N>()
         .map(|efforts| FeedForward::new(move |[q, dq, ddq]| efforts.dynamics.effort(q, dq, ddq)));
     let (executor, sender, monitor) = Executor::start(wanted)?;
+    let Monitor { events, samples } = monitor;
     let remote = executor.remote();
     controller.set_joints(remote.measured().setpoint);
     let worker = Worker {
         config,
         most: robot.motion_limits(),
-        chains: VecDeque::from([(0, *controller.chain())]),
+        sampling: Arc::new(Mutex::new(Sampling::new(samples, *controller.chain()))),
         seen: Arc::new(Mutex::new(*controller.chain())),
         controller,
         sender,
-        monitor,
+        events,
         steering: remote.steering(),
         epoch: remote.steering().aborts(),
         jog_aborts: 0,
@@ -173,7 +174,7 @@ impl<const N: usize> Worker<'_, N> {
         }
         let all_fits = self.feed();
         if !all_fits || !self.may_take() {
-            self.sender.settle(Some(self.monitor.seen()));
+            self.sender.settle(Some(self.events.seen()));
         }
     }
 
@@ -239,12 +240,15 @@ impl<const N: usize> Worker<'_, N> {
         let newest = self.steering.newest();
         let Given { located, planned } = queued.given;
         let command = &located.command;
+        self.sampling
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(queued.id, *self.controller.chain());
         let mut flight = InFlight {
             id: queued.id,
             line: located.line,
             name: command.name(),
             planned_s: 0.0,
-            chain: *self.controller.chain(),
             started: None,
             finished: None,
             says: None,
@@ -290,7 +294,7 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     /// The work of one step; a command without work is finished at once.
-    fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>) {
+    fn enlist(&mut self, flight: &mut InFlight, step: Step<N>) {
         let command = flight.id;
         match step.task {
             Task::Message { text } => flight.says = Some(Note::Message { text }),
@@ -365,10 +369,16 @@ impl<const N: usize> Worker<'_, N> {
         status.settings = Some(self.controller.modal().settings().clone());
     }
 
-    /// Fills in a status without this thread.
+    /// Fills in a status and reads samples without this thread.
     fn live(&self) -> Live {
         let (remote, chain) = (self.remote.clone(), Arc::clone(&self.seen));
-        Live(Box::new(move |status: &mut Status| {
+        let (sampling, seen) = (Arc::clone(&self.sampling), Arc::clone(&self.seen));
+        let shared = Arc::clone(&self.ends.shared);
+        let read = move || {
+            let mut sampling = sampling.lock().unwrap_or_else(PoisonError::into_inner);
+            sampling.read(&seen, &shared.samples);
+        };
+        let fill = move |status: &mut Status| {
             let now = remote.measured();
             status.idle &= now.idle;
             status.held |= now.held;
@@ -379,7 +389,11 @@ impl<const N: usize> Worker<'_, N> {
             let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
             status.set_pose(&chain.forward(&now.position));
             status.cycles = remote.counters().into();
-        }))
+        };
+        Live {
+            fill: Box::new(fill),
+            read: Box::new(read),
+        }
     }
 
     pub(super) fn say(&self, note: Note) {
