@@ -166,6 +166,8 @@ function setWorld(about) {
   get('objects-layer').hidden = false;
   get('plan-now').hidden = !about.plan;
   get('plan-now').textContent = about.plan || '';
+  // A plan gives its commands one by one: there is no program.
+  if (about.plan) get('text').placeholder = about.plan;
 }
 
 function notice(text) {

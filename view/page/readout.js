@@ -97,12 +97,15 @@ export class Readout {
   tell(text) { this.notes([{ note: { event: 'page', text } }]); }
 }
 
+/** The line that a note is about; what a plan gives has none. */
+const at = ({ line }) => (line > 0 ? `${line}  ` : '');
+
 /** A note in words, and its kind. */
 export function words(note) {
   switch (note.event) {
-    case 'started': return [`${note.line}  ${note.name}, ${note.planned_s.toFixed(2)} s`, ''];
-    case 'done': return [`${note.line}  ${note.name} done`, ''];
-    case 'refused': return [`${note.line}  ${note.name} refused: ${note.error.message}`, 'bad'];
+    case 'started': return [`${at(note)}${note.name}, ${note.planned_s.toFixed(2)} s`, ''];
+    case 'done': return [`${at(note)}${note.name} done`, ''];
+    case 'refused': return [`${at(note)}${note.name} refused: ${note.error.message}`, 'bad'];
     case 'message': return [note.text, 'said'];
     case 'ended': return [`the program ended with reason ${note.reason}`, note.reason > 0 ? 'warn' : ''];
     case 'stopped': return ['stopped', 'warn'];
