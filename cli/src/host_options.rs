@@ -1,3 +1,5 @@
+use std::path::{Path, PathBuf};
+
 use clap::{Args, ValueEnum};
 use engine::host::ClientChannels;
 use engine::session::{SessionConfig, SessionError};
@@ -51,6 +53,15 @@ pub(crate) struct HostOptions {
     /// time
     #[arg(long)]
     lock_step: bool,
+}
+
+/// What the live view shows beside the arm.
+#[derive(Args, Debug)]
+pub(crate) struct ShownWorld {
+    /// Show the objects of this world in the live view: the database of a plan as it changes, or a
+    /// workstation file
+    #[arg(long, value_name = "WORLD", requires = "view")]
+    pub(crate) world: Option<PathBuf>,
 }
 
 /// What an engine does with a command that it refuses.
@@ -150,13 +161,23 @@ impl HostOptions {
         };
         let mut host = Host::start(channels, robot, &config, company).map_err(failure)?;
         self.recorder.start(&mut host, robot)?;
-        if self.view {
-            host.company.view = Some(ViewProcess::start(&host.arm)?);
-        }
         if let Some(warning) = &host.session.warning {
             tracing::warn!("{warning}");
         }
         Ok(host)
+    }
+}
+
+impl HostOptions {
+    /// Starts the live view if one was asked for, with the objects of a world.
+    ///
+    /// # Errors
+    /// [`Exit::Internal`] when its process cannot be started.
+    pub(crate) fn show(&self, host: &mut Host, world: Option<&Path>) -> Result<(), Failure> {
+        if self.view {
+            host.company.view = Some(ViewProcess::start(&host.arm, world)?);
+        }
+        Ok(())
     }
 }
 

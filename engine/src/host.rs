@@ -16,7 +16,7 @@ use crate::control::ControlThread;
 use crate::flight::{Flight, FlightOptions, Recorded};
 use crate::queue::Given;
 use crate::session::{
-    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status, SubmitError,
+    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
 };
 use crate::texts::Texts;
 pub use crate::texts::{GivenProgram, length_word};
@@ -478,10 +478,11 @@ fn jog_for(session: &Session, verb: Verb) -> Answer {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
         "workstation" => JogSpace::Workstation,
+        "base" => JogSpace::Base,
         "goal" => JogSpace::Goal,
         other => {
             return Answer::refuse(format!(
-                "a jog is in joint, tool or workstation space or towards a goal, not {other:?}"
+                "a jog is in joint, tool, workstation or base space or towards a goal, not {other:?}"
             ));
         }
     };

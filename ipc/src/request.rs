@@ -35,10 +35,10 @@ pub enum Verb {
     },
     /// Jog; the arm stops when no further request comes in time.
     Jog {
-        /// `joint`, `tool`, `workstation` or `goal`.
+        /// `joint`, `tool`, `workstation`, `base` or `goal`.
         space: String,
         /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
-        /// tool frame or in the workstation; one for all joints towards a goal; all 0 stops.
+        /// tool frame, in the workstation or in the base; one for all joints towards a goal; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,

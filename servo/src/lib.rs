@@ -41,7 +41,7 @@ pub use guard::{
 };
 pub use handle::Executor;
 pub use histogram::Histogram;
-pub use monitor::Monitor;
+pub use monitor::{Events, Monitor, Samples};
 pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};

@@ -165,12 +165,7 @@ impl<const N: usize> Runner<N> {
             shared: Arc::clone(&shared),
             epoch: 0,
         };
-        let monitor = Monitor {
-            events: event_reader,
-            samples: sample_reader,
-            guarded: guarded_reader,
-            seen: 0,
-        };
+        let monitor = Monitor::new(event_reader, guarded_reader, sample_reader);
         (runner, sender, Remote { shared }, monitor)
     }
 

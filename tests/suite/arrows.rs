@@ -44,7 +44,10 @@ const ARROWS: [(&str, &[&str]); 24] = [
             "scheduling",
         ],
     ),
-    ("view", &["planner", "crcl", "ipc", "recorder"]),
+    (
+        "view",
+        &["planner", "crcl", "ipc", "recorder", "scheduling"],
+    ),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),

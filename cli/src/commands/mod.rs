@@ -88,7 +88,7 @@ impl Command {
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
-            Self::Bench(command) => command.run(),
+            Self::Bench(command) => command.run(printer),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Convert(command) => command.run(),

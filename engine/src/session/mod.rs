@@ -187,8 +187,13 @@ impl Shared {
     }
 }
 
-/// Fills in the present state of the motion without asking the worker.
-struct Live(Box<dyn Fn(&mut Status) + Send + Sync>);
+/// What is known of the motion without asking the worker, which may be planning.
+struct Live {
+    /// Fills in the present state.
+    fill: Box<dyn Fn(&mut Status) + Send + Sync>,
+    /// Reads the samples of the servo thread.
+    read: Box<dyn Fn() + Send + Sync>,
+}
 
 impl fmt::Debug for Live {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -403,7 +408,7 @@ impl Session {
     pub fn status(&self) -> Status {
         let status = self.shared.status.lock();
         let mut status = status.unwrap_or_else(PoisonError::into_inner).clone();
-        (self.live.0)(&mut status);
+        (self.live.fill)(&mut status);
         let inbox = self.shared.inbox();
         status.queued = inbox.waiting();
         status.single_step = inbox.is_single_step();
@@ -411,9 +416,10 @@ impl Session {
         status
     }
 
-    /// What was recorded since the last call.
+    /// What was recorded since the last call, up to the last servo period, whatever the planner does.
     #[must_use]
     pub fn samples(&self) -> Vec<RunSample> {
+        (self.live.read)();
         std::mem::take(
             &mut *self
                 .shared

@@ -93,6 +93,8 @@ pub struct Cycles {
     pub skipped: u64,
     /// Setpoints that the driver missed, by its own count.
     pub driver_missed: u64,
+    /// Events and samples of periods that were not read in time.
+    pub lost_reports: u64,
 }
 
 impl From<Counters> for Cycles {
@@ -102,6 +104,7 @@ impl From<Counters> for Cycles {
             published: counters.published,
             skipped: counters.skipped,
             driver_missed: counters.driver_missed,
+            lost_reports: counters.lost_reports,
         }
     }
 }

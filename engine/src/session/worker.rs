@@ -4,6 +4,7 @@ mod guarding;
 mod jogging;
 mod replacing;
 mod reports;
+mod sampling;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -17,6 +18,7 @@ use trajectory::{ToolLimits, Trajectory};
 
 use guarding::Guarding;
 use jogging::Jogging;
+use sampling::Sampling;
 
 use super::note::Note;
 use super::status::state_name;
@@ -28,8 +30,8 @@ use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
-    Arrival, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering,
-    ToolOrder, Work,
+    Arrival, Events, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender,
+    Steering, ToolOrder, Work,
 };
 
 /// Largest number of commands in work, the one that moves among them.
@@ -50,6 +52,7 @@ pub(super) struct InFlight<const N: usize> {
     line: usize,
     name: &'static str,
     planned_s: f64,
+    /// The chain with the tool that it begins with.
     chain: Chain<N>,
     started: Option<u64>,
     finished: Option<u64>,
@@ -71,7 +74,8 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) most: ToolLimits,
     pub(super) controller: Controller<N>,
     pub(super) sender: SegmentSender<N>,
-    monitor: Monitor<N>,
+    events: Events<N>,
+    sampling: Arc<Mutex<Sampling<N>>>,
     pub(super) remote: Remote<N>,
     steering: Steering,
     /// How many aborts were carried out: commands of another epoch wait or are dropped.
@@ -84,8 +88,6 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     jogging: Option<Jogging>,
-    /// Chains of the last reported commands, for recorded samples.
-    chains: VecDeque<(u32, Chain<N>)>,
     /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
@@ -152,16 +154,17 @@ fn start<'a, const N: usize>(
         .efforts::<N>()
         .map(|efforts| FeedForward::new(move |[q, dq, ddq]| efforts.dynamics.effort(q, dq, ddq)));
     let (executor, sender, monitor) = Executor::start(wanted)?;
+    let Monitor { events, samples } = monitor;
     let remote = executor.remote();
     controller.set_joints(remote.measured().setpoint);
     let worker = Worker {
         config,
         most: robot.motion_limits(),
-        chains: VecDeque::from([(0, *controller.chain())]),
+        sampling: Arc::new(Mutex::new(Sampling::new(samples, *controller.chain()))),
         seen: Arc::new(Mutex::new(*controller.chain())),
         controller,
         sender,
-        monitor,
+        events,
         steering: remote.steering(),
         epoch: remote.steering().aborts(),
         jog_aborts: 0,
@@ -191,7 +194,7 @@ impl<const N: usize> Worker<'_, N> {
         }
         let all_fits = self.feed();
         if !all_fits || !self.may_take() {
-            self.sender.settle(Some(self.monitor.seen()));
+            self.sender.settle(Some(self.events.seen()));
         }
     }
 
@@ -264,6 +267,10 @@ impl<const N: usize> Worker<'_, N> {
         let newest = self.steering.newest();
         let given = queued.given;
         let language = matches!(given, Given::Command { .. });
+        self.sampling
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(queued.id, *self.controller.chain());
         let mut flight = InFlight {
             id: queued.id,
             line: given.line(),
@@ -423,10 +430,16 @@ impl<const N: usize> Worker<'_, N> {
         status.settings = Some(self.controller.modal().settings().clone());
     }
 
-    /// Fills in a status without this thread.
+    /// Fills in a status and reads samples without this thread.
     fn live(&self) -> Live {
         let (remote, chain) = (self.remote.clone(), Arc::clone(&self.seen));
-        Live(Box::new(move |status: &mut Status| {
+        let (sampling, seen) = (Arc::clone(&self.sampling), Arc::clone(&self.seen));
+        let shared = Arc::clone(&self.ends.shared);
+        let read = move || {
+            let mut sampling = sampling.lock().unwrap_or_else(PoisonError::into_inner);
+            sampling.read(&seen, &shared.samples);
+        };
+        let fill = move |status: &mut Status| {
             let now = remote.measured();
             status.idle &= now.idle;
             status.held |= now.held;
@@ -441,7 +454,11 @@ impl<const N: usize> Worker<'_, N> {
                 wake_up: remote.latency().into(),
                 work: remote.work().into(),
             };
-        }))
+        };
+        Live {
+            fill: Box::new(fill),
+            read: Box::new(read),
+        }
     }
 
     pub(super) fn say(&self, note: Note) {

@@ -51,9 +51,9 @@ impl<const N: usize> Worker<'_, N> {
         let Some(guarding) = self.flight.get_mut(at).and_then(|f| f.guarding.take()) else {
             return;
         };
-        let mut report = self.monitor.guarded();
+        let mut report = self.events.guarded();
         while report.is_some_and(|report| report.command != command) {
-            report = self.monitor.guarded();
+            report = self.events.guarded();
         }
         let Some(mut flight) = self.flight.remove(at) else {
             return;

@@ -1,5 +1,6 @@
 //! A move that takes the place of the one that moves, in the same state of motion.
 
+use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use crcl::Located;
@@ -110,6 +111,10 @@ impl<const N: usize> Worker<'_, N> {
         let mut flights = Vec::with_capacity(ids.len());
         let mut by = 0;
         for (id, (located, step)) in ids.iter().zip(new.steps) {
+            self.sampling
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .begin(*id, *new.controller.chain());
             let mut flight = InFlight {
                 id: *id,
                 line: located.line,
@@ -147,7 +152,6 @@ impl<const N: usize> Worker<'_, N> {
         }
         if let Some(old) = self.flight.pop_front() {
             let (id, line, name) = (old.id, old.line, old.name);
-            self.chains.push_back((id, old.chain));
             self.say(Note::Replaced { id, line, name, by });
         }
         self.controller = new.controller;
@@ -179,7 +183,7 @@ impl<const N: usize> Worker<'_, N> {
             if let Some((_, accepted)) = self.spliced.filter(|(id, _)| *id == by) {
                 return accepted;
             }
-            self.sender.settle(Some(self.monitor.seen()));
+            self.sender.settle(Some(self.events.seen()));
             std::thread::sleep(Duration::from_micros(50));
         }
         false
