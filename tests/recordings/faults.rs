@@ -95,10 +95,8 @@ fn replayed(file: &Path, first: u64) -> String {
                 let name = message["robot"]["name"].as_str();
                 robot = robot.or(name.map(str::to_owned));
             }
-            Message::Binary(bytes) => {
-                if bytes[16..24] == first.to_le_bytes() {
-                    return robot.expect("the robot comes first");
-                }
+            Message::Binary(bytes) if bytes[16..24] == first.to_le_bytes() => {
+                return robot.expect("the robot comes first");
             }
             _ => {}
         }
