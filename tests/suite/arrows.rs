@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 24] = [
+const ARROWS: [(&str, &[&str]); 25] = [
     (
         "cli",
         &[
@@ -52,6 +52,7 @@ const ARROWS: [(&str, &[&str]); 24] = [
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
     ("canter-ros2", &["ipc", "scheduling"]),
+    ("canter-fleet", &["ipc"]),
     (
         "engine",
         &[
@@ -87,14 +88,14 @@ const ARROWS: [(&str, &[&str]); 24] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 16] = [
+const FENCES: [(&str, &[&str]); 19] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
-    ("clap", &["cli", "canter-ros2"]),
+    ("clap", &["cli", "canter-ros2", "canter-fleet"]),
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
@@ -102,6 +103,9 @@ const FENCES: [(&str, &[&str]); 16] = [
     ("numpy", &["canter-python"]),
     ("ros2-client", &["canter-ros2"]),
     ("socket2", &["canter-ros2"]),
+    ("zenoh", &["canter-fleet"]),
+    ("ratatui", &["canter-fleet"]),
+    ("rcgen", &["canter-fleet"]),
     (
         "rtrb",
         &["servo", "driver-franka", "driver-ur", "driver-kuka"],
