@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 25] = [
+const ARROWS: [(&str, &[&str]); 26] = [
     (
         "cli",
         &[
@@ -53,6 +53,7 @@ const ARROWS: [(&str, &[&str]); 25] = [
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
     ("canter-ros2", &["ipc", "scheduling"]),
+    ("canter-fleet", &["ipc"]),
     (
         "engine",
         &[
@@ -89,14 +90,14 @@ const ARROWS: [(&str, &[&str]); 25] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 17] = [
+const FENCES: [(&str, &[&str]); 20] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
-    ("clap", &["cli", "canter-ros2"]),
+    ("clap", &["cli", "canter-ros2", "canter-fleet"]),
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
@@ -104,6 +105,9 @@ const FENCES: [(&str, &[&str]); 17] = [
     ("numpy", &["canter-python"]),
     ("ros2-client", &["canter-ros2"]),
     ("socket2", &["canter-ros2"]),
+    ("zenoh", &["canter-fleet"]),
+    ("ratatui", &["canter-fleet"]),
+    ("rcgen", &["canter-fleet"]),
     (
         "rtrb",
         &[
