@@ -119,10 +119,19 @@ pub(crate) struct Picture {
     pub(crate) settings: Settings,
     /// What the robot can do.
     pub(crate) largest: Largest,
-    /// The gripper: whether it holds or is open is not known; how far it is open (m).
-    pub(crate) gripper: Option<f64>,
+    /// The gripper, if there is one.
+    pub(crate) gripper: Option<Gripper>,
     /// What the sensors say.
     pub(crate) sensors: Sensors,
+}
+
+/// What a gripper measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gripper {
+    /// How far it is open (m).
+    pub(crate) opening: f64,
+    /// Whether it feels an object between its fingers; false where it cannot tell.
+    pub(crate) holding: bool,
 }
 
 /// What is behind the lock.

@@ -3,10 +3,10 @@
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use crcl::{Command, Program, json};
-use ipc::{Arm, Client, IpcError, Observer, State, ToolStatus, Verb};
+use ipc::{Arm, Client, IpcError, Observer, State, ToolFlags, ToolStatus, Verb};
 use serde_json::Value;
 
-use crate::cell::{Largest, Picture, Settings};
+use crate::cell::{Gripper, Largest, Picture, Settings};
 use crate::sensing::{Sensors, Tripped};
 
 /// How long an engine may take to answer.
@@ -98,7 +98,7 @@ impl Engine {
                 end_point: settings["end_point"].as_f64().unwrap_or(0.0),
             },
             largest: largest(&status["largest"]),
-            gripper: state.as_ref().and_then(opening),
+            gripper: state.as_ref().and_then(gripper),
             sensors: state.as_ref().map(sensors).unwrap_or_default(),
             joints,
         };
@@ -209,12 +209,15 @@ fn sensors(state: &State) -> Sensors {
     }
 }
 
-/// How far the gripper is open (m), if there is one.
-fn opening(state: &State) -> Option<f64> {
-    let gripper = state.tools.get(ipc::GRIPPER)?;
-    match ToolStatus::from_number(gripper.status)? {
+/// What the gripper measures, if there is one.
+fn gripper(state: &State) -> Option<Gripper> {
+    let tool = state.tools.get(ipc::GRIPPER)?;
+    match ToolStatus::from_number(tool.status)? {
         ToolStatus::Unknown => None,
-        _ => Some(gripper.position),
+        _ => Some(Gripper {
+            opening: tool.position,
+            holding: tool.flags & ToolFlags::OBJECT != 0,
+        }),
     }
 }
 
@@ -245,4 +248,27 @@ fn array<const N: usize>(value: &Value) -> [f64; N] {
         *place = number;
     }
     array
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ipc::ToolFeedback;
+
+    #[test]
+    fn a_held_object_is_reported() {
+        let mut state = State::default();
+        assert_eq!(gripper(&state), None);
+        for holding in [false, true] {
+            let object = if holding { ToolFlags::OBJECT } else { 0 };
+            state.tools[ipc::GRIPPER] = ToolFeedback {
+                status: ToolStatus::Closed as u32,
+                position: 0.03,
+                flags: ToolFlags::SENSES_OBJECT | object,
+                ..ToolFeedback::default()
+            };
+            let opening = 0.03;
+            assert_eq!(gripper(&state), Some(Gripper { opening, holding }));
+        }
+    }
 }

@@ -166,14 +166,14 @@ impl Choice {
     }
 
     fn gripper(&self, picture: &Picture) -> Option<GripperStatus> {
-        let opening = picture.gripper.filter(|_| self.parts.gripper)?;
+        let gripper = picture.gripper.filter(|_| self.parts.gripper)?;
         Some(GripperStatus {
             name: "gripper".to_owned(),
             options: Vec::new(),
-            // NIST's client of 2021 needs the element; nothing is known of an object.
-            holding: Some(false),
+            // NIST's client of 2021 needs the element, also of a gripper that cannot tell.
+            holding: Some(gripper.holding),
             state: GripperState::Parallel {
-                separation: short(opening / self.units.length.metres()),
+                separation: short(gripper.opening / self.units.length.metres()),
             },
         })
     }
@@ -234,6 +234,7 @@ fn cut(text: &str, most: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::Gripper;
     use crcl::xml::{CommandState, Parameter, XmlCommand, read_status};
 
     fn picture(joints: usize) -> Picture {
@@ -244,7 +245,10 @@ mod tests {
             sliding: vec![false; joints],
             position: [1.0 / 3.0, -1.0 / 7.0, 1e-13],
             orientation: [0.0, 1.0, 0.0, 0.0],
-            gripper: Some(0.085),
+            gripper: Some(Gripper {
+                opening: 0.085,
+                holding: true,
+            }),
             ..Picture::default()
         }
     }
@@ -294,7 +298,8 @@ mod tests {
                 (&parameters, &Guards::default()),
             );
             assert!(text.len() < 4095, "{} bytes, {joints} joints", text.len());
-            read_status(&text).unwrap();
+            let status = read_status(&text).unwrap();
+            assert_eq!(status.gripper.unwrap().holding, Some(true));
         }
     }
 
