@@ -8,8 +8,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::time::Duration;
 
-use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, State, Verdict};
-use servo::{Control, Event, FeedForward, Monitor, Runner, Tick};
+use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, Sensor, State, Verdict};
+use servo::{
+    Control, Event, FeedForward, GuardKind, GuardOrder, GuardOutcome, GuardSource, MAX_GUARDS,
+    Monitor, Runner, SegmentSender, SensorGuard, Tick, Work,
+};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
 
 thread_local! {
@@ -98,6 +101,8 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         ..State::default()
     };
     state.position = ack.position;
+    state.sensor_count = 1;
+    let force = Cell::new(0.0);
     let mut period = |number: u64| {
         let begin_ns = number * 1_000_000;
         let tick = Tick {
@@ -112,6 +117,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         if number == 0 {
             assert_eq!(received.effort[..JOINTS], *weight.as_slice());
         }
+        state.sensors[0] = Sensor::new("force", force.get());
         state.position = received.position;
         state.sequence += 1;
         state.driver_state = DriverState::Active as u32;
@@ -120,11 +126,13 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     // Connections are made when the first messages pass.
     (0..100).for_each(&mut period);
 
-    let (mut next, mut finished, mut heap, mut waited) = (0, 0, 0, 0);
+    let (mut next, mut finished, mut heap, mut waited, mut tripped) = (0, 0, 0, 0, 0);
     for block in 0..100 {
-        while sender.room() > 4000 && feed(&mut sender, next) {
+        while sender.room() > 4000 && guard(&mut sender, next) && feed(&mut sender, next) {
             next += 1;
         }
+        // Towards the end a guard stops the command that moves, and none begins any more.
+        force.set(if block >= 95 { 20.0 } else { 0.0 });
         for order in orders(block) {
             remote.control(order);
         }
@@ -136,14 +144,32 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         heap += after_heap - before.0 - counting_costs();
         waited += after_waits - before.1;
         finished += count_finished(&mut monitor);
+        let reports = std::iter::from_fn(|| monitor.guarded());
+        tripped += reports
+            .filter(|report| report.path_time > 0.0 && report.outcome != GuardOutcome::Quiet)
+            .count();
     }
     assert!(finished > 40, "only {finished} commands");
     assert_eq!(remote.counters().published, 100_100);
+    assert!(tripped > 0, "no guard has stopped a command");
     assert_eq!(
         (heap, waited),
         (0, 0),
         "heap calls and waits in the periods"
     );
+}
+
+/// Guards of the next command: it stops where the force is above 10 N.
+fn guard(sender: &mut SegmentSender<JOINTS>, command: u32) -> bool {
+    let mut guards = [None; MAX_GUARDS];
+    guards[0] = Some(SensorGuard {
+        source: GuardSource::named("force"),
+        kind: GuardKind::Over,
+        limit: 10.0,
+    });
+    sender
+        .hand_over(Work::Guards(GuardOrder { command, guards }))
+        .is_ok()
 }
 
 /// The driver's answer to the handshake.

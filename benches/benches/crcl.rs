@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
-use ipc::{Arm, Domain, Observer};
+use ipc::{Arm, Domain};
 
 /// How long the servo period is watched, alone and beside clients.
 const WATCH: Duration = Duration::from_secs(8);
@@ -190,26 +190,84 @@ fn print(name: &str, times: &mut [u64]) {
     );
 }
 
-/// What the servo thread does for a while: from when a period should begin until its setpoint is out,
-/// wake-up and work together (ns), and how many periods were left out.
-fn watch(arm: &Arm) -> (Vec<u64>, u64) {
-    let observer = Observer::open(arm).unwrap();
-    while observer.next_setpoint().is_some() {}
-    let (mut times, mut skipped) = (Vec::new(), 0_u64);
-    let mut last: Option<(u64, u64)> = None;
-    let end = Instant::now() + WATCH;
-    while Instant::now() < end {
-        while let Some(setpoint) = observer.next_setpoint() {
-            times.push(setpoint.published_ns.saturating_sub(setpoint.tick_ns));
-            if let Some((tick, sequence)) = last {
-                let (ticks, messages) = (setpoint.tick - tick, setpoint.sequence - sequence);
-                skipped += ticks - messages.min(ticks);
-            }
-            last = Some((setpoint.tick, setpoint.sequence));
+/// What the servo thread has done since its engine started: wake-up and work of a period (p50, p99,
+/// longest; ns), and how many periods were left out.
+#[derive(Clone, Copy, Debug)]
+struct Periods {
+    wake_up: [u64; 3],
+    work: [u64; 3],
+    left_out: u64,
+}
+
+impl Periods {
+    /// As the engine of an arm counts them.
+    fn of(arm: &Arm) -> Self {
+        let client = ipc::Client::open(arm, "bench crcl").unwrap();
+        let answer = client
+            .ask(ipc::Verb::Status, Duration::from_secs(2))
+            .unwrap();
+        let status = &answer.body["status"];
+        let spread = |name: &str| {
+            ["p50", "p99", "longest"].map(|at| status["timing"][name][at].as_u64().unwrap())
+        };
+        Self {
+            wake_up: spread("wake_up"),
+            work: spread("work"),
+            left_out: status["cycles"]["skipped"].as_u64().unwrap(),
         }
-        sleep(Duration::from_millis(1));
     }
-    (times, skipped)
+
+    fn print(&self, name: &str) {
+        for (part, [p50, p99, longest]) in [("wake-up", self.wake_up), ("work", self.work)] {
+            let us = |ns: u64| ns as f64 / 1e3;
+            println!(
+                "{part} {name}: p50 {:.1} us, p99 {:.1} us, longest {:.1} us",
+                us(p50),
+                us(p99),
+                us(longest)
+            );
+        }
+        println!("periods left out {name}: {}", self.left_out);
+    }
+}
+
+/// An engine with a CRCL server, and an arm that moves.
+struct Scene {
+    arm: Arm,
+    address: SocketAddr,
+    ends: Arc<AtomicBool>,
+    mover: Option<JoinHandle<()>>,
+    _processes: [Peer; 2],
+}
+
+impl Scene {
+    fn new(name: &str) -> Self {
+        let name = format!("bench-{}/{name}", std::process::id());
+        let domain = Domain::choose(None, |name| std::env::var_os(name)).unwrap();
+        let arm = domain.arm(&name).unwrap();
+        let words = ["engine", "--robot", "ur5e", "--arm", &name];
+        let (engine, _) = start(&words, "engine of ur5e");
+        let listen = ["serve", "crcl", "--arm", &name, "--listen", "127.0.0.1:0"];
+        let (server, line) = start(&listen, "serving CRCL at");
+        let address = line.trim().rsplit(' ').next().unwrap().parse().unwrap();
+        let ends = Arc::new(AtomicBool::new(false));
+        Self {
+            arm,
+            address,
+            mover: Some(mover(address, Arc::clone(&ends))),
+            ends,
+            _processes: [server, engine],
+        }
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Release);
+        if let Some(mover) = self.mover.take() {
+            mover.join().unwrap();
+        }
+    }
 }
 
 /// Answers whatever comes with so many bytes.
@@ -231,67 +289,56 @@ fn echo(bytes: usize) -> SocketAddr {
     address
 }
 
-fn main() {
-    let name = format!("bench-{}/crcl", std::process::id());
-    let domain = Domain::choose(None, |name| std::env::var_os(name)).unwrap();
-    let arm = domain.arm(&name).unwrap();
-    let (_engine, _) = start(
-        &["engine", "--robot", "ur5e", "--arm", &name],
-        "engine of ur5e",
-    );
-    let listen = ["serve", "crcl", "--arm", &name, "--listen", "127.0.0.1:0"];
-    let (_server, line) = start(&listen, "serving CRCL at");
-    let address: SocketAddr = line.trim().rsplit(' ').next().unwrap().parse().unwrap();
+/// Asks from eight clients for a while; gives the times.
+fn polled(ask: impl Fn() -> Box<dyn FnMut() + Send> + Send + 'static, time: Duration) -> Vec<u64> {
     let ends = Arc::new(AtomicBool::new(false));
-    let mover = mover(address, Arc::clone(&ends));
-    sleep(Duration::from_millis(500));
-    let (mut alone, left_out) = watch(&arm);
-    print("period alone, wake-up and work", &mut alone);
-    println!("periods left out alone: {left_out}");
+    let stop = Arc::clone(&ends);
+    let clients = spawn(move || poll(ask, &stop));
+    sleep(time);
+    ends.store(true, Ordering::Release);
+    clients.join().unwrap()
+}
 
-    let polls = Arc::new(AtomicBool::new(false));
-    let stop = Arc::clone(&polls);
-    let clients = spawn(move || {
-        let ask = || -> Box<dyn FnMut() + Send> {
-            let mut client = Client::connect(address);
-            Box::new(move || drop(client.status()))
-        };
-        poll(ask, &stop)
-    });
-    sleep(Duration::from_millis(500));
-    let (mut beside, left_out) = watch(&arm);
-    polls.store(true, Ordering::Release);
-    let mut answers = clients.join().unwrap();
-    print("period beside eight clients at 1 kHz", &mut beside);
-    println!("periods left out beside them: {left_out}");
+fn main() {
+    let alone = Scene::new("alone");
+    sleep(WATCH);
+    let before = Periods::of(&alone.arm);
+    before.print("alone");
+    drop(alone);
+
+    let scene = Scene::new("beside");
+    let address = scene.address;
+    let ask = move || -> Box<dyn FnMut() + Send> {
+        let mut client = Client::connect(address);
+        Box::new(move || drop(client.status()))
+    };
+    let mut answers = polled(ask, WATCH);
+    let beside = Periods::of(&scene.arm);
+    beside.print("beside eight clients at 1 kHz");
     print("GetStatus while the arm moves", &mut answers);
 
     let size = Client::connect(address).status().len();
     let echo = echo(size);
-    let polls = Arc::new(AtomicBool::new(false));
-    let stop = Arc::clone(&polls);
-    let peers = spawn(move || {
-        let ask = || -> Box<dyn FnMut() + Send> {
-            let mut stream = TcpStream::connect(echo).unwrap();
-            stream.set_nodelay(true).unwrap();
-            let mut buffer = vec![0; size];
-            Box::new(move || {
-                stream.write_all(&[b'x'; 228]).unwrap();
-                stream.read_exact(&mut buffer).unwrap();
-            })
-        };
-        poll(ask, &stop)
-    });
-    sleep(WATCH / 2);
-    polls.store(true, Ordering::Release);
-    let mut echoes = peers.join().unwrap();
+    let ask = move || -> Box<dyn FnMut() + Send> {
+        let mut stream = TcpStream::connect(echo).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let mut buffer = vec![0; size];
+        Box::new(move || {
+            stream.write_all(&[b'x'; 228]).unwrap();
+            stream.read_exact(&mut buffer).unwrap();
+        })
+    };
+    let mut echoes = polled(ask, WATCH / 2);
     print("echo of as many bytes", &mut echoes);
-    ends.store(true, Ordering::Release);
-    mover.join().unwrap();
-    let ratio = |share| quantile(&answers, share) / quantile(&echoes, share);
-    println!("ratio echo-p50 {:.3}", ratio(0.5));
-    println!("ratio echo-p99 {:.3}", ratio(0.99));
-    let period = |share| quantile(&beside, share) / quantile(&alone, share);
-    println!("ratio period-alone-p50 {:.3}", period(0.5));
-    println!("ratio period-alone-p99 {:.3}", period(0.99));
+    drop(scene);
+    for (name, share) in [("p50", 0.5), ("p99", 0.99)] {
+        let ratio = quantile(&answers, share) / quantile(&echoes, share);
+        println!("ratio echo-{name} {ratio:.3}");
+    }
+    for (name, at) in [("p50", 0), ("p99", 1)] {
+        let wake_up = beside.wake_up[at] as f64 / before.wake_up[at] as f64;
+        let work = beside.work[at] as f64 / before.work[at] as f64;
+        println!("ratio wake-up-alone-{name} {wake_up:.3}");
+        println!("ratio work-alone-{name} {work:.3}");
+    }
 }

@@ -103,6 +103,9 @@ impl Console {
                 ));
             }
             Note::Message { text } => printer.line(&format!("message  {text}")),
+            Note::Guarded { line, message, .. } => {
+                printer.line(&format!("guard    line {line:4}  {message}"));
+            }
             Note::Refused {
                 line, name, error, ..
             } => printer.note(&format!(

@@ -1,3 +1,5 @@
+use std::path::{Path, PathBuf};
+
 use clap::{Args, ValueEnum};
 use engine::host::ClientChannels;
 use engine::session::{SessionConfig, SessionError};
@@ -12,6 +14,7 @@ use crate::failure::Failure;
 use crate::recorder_options::RecorderOptions;
 use crate::simulation::{Kind, Simulation};
 use crate::view_process::ViewProcess;
+use crate::wall::WallOption;
 
 /// An engine that ends its simulated driver, if it has one.
 pub(crate) type Host = engine::host::Host<Company>;
@@ -40,6 +43,8 @@ pub(crate) struct HostOptions {
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: String,
     #[command(flatten)]
+    wall: WallOption,
+    #[command(flatten)]
     pub(crate) recorder: RecorderOptions,
     /// Show the arm in the browser: prints the address of a live view, see `canter view`
     #[arg(long)]
@@ -48,6 +53,15 @@ pub(crate) struct HostOptions {
     /// time
     #[arg(long)]
     lock_step: bool,
+}
+
+/// What the live view shows beside the arm.
+#[derive(Args, Debug)]
+pub(crate) struct ShownWorld {
+    /// Show the objects of this world in the live view: the database of a plan as it changes, or a
+    /// workstation file
+    #[arg(long, value_name = "WORLD", requires = "view")]
+    pub(crate) world: Option<PathBuf>,
 }
 
 /// What an engine does with a command that it refuses.
@@ -110,11 +124,17 @@ impl HostOptions {
         default_length: crcl::LengthUnit,
         on_refusal: FailurePolicy,
     ) -> Result<Host, Failure> {
+        if self.wall.text().is_some() && self.driver != DriverChoice::Sim {
+            let cause = anyhow::anyhow!("--wall is for --driver sim");
+            return Err(Failure::new(Exit::Usage, cause));
+        }
         let arm = self.arm.open()?;
         // Before the driver: a second engine must not disturb the arm of the first.
         let channels = ClientChannels::open(&arm)?;
         let simulation = match self.driver {
-            DriverChoice::Sim => Some(Kind::Servos),
+            DriverChoice::Sim => Some(Kind::Servos {
+                wall: self.wall.text(),
+            }),
             DriverChoice::Mujoco => Some(Kind::Mujoco {
                 python: &self.python,
             }),
@@ -141,13 +161,23 @@ impl HostOptions {
         };
         let mut host = Host::start(channels, robot, &config, company).map_err(failure)?;
         self.recorder.start(&mut host, robot)?;
-        if self.view {
-            host.company.view = Some(ViewProcess::start(&host.arm)?);
-        }
         if let Some(warning) = &host.session.warning {
             tracing::warn!("{warning}");
         }
         Ok(host)
+    }
+}
+
+impl HostOptions {
+    /// Starts the live view if one was asked for, with the objects of a world.
+    ///
+    /// # Errors
+    /// [`Exit::Internal`] when its process cannot be started.
+    pub(crate) fn show(&self, host: &mut Host, world: Option<&Path>) -> Result<(), Failure> {
+        if self.view {
+            host.company.view = Some(ViewProcess::start(&host.arm, world)?);
+        }
+        Ok(())
     }
 }
 

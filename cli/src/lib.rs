@@ -42,6 +42,7 @@ mod table;
 mod tls_option;
 mod view_process;
 mod viewing;
+mod wall;
 mod world_boxes;
 mod world_file;
 

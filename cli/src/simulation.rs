@@ -18,7 +18,10 @@ const PATIENCE: Duration = Duration::from_secs(3);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind<'a> {
     /// The built-in servos.
-    Servos,
+    Servos {
+        /// A wall, as its option is written.
+        wall: Option<&'a str>,
+    },
     /// MuJoCo, in this Python.
     Mujoco {
         /// The Python with its packages.
@@ -47,7 +50,10 @@ impl Simulation {
             let mut command = Command::new(program);
             command.arg("driver");
             match kind {
-                Kind::Servos => command.arg("sim"),
+                Kind::Servos { wall: None } => command.arg("sim"),
+                Kind::Servos { wall: Some(wall) } => {
+                    command.args(["sim", &format!("--wall={wall}")])
+                }
                 Kind::Mujoco { python } => command.args(["mujoco", "--python", python]),
             };
             command

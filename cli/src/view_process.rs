@@ -1,6 +1,7 @@
 use std::env;
 use std::io::Write;
 use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use anyhow::Context;
@@ -16,15 +17,21 @@ pub(crate) struct ViewProcess {
 }
 
 impl ViewProcess {
-    /// Starts `canter view` for an arm; it prints its address to standard error.
+    /// Starts `canter view` for an arm, with the objects of a world if one is given; it prints its
+    /// address to standard error.
     ///
     /// # Errors
     /// [`Exit::Internal`] when the process cannot be started.
-    pub(crate) fn start(arm: &Arm) -> Result<Self, Failure> {
+    pub(crate) fn start(arm: &Arm, world: Option<&Path>) -> Result<Self, Failure> {
         let program = env::current_exe().context("cannot find the program's own file");
         let child = program.and_then(|program| {
-            Command::new(program)
-                .args(["view", "--until-end-of-input", "--arm"])
+            let mut command = Command::new(program);
+            command.arg("view");
+            if let Some(world) = world {
+                command.arg("--world").arg(world);
+            }
+            command
+                .args(["--until-end-of-input", "--arm"])
                 .arg(arm.to_string())
                 .arg("--domain")
                 .arg(arm.domain().directory())

@@ -51,8 +51,8 @@ fn boxes(model: &Model, run: Option<StoredRun>) -> World {
 
 /// Where a plan is, in one sentence.
 fn words(run: &StoredRun) -> String {
-    let counters = serde_json::from_str::<State>(&run.state).map(|state| state.counters);
-    let (statements, kits) = counters.map_or((0, 0), |found| (found.statements, found.kits));
+    let state = serde_json::from_str::<State>(&run.state);
+    let done = state.map(|state| state.counters).unwrap_or_default();
     let outcome = run.outcome.as_ref().map(|text| serde_json::from_str(text));
     let now = match (outcome, &run.under_way) {
         (Some(Ok(Outcome::Failed { reason, .. })), _) => format!("failed: {reason}"),
@@ -61,7 +61,7 @@ fn words(run: &StoredRun) -> String {
         (None, None) => "between two steps".to_owned(),
     };
     format!(
-        "plan {}: {now}; {statements} statements, {kits} kits",
-        run.plan
+        "plan {}: {now}; done: {} statements, {} kits, {} errands of the factotum",
+        run.plan, done.statements, done.kits, done.factotum_calls
     )
 }

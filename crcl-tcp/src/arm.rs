@@ -11,6 +11,7 @@ use ipc::{Arm, ControlClient, IpcError};
 
 use crate::cell::Cell;
 use crate::engine::{Engine, Happened, Report};
+use crate::sensing::Tripped;
 use crate::stopper::{abort, wait_for_rest};
 
 /// How often the engine is asked how far it is.
@@ -70,6 +71,8 @@ struct Active {
     last: u64,
     /// Since when the engine has done it.
     done: Option<Instant>,
+    /// What its guard said that has ended it.
+    said: Option<String>,
 }
 
 /// Follows an engine.
@@ -130,12 +133,16 @@ impl Follower {
                 order,
                 done: (last == 0).then(Instant::now),
                 last,
+                said: None,
             }),
             Err(why) => self.cell.lock().fail(serial, &why),
         }
     }
 
     fn give(&mut self, order: &Order) -> Result<u64, String> {
+        if let Some(last) = self.replace(order) {
+            return Ok(last);
+        }
         let stopped = order.preempts && self.preempt()?;
         if stopped || order.epoch != self.given {
             self.wait_for_end()?;
@@ -168,6 +175,27 @@ impl Follower {
             abort(&self.control, true)?;
         }
         Ok(last)
+    }
+
+    /// Has the engine lead a motion that is under way over into this one, without a stop; nothing
+    /// where that is not possible. The motion under way then never becomes done.
+    fn replace(&mut self, order: &Order) -> Option<u64> {
+        let moves = match self.active.iter().collect::<Vec<_>>().as_slice() {
+            [active] => active.order.kind == Kind::Motion && active.done.is_none(),
+            _ => false,
+        };
+        if !(order.preempts && moves && order.epoch == self.given) {
+            return None;
+        }
+        // Refused, the motion is stopped first.
+        let last = self.engine.replace(&order.commands).ok()?;
+        self.active.clear();
+        // A stop that came meanwhile did not find this command; if the stop is refused, the thread
+        // that stops says so.
+        if self.cell.lock().epoch != order.epoch {
+            let _ = abort(&self.control, true);
+        }
+        Some(last)
     }
 
     /// Stops a motion that is under way, which then never becomes done; says whether there was one.
@@ -224,9 +252,22 @@ impl Follower {
                     self.cell.lock().fail(active.order.serial, &why);
                 }
             }
+            Happened::Guarded { id, tripped } => self.trip(id, tripped),
             Happened::Faulted(why) => self.drop_all(epoch, &why),
             Happened::Closed => self.drop_all(epoch, "the engine has ended"),
         }
+    }
+
+    /// A guard has ended a command: it is where it is, and not where it was sent.
+    fn trip(&mut self, id: u64, tripped: Tripped) {
+        let found = self.active.iter_mut().find(|active| active.last >= id);
+        if let Some(active) = found {
+            active.order.target = None;
+            active.said = Some(tripped.sentence.clone());
+        }
+        let mut inner = self.cell.lock();
+        inner.guards.count = inner.guards.count.saturating_add(1);
+        inner.guards.last = Some(tripped);
     }
 
     /// Forgets all commands; those that were not stopped by a client have failed.
@@ -259,7 +300,7 @@ impl Follower {
             let order = &active.order;
             let waits = order.kind == Kind::Motion && self.active.len() == 1;
             if !waits || (still && settled(&report, order.target)) {
-                inner.finish(order.serial, CommandState::Done, None);
+                inner.finish(order.serial, CommandState::Done, active.said.clone());
             } else if since.elapsed() >= SETTLE {
                 let why = "the arm has not settled within its tolerance";
                 inner.fail(order.serial, why);

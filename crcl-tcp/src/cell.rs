@@ -6,6 +6,7 @@ use crcl::Command;
 use crcl::xml::{CommandState, Instance, ProgramPlace};
 
 use crate::parameters::Parameters;
+use crate::sensing::{Guards, Sensors};
 
 /// Number of a connection, from 1.
 pub(crate) type ConnectionId = u64;
@@ -120,6 +121,8 @@ pub(crate) struct Picture {
     pub(crate) largest: Largest,
     /// The gripper: whether it holds or is open is not known; how far it is open (m).
     pub(crate) gripper: Option<f64>,
+    /// What the sensors say.
+    pub(crate) sensors: Sensors,
 }
 
 /// What is behind the lock.
@@ -140,6 +143,8 @@ pub(crate) struct Inner {
     pub(crate) configured: Option<(i64, ConnectionId)>,
     /// What clients have set.
     pub(crate) parameters: Parameters,
+    /// The guards of the last command.
+    pub(crate) guards: Guards,
     pub(crate) picture: Picture,
     status: i64,
 }

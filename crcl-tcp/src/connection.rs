@@ -12,6 +12,7 @@ use crcl::xml::{
 use crcl::{Command, Pose};
 
 use crate::arm::{Kind, Order};
+use crate::blocks::Blocks;
 use crate::cell::{Cell, ConnectionId, Inner, Last};
 use crate::framing::{Frame, Frames, LONGEST_DOCUMENT};
 use crate::report::Choice;
@@ -52,6 +53,7 @@ pub(crate) struct Connection {
     ways: Ways,
     manners: Manners,
     choice: Choice,
+    blocks: Blocks,
     /// What is told on this connection only, and until which command.
     private: Option<(u64, Last)>,
     stream: Box<dyn Stream>,
@@ -83,6 +85,7 @@ impl Connection {
             ways,
             manners: manners.clone(),
             choice: Choice::new(manners.units.of_connection()),
+            blocks: Blocks::default(),
             private: None,
             stream,
         })
@@ -164,8 +167,12 @@ impl Connection {
                 self.private = None;
             }
             let last = self.private.as_ref().map_or(&inner.last, |(_, last)| last);
-            self.choice
-                .write(last, number, &inner.picture, &inner.parameters)
+            self.choice.write(
+                last,
+                number,
+                &inner.picture,
+                (&inner.parameters, &inner.guards),
+            )
         };
         let sent = self.stream.write_all(text.as_bytes());
         match sent.and_then(|()| self.stream.flush()) {
@@ -225,7 +232,7 @@ impl Connection {
             }
             _ => false,
         };
-        if let Err(why) = allowed(inner, command) {
+        if let Err(why) = allowed(inner, command).and_then(|()| guardable(&instance.instruction)) {
             // NIST's pendant repeats the choice of its reports on a connection that only looks.
             if !repeated {
                 self.end(inner, instance, CommandState::Error, Some(why));
@@ -289,18 +296,26 @@ impl Connection {
             XmlCommand::ConfigureJointReports { reset_all, reports } => {
                 return Some(self.choice.choose_joints(*reset_all, reports, joints));
             }
+            XmlCommand::EnableSensor { sensor, .. } => {
+                let sensors = &inner.picture.sensors;
+                return Some(self.choice.sensors.choose(sensor, true, sensors));
+            }
+            XmlCommand::DisableSensor(sensor) => {
+                let sensors = &inner.picture.sensors;
+                return Some(self.choice.sensors.choose(sensor, false, sensors));
+            }
             _ => return None,
         }
         Some(Ok(()))
     }
 
     /// What the engine is to do; nothing where the command changes nothing here.
-    fn order(&self, inner: &Inner, instruction: &Instruction) -> Result<Option<Order>, String> {
-        let sliding = &inner.picture.sliding;
-        let command = self.choice.units.to_si(&instruction.command, sliding);
+    fn order(&mut self, inner: &Inner, instruction: &Instruction) -> Result<Option<Order>, String> {
+        let (sliding, units) = (&inner.picture.sliding, self.choice.units);
+        let command = units.to_si(&instruction.command, sliding);
         let instruction = Instruction {
             command,
-            ..instruction.clone()
+            ..instruction.in_si(units.force, units.torque)
         };
         let commands: Vec<_> = match instruction.meaning() {
             Ok(Meaning::Commands(commands)) => {
@@ -309,31 +324,40 @@ impl Connection {
                 commands.into_iter().map(capped).collect()
             }
             Ok(Meaning::NoEffect(_)) => return Ok(None),
-            Ok(Meaning::LoopStart(_) | Meaning::LoopEnd { .. }) => {
-                let name = instruction.command.name();
-                return Err(format!(
-                    "{name} belongs into files; a client repeats the commands"
-                ));
+            Ok(Meaning::LoopStart(name)) => return self.blocks.begin(name).map(|()| None),
+            Ok(Meaning::LoopEnd { name, count }) => {
+                let again = self.blocks.end(&name, count)?;
+                return Ok(self.made(inner, Kind::Motion, again));
             }
             Err(refusal) => return Err(sentence(&refusal)),
         };
-        if commands.is_empty() {
-            return Ok(None);
-        }
         if let Some(error) = commands.iter().find_map(|command| command.check().err()) {
             return Err(error.to_string());
         }
-        let kind = kind(&instruction.command);
-        let moves =
-            kind == Kind::Motion && !matches!(commands.first(), Some(Command::Dwell { .. }));
-        Ok(Some(Order {
+        let (kind, commands) = match instruction.command {
+            XmlCommand::RunProgram(_) => (program_kind(&commands), units.around(commands)),
+            _ => (kind(&instruction.command), commands),
+        };
+        if kind == Kind::Begin || kind == Kind::End {
+            self.blocks.clear();
+        } else {
+            self.blocks.keep(&commands)?;
+        }
+        Ok(self.made(inner, kind, commands))
+    }
+
+    /// The order for these commands; none where there is nothing to do.
+    fn made(&self, inner: &Inner, kind: Kind, commands: Vec<Command>) -> Option<Order> {
+        let first = commands.iter().find(|command| command.takes_guards());
+        let moves = kind == Kind::Motion && !matches!(first, Some(Command::Dwell { .. }));
+        (!commands.is_empty()).then(|| Order {
             serial: 0,
             epoch: inner.epoch,
             kind,
             target: target(&commands),
             preempts: moves && !self.manners.queue,
             commands,
-        }))
+        })
     }
 
     fn give(&self, inner: &mut Inner, instance: &Instance, order: Order) {
@@ -345,6 +369,8 @@ impl Connection {
             Kind::End => inner.initialised = false,
             _ => {}
         }
+        inner.guards.guards = instance.instruction.guards.clone();
+        inner.guards.last = None;
         let serial = inner.begin(self.id, Last::new(instance, CommandState::Working));
         let order = Order { serial, ..order };
         if self.ways.orders.send(order).is_err() {
@@ -386,6 +412,19 @@ fn allowed(inner: &Inner, command: &XmlCommand) -> Result<(), String> {
     }
 }
 
+/// Whether the command can have the guards that it has.
+fn guardable(instruction: &Instruction) -> Result<(), String> {
+    let motion = kind(&instruction.command) == Kind::Motion;
+    let program = matches!(instruction.command, XmlCommand::RunProgram(_));
+    if instruction.guards.is_empty() || motion || program {
+        return Ok(());
+    }
+    let name = instruction.command.name();
+    Err(format!(
+        "a guard on {name}, which neither moves the arm nor waits"
+    ))
+}
+
 fn kind(command: &XmlCommand) -> Kind {
     match command {
         XmlCommand::InitCanon => Kind::Begin,
@@ -402,8 +441,32 @@ fn kind(command: &XmlCommand) -> Kind {
     }
 }
 
+/// What kind the program of RunProgram is.
+fn program_kind(commands: &[Command]) -> Kind {
+    let tool = |command: &Command| {
+        matches!(
+            command,
+            Command::OpenGripper
+                | Command::CloseGripper
+                | Command::SetEndEffector { .. }
+                | Command::OpenToolChanger
+                | Command::CloseToolChanger
+        )
+    };
+    if commands.iter().any(tool) {
+        Kind::Tool
+    } else {
+        Kind::Motion
+    }
+}
+
 /// Where the last move stops (m), if a pose of its own says so.
 fn target(commands: &[Command]) -> Option<[f64; 3]> {
+    // A program that RunProgram runs has other units.
+    let units = |command: &Command| matches!(command, Command::SetLengthUnits { .. });
+    if commands.iter().any(units) {
+        return None;
+    }
     match commands.iter().rev().find(|command| command.is_move())? {
         Command::MoveScrew { .. } => None,
         Command::MoveThroughWaypoints { waypoints } => {

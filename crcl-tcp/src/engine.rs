@@ -1,12 +1,13 @@
 //! The engine's ends: what is asked of it and what it says.
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use crcl::{Command, Program, json};
 use ipc::{Arm, Client, IpcError, Observer, State, ToolStatus, Verb};
 use serde_json::Value;
 
 use crate::cell::{Largest, Picture, Settings};
+use crate::sensing::{Sensors, Tripped};
 
 /// How long an engine may take to answer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
@@ -30,6 +31,7 @@ pub(crate) struct Report {
 pub(crate) enum Happened {
     Done { id: u64 },
     Refused { id: u64, why: String },
+    Guarded { id: u64, tripped: Tripped },
     Faulted(String),
     Closed,
 }
@@ -97,6 +99,7 @@ impl Engine {
             },
             largest: largest(&status["largest"]),
             gripper: state.as_ref().and_then(opening),
+            sensors: state.as_ref().map(sensors).unwrap_or_default(),
             joints,
         };
         Ok(Report {
@@ -132,15 +135,39 @@ impl Engine {
     /// # Errors
     /// As [`Self::report`].
     pub(crate) fn submit(&self, commands: &[Command]) -> Result<u64, String> {
-        let program: Program = commands.iter().cloned().collect();
-        let body = self.ask(Verb::Submit {
-            format: "json".to_owned(),
-            name: "crcl".to_owned(),
-            program: json::write(&program),
-        })?;
-        let last = body["last"].as_u64();
-        last.ok_or_else(|| "the engine did not number the command".to_owned())
+        let (format, name, program) = document(commands);
+        last(&self.ask(Verb::Submit {
+            format,
+            name,
+            program,
+        })?)
     }
+
+    /// Has a move take the place of the one that moves; gives the number of the last command.
+    ///
+    /// # Errors
+    /// As [`Self::report`]: the move under way goes on.
+    pub(crate) fn replace(&self, commands: &[Command]) -> Result<u64, String> {
+        let (format, name, program) = document(commands);
+        last(&self.ask(Verb::Replace {
+            format,
+            name,
+            program,
+        })?)
+    }
+}
+
+/// Commands as the engine reads them: format, name, program.
+fn document(commands: &[Command]) -> (String, String, String) {
+    let program: Program = commands.iter().cloned().collect();
+    let program = json::write(&program);
+    ("json".to_owned(), "crcl".to_owned(), program)
+}
+
+/// The number of the last command that was taken.
+fn last(body: &Value) -> Result<u64, String> {
+    let last = body["last"].as_u64();
+    last.ok_or_else(|| "the engine did not number the command".to_owned())
 }
 
 fn happened(note: &Value) -> Option<Happened> {
@@ -152,9 +179,33 @@ fn happened(note: &Value) -> Option<Happened> {
             id: id(),
             why: text(&note["error"]["message"]),
         }),
+        "guarded" => Some(Happened::Guarded {
+            id: id(),
+            tripped: Tripped {
+                sensor: text(&note["sensor"]),
+                value: note["value"].as_f64().unwrap_or(0.0),
+                stop_s: note["stop_s"].as_f64().unwrap_or(0.0),
+                position: array(&note["position_m"]),
+                orientation: array(&note["orientation_wxyz"]),
+                sentence: text(&note["message"]),
+            },
+        }),
         "faulted" => Some(Happened::Faulted(text(&note["reason"]))),
         "closed" => Some(Happened::Closed),
         _ => None,
+    }
+}
+
+/// What the sensors of a state say.
+fn sensors(state: &State) -> Sensors {
+    let used = state.sensors.iter().take(state.sensor_count as usize);
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let now = now.map_or(0, |since| since.as_millis());
+    Sensors {
+        values: used.map(|sensor| (sensor.text(), sensor.value)).collect(),
+        digital: state.digital_inputs,
+        count: state.sequence,
+        read_ms: i64::try_from(now).unwrap_or(i64::MAX),
     }
 }
 

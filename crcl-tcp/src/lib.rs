@@ -11,6 +11,7 @@
 
 mod allow;
 mod arm;
+mod blocks;
 mod cell;
 mod client;
 mod connection;
@@ -18,6 +19,7 @@ mod engine;
 mod framing;
 mod parameters;
 mod report;
+mod sensing;
 mod server;
 mod si;
 mod stopper;

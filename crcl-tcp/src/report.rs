@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use crcl::Pose;
 use crcl::xml::{
-    CommandStatus, GripperState, GripperStatus, GuardsStatus, JointReport, JointStatus, PoseStatus,
+    CommandStatus, GripperState, GripperStatus, JointReport, JointStatus, PoseStatus,
     PoseTolerance, SettingsStatus, Status, StatusParts, write_status,
 };
 
 use crate::cell::{Last, Picture};
 use crate::parameters::Parameters;
-use crate::si::ConnectionUnits;
+use crate::sensing::{Guards, SensorChoice};
+use crate::si::{ConnectionUnits, axes, short};
 
 /// The longest status (bytes): NIST's C++ client takes what one call of `recv` gives it for a
 /// document, and its buffer has 4096.
@@ -26,6 +27,8 @@ pub(crate) struct Choice {
     pub(crate) parts: StatusParts,
     /// What is reported of each joint; the position of all until something is chosen.
     pub(crate) joints: Option<BTreeMap<i32, JointReport>>,
+    /// Which sensors a status has.
+    pub(crate) sensors: SensorChoice,
 }
 
 impl Choice {
@@ -39,6 +42,7 @@ impl Choice {
                 ..StatusParts::default()
             },
             joints: None,
+            sensors: SensorChoice::default(),
         }
     }
 
@@ -75,7 +79,7 @@ impl Choice {
         last: &Last,
         number: i64,
         picture: &Picture,
-        parameters: &Parameters,
+        (parameters, guards): (&Parameters, &Guards),
     ) -> String {
         let mut status = Status {
             command: command(last, number),
@@ -87,7 +91,11 @@ impl Choice {
                 end_effector_parameters: parameters.end_effector.clone(),
                 ..self.settings(picture)
             }),
-            guards: self.parts.guards.then(GuardsStatus::default),
+            sensors: match self.parts.sensors {
+                true => picture.sensors.statuses(&self.sensors, &self.units),
+                false => Vec::new(),
+            },
+            guards: self.parts.guards.then(|| guards.status(&self.units)),
             ..Status::default()
         };
         let mut text = write_status(&status);
@@ -99,11 +107,16 @@ impl Choice {
             text = write_status(&status);
         }
         if text.len() > LONGEST {
+            status.sensors.truncate(4);
+            text = write_status(&status);
+        }
+        if text.len() > LONGEST {
             status.settings = None;
             text = write_status(&status);
         }
         if text.len() > LONGEST {
             status.joints.truncate(8);
+            status.sensors.clear();
             status.command.description = status.command.description.map(|text| cut(&text, 80));
             text = write_status(&status);
         }
@@ -218,31 +231,6 @@ fn cut(text: &str, most: usize) -> String {
     text.chars().take(most).collect()
 }
 
-/// A number with nine digits after the point: a picometre, and no exponent.
-fn short(value: f64) -> f64 {
-    if value.abs() < 1e6 {
-        (value * 1e9).round() / 1e9
-    } else {
-        value
-    }
-}
-
-/// The X axis and the Z axis of an orientation w, x, y, z.
-fn axes(q: &[f64; 4]) -> ([f64; 3], [f64; 3]) {
-    let [w, x, y, z] = *q;
-    let x_axis = [
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y + w * z),
-        2.0 * (x * z - w * y),
-    ];
-    let z_axis = [
-        2.0 * (x * z + w * y),
-        2.0 * (y * z - w * x),
-        1.0 - 2.0 * (x * x + y * y),
-    ];
-    (x_axis, z_axis)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -299,7 +287,12 @@ mod tests {
                 sensors: true,
                 guards: true,
             };
-            let text = choice.write(&last, i64::MAX, &picture(joints as usize), &parameters);
+            let text = choice.write(
+                &last,
+                i64::MAX,
+                &picture(joints as usize),
+                (&parameters, &Guards::default()),
+            );
             assert!(text.len() < 4095, "{} bytes, {joints} joints", text.len());
             read_status(&text).unwrap();
         }
@@ -333,7 +326,12 @@ mod tests {
             angle: crcl::AngleUnit::Radian,
             ..ConnectionUnits::default()
         });
-        let text = choice.write(&Last::default(), 1, &picture(1), &Parameters::default());
+        let text = choice.write(
+            &Last::default(),
+            1,
+            &picture(1),
+            (&Parameters::default(), &Guards::default()),
+        );
         let status = read_status(&text).unwrap();
         assert_eq!(status.joints[0].position, Some(0.333333333));
         let Pose::Axes { point, z_axis, .. } = status.pose.unwrap().pose else {

@@ -4,7 +4,7 @@ use crcl::xml::{
     ActuateJoint, JointDetails, MoveScrew, PoseSettings, PoseTolerance, Quantity, Waypoint,
     XmlCommand,
 };
-use crcl::{AngleUnit, ForceUnit, LengthUnit, Pose, TorqueUnit};
+use crcl::{AngleUnit, Command, ForceUnit, LengthUnit, Pose, TorqueUnit};
 
 /// The units of a connection that has not set its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,6 +89,20 @@ impl ConnectionUnits {
         }
     }
 
+    /// Commands whose numbers are in units of the connection, for an engine that reads metres and
+    /// radians before and after them.
+    pub(crate) fn around(self, commands: Vec<Command>) -> Vec<Command> {
+        let units = |length, angle| {
+            [
+                Command::SetLengthUnits { unit: length },
+                Command::SetAngleUnits { unit: angle },
+            ]
+        };
+        let before = units(self.length, self.angle).into_iter();
+        let after = units(LengthUnit::Meter, AngleUnit::Radian);
+        before.chain(commands).chain(after).collect()
+    }
+
     fn quantity(self, quantity: Quantity, angular: bool) -> Quantity {
         match quantity {
             Quantity::Absolute(value) if angular => Quantity::Absolute(self.radians(value)),
@@ -170,4 +184,29 @@ impl ConnectionUnits {
             self.angle.radians()
         }
     }
+}
+
+/// A number with nine digits after the point: a picometre, and no exponent.
+pub(crate) fn short(value: f64) -> f64 {
+    if value.abs() < 1e6 {
+        (value * 1e9).round() / 1e9
+    } else {
+        value
+    }
+}
+
+/// The X axis and the Z axis of an orientation w, x, y, z.
+pub(crate) fn axes(q: &[f64; 4]) -> ([f64; 3], [f64; 3]) {
+    let [w, x, y, z] = *q;
+    let x_axis = [
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y + w * z),
+        2.0 * (x * z - w * y),
+    ];
+    let z_axis = [
+        2.0 * (x * z + w * y),
+        2.0 * (y * z - w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    ];
+    (x_axis, z_axis)
 }

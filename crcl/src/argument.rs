@@ -1,5 +1,6 @@
 //! The arguments of commands: their kinds, names and values.
 
+use crate::guard::Guard;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
 use crate::pose_and_set::PoseAndSet;
@@ -53,6 +54,8 @@ pub enum ArgumentKind {
     Screw,
     /// A list of poses with settings of their own.
     Waypoints,
+    /// A sensor with a limit.
+    Guard,
 }
 
 impl ArgumentKind {
@@ -78,6 +81,7 @@ impl ArgumentKind {
             Self::Joints => "a list of joints",
             Self::Screw => "a screw",
             Self::Waypoints => "a list of poses with settings",
+            Self::Guard => "a guard",
         }
     }
 
@@ -100,6 +104,7 @@ impl ArgumentKind {
                 "{{{{400, 0, 300}, {0, 0, -1}, {1, 0, 0}}, {\"speed\", 50}, {\"tolerance\", 2}}}"
             }
             Self::Screw => "{{-5, 720, -20}, {400, 0, 300}}",
+            Self::Guard => "{\"wrench.Fz\", \"OVER_MAX\", 10}",
         }
     }
 
@@ -145,6 +150,7 @@ pub(crate) enum Value {
     Joints(Vec<JointTarget>),
     Screw(Screw),
     Waypoints(Vec<PoseAndSet>),
+    Guard(Guard),
 }
 
 impl Value {
@@ -203,6 +209,13 @@ impl Value {
     pub(crate) fn waypoints(self) -> Option<Vec<PoseAndSet>> {
         if let Self::Waypoints(waypoints) = self {
             Some(waypoints)
+        } else {
+            None
+        }
+    }
+    pub(crate) fn guard(self) -> Option<Guard> {
+        if let Self::Guard(guard) = self {
+            Some(guard)
         } else {
             None
         }

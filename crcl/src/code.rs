@@ -63,6 +63,8 @@ codes! {
     POSE_SETTING = "crcl::pose-setting";
     /// A screw with too many or too few parts.
     SCREW = "crcl::screw-shape";
+    /// A guard that is none.
+    GUARD = "crcl::guard";
     /// A pose, point or axis with too many or too few parts.
     POSE_SHAPE = "crcl::pose-shape";
     /// An axis of length zero.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::argument::Value;
+use crate::guard::Guard;
 use crate::joint::JointTarget;
 use crate::pose::Pose;
 use crate::pose_and_set::PoseAndSet;
@@ -74,6 +75,11 @@ pub enum Command {
     MoveScrew {
         /// The screw.
         screw: Screw,
+    },
+    /// Extension: stop the next command that moves the arm or waits when a sensor trips the guard.
+    Guard {
+        /// The sensor and its limit.
+        guard: Guard,
     },
     /// Open the gripper.
     OpenGripper,
@@ -233,6 +239,7 @@ impl Command {
                 ("MoveThroughWaypoints", Value::Waypoints(waypoints.clone()))
             }
             Self::MoveScrew { screw } => ("MoveScrew", Value::Screw(*screw)),
+            Self::Guard { guard } => ("Guard", Value::Guard(guard.clone())),
             Self::OpenGripper => ("OpenGripper", Value::None),
             Self::CloseGripper => ("CloseGripper", Value::None),
             Self::SetEndEffector { setting } => ("SetEndEffector", Value::Number(*setting)),

@@ -190,6 +190,12 @@ pub static COMMANDS: &[CommandInfo] = {
             None,
         ),
         extension(
+            with("Guard", "guard", Kind::Guard, |v| {
+                v.guard().map(|guard| C::Guard { guard })
+            }),
+            None,
+        ),
+        extension(
             with("SetAbsoluteRotSpeed", "value", Kind::AngularSpeed, |v| {
                 v.number().map(|value| C::SetAbsoluteRotSpeed { value })
             }),
@@ -287,6 +293,11 @@ impl Command {
             .is_some_and(|a| moves.contains(&a.kind))
     }
 
+    /// Whether a guard before it can stop it: it moves the arm or waits.
+    pub fn takes_guards(&self) -> bool {
+        self.is_move() || matches!(self, Self::Dwell { .. })
+    }
+
     /// Checks every value of the command that can be checked without settings and robot, by the
     /// rules of the parser: for commands that were made in memory or received.
     ///
@@ -309,6 +320,7 @@ impl Command {
                 value::not_negative(ArgumentKind::Reason.noun(), reason as f64).map(drop)
             }
             (_, Value::Screw(screw)) => screw.check(),
+            (_, Value::Guard(guard)) => guard.check(),
             (_, Value::Waypoints(waypoints)) => check_waypoints(&waypoints),
             (Some(ArgumentKind::Joints), Value::Joints(joints)) => value::check_targets(&joints),
             (Some(ArgumentKind::Poses), Value::Poses(poses)) if poses.is_empty() => {

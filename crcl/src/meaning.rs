@@ -1,5 +1,6 @@
 //! Turns the calls of a text into commands: names, numbers of arguments, types, ranges.
 
+mod guard;
 mod screw;
 mod waypoints;
 
@@ -141,6 +142,7 @@ impl Meaning<'_, '_> {
             ArgumentKind::Joints => self.joints(node).map(Value::Joints),
             ArgumentKind::Screw => self.screw(node).map(Value::Screw),
             ArgumentKind::Waypoints => self.waypoints(node).map(Value::Waypoints),
+            ArgumentKind::Guard => self.guard(node).map(Value::Guard),
             _ => self.quantity(kind, node),
         }
     }

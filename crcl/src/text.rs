@@ -4,6 +4,7 @@ use crate::argument::Value;
 use crate::code;
 use crate::command::Command;
 use crate::finding::{Finding, Findings};
+use crate::guard::{Guard, GuardEnding};
 use crate::joint::JointTarget;
 use crate::meaning::Meaning;
 use crate::parser::Parser;
@@ -125,6 +126,7 @@ pub fn write_command(command: &Command) -> String {
         Value::Poses(poses) => list(&poses),
         Value::Joints(joints) => joint_list(&joints),
         Value::Screw(screw) => screw_parts(&screw),
+        Value::Guard(guard) => guard_parts(&guard),
         Value::Waypoints(waypoints) => waypoint_list(&waypoints),
     };
     format!("{name} ({argument})")
@@ -155,6 +157,15 @@ fn waypoint_list(waypoints: &[PoseAndSet]) -> String {
     };
     let all: Vec<_> = waypoints.iter().map(one).collect();
     format!("{{{}}}", all.join(",\n    "))
+}
+
+fn guard_parts(guard: &Guard) -> String {
+    let (sensor, limit) = (quote(&guard.sensor), quote(guard.limit.name()));
+    let mut parts = vec![sensor, limit, number(guard.value)];
+    if guard.ending != GuardEnding::Done {
+        parts.push(quote(guard.ending.name()));
+    }
+    format!("{{{}}}", parts.join(", "))
 }
 
 fn screw_parts(screw: &Screw) -> String {

@@ -132,6 +132,18 @@ impl ForceUnit {
         ("pound", Self::Pound),
         ("ounce", Self::Ounce),
     ];
+
+    /// How many newtons one of this unit is.
+    ///
+    /// # Source
+    /// BIPM and NIST, SP 811 (2008), appendix B.8: pound-force.
+    pub fn newtons(self) -> f64 {
+        match self {
+            Self::Newton => 1.0,
+            Self::Pound => 4.448_221_615_260_5,
+            Self::Ounce => 4.448_221_615_260_5 / 16.0,
+        }
+    }
 }
 
 /// Unit of torques, in CRCL's XML only. Default: newton metre.
@@ -150,6 +162,17 @@ impl TorqueUnit {
         ("newtonMeter", Self::NewtonMeter),
         ("footPound", Self::FootPound),
     ];
+
+    /// How many newton metres one of this unit is.
+    ///
+    /// # Source
+    /// BIPM and NIST, SP 811 (2008), appendix B.8: foot pound-force.
+    pub fn newton_meters(self) -> f64 {
+        match self {
+            Self::NewtonMeter => 1.0,
+            Self::FootPound => 1.355_817_948_331_400_4,
+        }
+    }
 }
 
 /// The frame that poses are given in; set by the extension SetCoordinateFrame.

@@ -62,6 +62,12 @@ pub enum ValueError {
     /// A move of no joint at all.
     #[error("a list needs at least one joint")]
     NoJoints,
+    /// The name of a sensor is empty, too long, or no name.
+    #[error("the name of a sensor has 1 to 24 bytes and no control characters, got {length} bytes")]
+    Sensor {
+        /// Its length (bytes).
+        length: usize,
+    },
     /// Two targets for one joint.
     #[error("joint {joint} has two targets")]
     SameJoint {
@@ -102,6 +108,7 @@ impl ValueError {
             Self::NotOrthogonal { .. } => code::NOT_ORTHOGONAL,
             Self::NoPoses => code::NO_POSES,
             Self::NoJoints | Self::SameJoint { .. } => code::JOINTS,
+            Self::Sensor { .. } => code::GUARD,
         }
     }
 
@@ -121,6 +128,7 @@ impl ValueError {
                                            90 degrees to the Z axis"
             }
             Self::NoPoses => "give the pose to stop at",
+            Self::Sensor { .. } => "write a name that the driver gives, such as `wrench.Fz`",
             Self::NoJoints | Self::SameJoint { .. } => "give one target for each joint that moves",
         }
     }

@@ -135,11 +135,15 @@ fn blocks_are_written_out() {
 #[test]
 fn what_cannot_be_done_is_refused_at_its_element() {
     let guard = "<Guard><SensorID>F</SensorID><LimitType>OVER_MAX</LimitType><LimitValue>3</LimitValue></Guard>";
-    let guarded = format!("{guard}<DwellTime>1</DwellTime>");
+    let guarded = format!("{guard}<UnitName>inch</UnitName>");
+    let both = "<RequireTrigger>true</RequireTrigger><ErrorOnTrigger>true</ErrorOnTrigger></Guard>";
+    let never = guard.replace("</Guard>", both) + "<DwellTime>1</DwellTime>";
+    let twice = "<ProgramText>InitCanon() EndCanon(0) EndCanon(0)</ProgramText>";
     let cases = [
-        ("Dwell", guarded.as_str(), "<Guard"),
+        ("SetLengthUnits", guarded.as_str(), "<Guard"),
+        ("Dwell", never.as_str(), "<Guard"),
         ("RunProgram", "<ProgramText>x</ProgramText>", "<ProgramText"),
-        ("EnableSensor", "<SensorID>F</SensorID>", "<SensorID"),
+        ("RunProgram", twice, "<ProgramText"),
     ];
     for (kind, inside, element) in cases {
         let (code, line, _, text) = first(&program(&command(kind, inside)));
@@ -148,6 +152,96 @@ fn what_cannot_be_done_is_refused_at_its_element() {
             (code::UNSUPPORTED, 3, element),
             "{kind}"
         );
+    }
+}
+
+/// A guard is a command before its own, with its limit in SI units; a program of the robot's own
+/// language is its commands.
+#[test]
+fn guards_and_programs_of_the_robot_are_commands() {
+    let guard = "<Guard><SensorID>ATI</SensorID><SubField>Fz</SubField>\
+                 <LimitType>OVER_MAX</LimitType><LimitValue>2</LimitValue></Guard>";
+    let text = command("SetForceUnits", "<UnitName>pound</UnitName>")
+        + &command("Dwell", &format!("{guard}<DwellTime>1</DwellTime>"))
+        + &command(
+            "RunProgram",
+            "<ProgramText>InitCanon() Dwell(2) EndCanon(0)</ProgramText>",
+        );
+    let reading = xml::read(&program(&text), &ReadOptions::default());
+    assert_eq!(reading.findings, []);
+    let middle: Vec<_> = reading.program.iter().skip(1).take(3).cloned().collect();
+    let Command::Guard { guard } = &middle[0] else {
+        panic!("{middle:?}");
+    };
+    assert_eq!(guard.sensor, "ATI.Fz");
+    assert!((guard.value - 2.0 * 4.448_221_615_260_5).abs() < 1e-12);
+    let dwell = |seconds| Command::Dwell { seconds };
+    assert_eq!(middle[1..], [dwell(1.0), dwell(2.0)]);
+    let strict = ReadOptions {
+        strict: true,
+        ..ReadOptions::default()
+    };
+    assert!(xml::read(&program(&text), &strict).has_errors());
+}
+
+/// Guards go round all three forms with the move behind them.
+#[test]
+fn guards_go_round_all_three_forms() {
+    let guard = |sensor: &str, limit, value, ending| Command::Guard {
+        guard: crcl::Guard {
+            sensor: sensor.to_owned(),
+            limit,
+            value,
+            ending,
+        },
+    };
+    let end = crcl::GuardEnding::Done;
+    let commands = [
+        Command::InitCanon,
+        guard("wrench.Tz", GuardLimit::IncreaseOverLimit, 0.25, end),
+        guard(
+            "digital_input_3",
+            GuardLimit::OverMax,
+            0.5,
+            crcl::GuardEnding::ErrorOnTrigger,
+        ),
+        guard(
+            "a.b",
+            GuardLimit::UnderMin,
+            -0.01,
+            crcl::GuardEnding::RequireTrigger,
+        ),
+        Command::Dwell { seconds: 1.0 },
+        Command::EndCanon { reason: 0 },
+    ];
+    let program: Program = commands.iter().cloned().collect();
+    let options = ReadOptions::default();
+    let from_text = text::read(&text::write(&program), &options);
+    assert_eq!(from_text.findings, []);
+    let from_xml = xml::read(&xml::write(&from_text.program).unwrap(), &options);
+    assert_eq!(from_xml.findings, []);
+    let from_json = json::read(&json::write(&from_xml.program), &options);
+    let again: Vec<_> = from_json.program.iter().cloned().collect();
+    assert_eq!(again, commands);
+    // In strict mode a guard is refused by name.
+    let strict = ReadOptions {
+        strict: true,
+        ..ReadOptions::default()
+    };
+    assert!(text::read(&text::write(&program), &strict).has_errors());
+    assert!(json::read(&json::write(&program), &strict).has_errors());
+    // A guard without a command behind it has no form in XML.
+    let lonely: Program = [&commands[..2], &commands[5..]]
+        .concat()
+        .into_iter()
+        .collect();
+    assert!(xml::write(&lonely).is_err());
+    for wrong in [
+        "Guard ({\"\", \"OVER_MAX\", 1})",
+        "Guard ({\"f\", \"OVER\", 1})",
+        "Guard (3)",
+    ] {
+        assert!(text::read(wrong, &options).has_errors(), "{wrong}");
     }
 }
 

@@ -205,7 +205,7 @@ fn given<const N: usize>(legs: Vec<Leg<N>>) -> Vec<Given> {
         .unzip();
     let program: crcl::Program = commands.into_iter().collect();
     let both = program.commands.into_iter().zip(planned);
-    both.map(|(located, planned)| Given {
+    both.map(|(located, planned)| Given::Command {
         located,
         planned: Some(planned.into()),
     })

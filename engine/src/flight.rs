@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use ipc::Arm;
 use planner::robot::Robot;
-use recorder::{Head, Periods, Recording, Ring, Rotation, Sample, Summary, topic};
+use recorder::{Head, Period, Periods, Recording, Ring, Rotation, Sample, Summary, topic};
 
-use crate::recorded_arm::{RecordedArm, joint_numbers, level, pose_numbers, wall_ns};
+use crate::recorded_arm::{RecordedArm, level, pose_numbers, wall_ns};
 use crate::session::{Note, RunSample, Session, Status};
 use crate::texts::GivenProgram;
 
@@ -151,7 +151,7 @@ impl Flight {
             published: cycles.published,
             skipped: cycles.skipped,
             driver_missed: cycles.driver_missed,
-            unrecorded: 0,
+            unrecorded: cycles.lost_reports,
         };
         for recording in self.recordings() {
             recording.periods(periods);
@@ -270,17 +270,15 @@ fn remove_oldest(folder: &Path) {
 }
 
 fn sample(from: &RunSample) -> Sample {
-    let list = |values: &[f64]| joint_numbers(values, values.len());
-    Sample {
+    let period = Period {
         tick: from.tick,
         command: from.command,
         path_time: from.path_time,
         time_scaling: from.time_scaling,
-        position: list(&from.q),
-        velocity: list(&from.dq),
-        acceleration: list(&from.ddq),
-        measured: list(&from.measured),
+        published: [&from.q, &from.dq, &from.ddq],
+        measured: &from.measured,
         tool: pose_numbers(&from.workstation_from_tool),
         measured_tool: from.measured_pose.translation.vector.into(),
-    }
+    };
+    Sample::of(&period, from.q.len())
 }

@@ -3,14 +3,18 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crcl::ReadOptions;
-use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
+use crcl::{Located, ReadOptions};
+use ipc::{
+    Answer, Arm, ClientServer, FollowPoint, Identity, IpcError, Ownership, StatusWriter, Verb,
+};
 use planner::robot::Robot;
+use planner::timed::{TimedPoint, TimedTrajectory};
 use serde_json::{Value, json};
 use servo::ExecutorError;
 
 use crate::control::ControlThread;
 use crate::flight::{Flight, FlightOptions, Recorded};
+use crate::queue::Given;
 use crate::session::{
     Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
 };
@@ -297,15 +301,28 @@ impl<D> Host<D> {
                     }
                     answer
                 }
-                jog @ Verb::Jog { .. } => self::jog(session, jog),
-                Verb::SingleStep { on } => {
-                    session.set_single_step(on);
-                    Answer::accept(Value::Null)
-                }
-                Verb::Next => done(session.step_on()),
-                _ => Answer::refuse("this engine cannot do that"),
+                other => asked(session, other),
             }
         })
+    }
+}
+
+/// Asks the session for what concerns it alone.
+fn asked(session: &Session, verb: Verb) -> Answer {
+    match verb {
+        Verb::Replace {
+            format,
+            name,
+            program,
+        } => replace(session, &format, &name, &program),
+        jog @ Verb::Jog { .. } => jog_for(session, jog),
+        follow @ Verb::Follow { .. } => self::follow(session, follow),
+        Verb::SingleStep { on } => {
+            session.set_single_step(on);
+            Answer::accept(Value::Null)
+        }
+        Verb::Next => done(session.step_on()),
+        _ => Answer::refuse("this engine cannot do that"),
     }
 }
 
@@ -367,11 +384,30 @@ fn cut(note: &Value) -> Value {
 
 /// Takes a program of a client: all its commands or none.
 fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    match read(format, name, program) {
+        Ok(commands) => taken(session.submit(commands)),
+        Err(refusal) => refusal,
+    }
+}
+
+/// Executes a move in the place of the one that moves.
+fn replace(session: &Session, format: &str, name: &str, program: &str) -> Answer {
+    match read(format, name, program) {
+        Ok(commands) => taken(session.replace(commands)),
+        Err(refusal) => refusal,
+    }
+}
+
+/// The commands of a program, or the answer that says what is wrong with it.
+fn read(format: &str, name: &str, program: &str) -> Result<Vec<Located>, Answer> {
     let read = match format {
         "text" => crcl::text::read,
         "json" => crcl::json::read,
         "xml" => crcl::xml::read,
-        other => return Answer::refuse(format!("a program is text, json or xml, not {other:?}")),
+        other => {
+            let why = format!("a program is text, json or xml, not {other:?}");
+            return Err(Answer::refuse(why));
+        }
     };
     let reading = read(program, &ReadOptions::default());
     if reading.has_errors() {
@@ -382,20 +418,52 @@ fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer 
             &source,
             (crcl::Look::Plain, 100),
         );
-        return Answer::refuse(text.trim_end());
+        return Err(Answer::refuse(text.trim_end()));
     }
-    match session.submit(reading.program.commands) {
+    Ok(reading.program.commands)
+}
+
+/// The numbers of commands that were taken, as an answer.
+fn taken(ids: Result<Vec<u32>, impl std::fmt::Display>) -> Answer {
+    match ids {
         Ok(ids) => Answer::accept(json!({
             "first": ids.first(),
             "last": ids.last(),
             "commands": ids.len(),
         })),
-        Err(full) => Answer::refuse(full.to_string()),
+        Err(refusal) => Answer::refuse(refusal.to_string()),
+    }
+}
+
+/// Takes a trajectory with times of its own into the queue.
+fn follow(session: &Session, verb: Verb) -> Answer {
+    let Verb::Follow {
+        joints,
+        points,
+        retime,
+    } = verb
+    else {
+        return Answer::refuse("this is no trajectory");
+    };
+    taken(session.give(vec![Given::Timed(TimedTrajectory {
+        joints,
+        points: points.into_iter().map(timed_point).collect(),
+        retime,
+    })]))
+}
+
+/// A point as the planner takes it.
+fn timed_point(point: FollowPoint) -> TimedPoint {
+    TimedPoint {
+        time: point.time_s,
+        positions: point.positions,
+        velocities: point.velocities,
+        accelerations: point.accelerations,
     }
 }
 
 /// Jogs for as long as the client sends requests.
-fn jog(session: &Session, verb: Verb) -> Answer {
+fn jog_for(session: &Session, verb: Verb) -> Answer {
     let Verb::Jog {
         space,
         speeds,
@@ -410,10 +478,11 @@ fn jog(session: &Session, verb: Verb) -> Answer {
         "joint" => JogSpace::Joint,
         "tool" => JogSpace::Tool,
         "workstation" => JogSpace::Workstation,
+        "base" => JogSpace::Base,
         "goal" => JogSpace::Goal,
         other => {
             return Answer::refuse(format!(
-                "a jog is in joint, tool or workstation space or towards a goal, not {other:?}"
+                "a jog is in joint, tool, workstation or base space or towards a goal, not {other:?}"
             ));
         }
     };

@@ -4,21 +4,47 @@ use std::collections::VecDeque;
 
 use crcl::Located;
 use planner::controller::AnyStep;
+use planner::timed::TimedTrajectory;
 use thiserror::Error;
 
-/// A command that is to be executed, planned already or not.
+/// What is to be executed.
 #[derive(Debug)]
-pub struct Given {
-    /// The command and where it stood.
-    pub located: Located,
-    /// How it is executed, if it was planned before.
-    pub planned: Option<AnyStep>,
+pub enum Given {
+    /// A command of the language, planned already or not.
+    Command {
+        /// The command and where it stood.
+        located: Located,
+        /// How it is executed, if it was planned before.
+        planned: Option<AnyStep>,
+    },
+    /// A joint trajectory whose times are given.
+    Timed(TimedTrajectory),
+}
+
+impl Given {
+    /// Its name in notes and status.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Command { located, .. } => located.command.name(),
+            Self::Timed(_) => "FollowJointTrajectory",
+        }
+    }
+
+    /// Its line in the program, from 1; 0 where there is none.
+    #[must_use]
+    pub fn line(&self) -> usize {
+        match self {
+            Self::Command { located, .. } => located.line,
+            Self::Timed(_) => 0,
+        }
+    }
 }
 
 impl From<Located> for Given {
     fn from(located: Located) -> Self {
         let planned = None;
-        Self { located, planned }
+        Self::Command { located, planned }
     }
 }
 
@@ -83,6 +109,13 @@ impl Queue {
         self.next_id += 1;
         self.commands.push_back(Queued { id, epoch, given });
         Ok(id)
+    }
+
+    /// Numbers for commands that do not wait: as many as asked for.
+    pub fn number(&mut self, count: usize) -> Vec<u32> {
+        let first = self.next_id;
+        self.next_id += u32::try_from(count).unwrap_or(0);
+        (first..self.next_id).collect()
     }
 
     /// Takes the oldest command.

@@ -1,10 +1,10 @@
-//! What a recording tells of its arm, and how numbers and events are written in it.
+//! What a recording tells of its arm, and how poses and events are written in it.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Isometry3;
 use planner::robot::Robot;
-use recorder::{Head, MAX_JOINTS};
+use recorder::Head;
 
 /// The arm of a recording, at its first period.
 #[derive(Clone, Debug)]
@@ -68,16 +68,6 @@ pub(crate) fn wall_ns() -> u64 {
 pub fn pose_numbers(pose: &Isometry3<f64>) -> [f64; 7] {
     let (place, turn) = (pose.translation, pose.rotation);
     [place.x, place.y, place.z, turn.w, turn.i, turn.j, turn.k]
-}
-
-/// The first `joints` values of a list as a recording has them: with 0 behind the last joint.
-#[must_use]
-pub fn joint_numbers(values: &[f64], joints: usize) -> [f64; MAX_JOINTS] {
-    let mut all = [0.0; MAX_JOINTS];
-    for (to, from) in all.iter_mut().zip(values.iter().take(joints)) {
-        *to = *from;
-    }
-    all
 }
 
 /// The log level of an event (the name that [`Note`](crate::session::Note) is serialised with), by

@@ -23,12 +23,22 @@ pub enum Verb {
         /// The program.
         program: String,
     },
+    /// Execute a move in the place of the one that moves now, in the same state of motion and without
+    /// a stop; refused where that is not possible, and the old move goes on.
+    Replace {
+        /// `text`, `json` or `xml`.
+        format: String,
+        /// The program's name, for messages.
+        name: String,
+        /// The program: one move, with settings before and behind it.
+        program: String,
+    },
     /// Jog; the arm stops when no further request comes in time.
     Jog {
-        /// `joint`, `tool`, `workstation` or `goal`.
+        /// `joint`, `tool`, `workstation`, `base` or `goal`.
         space: String,
         /// Speeds as fractions of the largest, -1..=1: one per joint, or x, y, z, rx, ry, rz in the
-        /// tool frame or in the workstation; one for all joints towards a goal; all 0 stops.
+        /// tool frame, in the workstation or in the base; one for all joints towards a goal; all 0 stops.
         speeds: Vec<f64>,
         /// The arm stops when no further request comes for this long (ms).
         timeout_ms: u64,
@@ -39,6 +49,18 @@ pub enum Verb {
         /// Where a jog in space `goal` ends: one position per joint (rad, m).
         #[serde(default)]
         goal: Vec<f64>,
+    },
+    /// Follow a joint trajectory with the times of its points. It goes into the queue like a
+    /// command; a note tells when it begins, or why it is refused as a whole.
+    Follow {
+        /// Names of the joints, in the order of the numbers in each point: every joint of the arm
+        /// once.
+        joints: Vec<String>,
+        /// The points in the order of time.
+        points: Vec<FollowPoint>,
+        /// Whether only the way is kept, and the engine makes the time law.
+        #[serde(default)]
+        retime: bool,
     },
     /// Execute commands one by one, or all again.
     SingleStep {
@@ -71,13 +93,31 @@ impl Verb {
     pub fn commands(&self) -> bool {
         match self {
             Self::Submit { .. }
+            | Self::Replace { .. }
             | Self::Jog { .. }
+            | Self::Follow { .. }
             | Self::SingleStep { .. }
             | Self::Next
             | Self::Shutdown => true,
             Self::Status | Self::Notes { .. } | Self::Text { .. } => false,
         }
     }
+}
+
+/// A point of [`Verb::Follow`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FollowPoint {
+    /// When (s after the start of the trajectory).
+    pub time_s: f64,
+    /// Joint positions (rad, m).
+    pub positions: Vec<f64>,
+    /// Joint velocities (rad/s, m/s); empty: not given. For all points or for none.
+    #[serde(default)]
+    pub velocities: Vec<f64>,
+    /// Joint accelerations (rad/s², m/s²); empty: not given. For all points or for none.
+    #[serde(default)]
+    pub accelerations: Vec<f64>,
 }
 
 /// Who asks.

@@ -3,7 +3,7 @@
 //!
 //! [`otg`] plans random state-to-state problems, [`timing`] computes time laws of random paths,
 //! [`smooth`] plans lists of poses for a tool without an arm, a [`Trial`] plans a list for a robot,
-//! and [`RandomMoves`] plans random moves of a robot.
+//! its motion is drawn as it was [`Traced`], and [`RandomMoves`] plans random moves of a robot.
 //!
 //! This crate only calls the public functions of the library crates.
 #![forbid(unsafe_code)]
@@ -14,9 +14,11 @@ mod paths;
 mod problems;
 pub mod smooth;
 pub mod timing;
+mod traced;
 mod trial;
 
 pub use moves::{PlanningTime, RandomMoves};
 pub use paths::RandomPaths;
 pub use problems::{Ends, Problems};
+pub use traced::{Traced, TracedLimit, TracedPass};
 pub use trial::Trial;

@@ -14,7 +14,9 @@ use planner::task::{Move, Shape};
 use planner::with_dof;
 use trajectory::ToolLimits;
 
+use crate::Traced;
 use crate::smooth::Measure;
+use crate::traced::{places, times};
 
 /// A smooth motion to be tried: the first pose is its start.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,17 +66,76 @@ impl Trial {
         with_dof!(robot.dof(), N => self.measure_with::<N>(robot))
     }
 
+    /// Plans the motion as [`Trial::measure`] does, and gives it as points to be drawn; or why there
+    /// is none.
+    ///
+    /// # Errors
+    /// [`RobotError`] when the robot cannot be planned for.
+    pub fn trace(&self, robot: &Robot) -> Result<Result<Traced, String>, RobotError> {
+        with_dof!(robot.dof(), N => self.trace_with::<N>(robot))
+    }
+
     fn measure_with<const N: usize>(&self, robot: &Robot) -> Result<Measure, RobotError> {
-        let planner = Planner::new(
-            &robot.chain::<N>()?,
-            Isometry3::identity(),
-            robot.joint_limits::<N>(),
-            robot.joint_names(),
-        );
+        let planner = planner_of::<N>(robot)?;
         let home: SVector<f64, N> = vector(&robot.home);
-        let placed = self.placed(&planner.chain().forward(&home));
+        Ok(match self.find(&planner, &home) {
+            Ok(found) => {
+                let stops = found.with_stops(&planner);
+                self.measured(&found.planned, stops.as_ref(), found.planning)
+            }
+            Err((reason, planning)) => self.unplanned(reason, planning),
+        })
+    }
+
+    fn trace_with<const N: usize>(
+        &self,
+        robot: &Robot,
+    ) -> Result<Result<Traced, String>, RobotError> {
+        let planner = planner_of::<N>(robot)?;
+        let home: SVector<f64, N> = vector(&robot.home);
+        let found = self.find(&planner, &home).map_err(|(reason, _)| reason);
+        Ok(found.map(|found| {
+            let placed = self.placed(&planner.chain().forward(&home));
+            let stops = found.with_stops(&planner);
+            let trajectory = &found.planned.trajectory;
+            let (step, count) = times(trajectory.duration());
+            let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
+            let states = (0..count).map(|k| {
+                let time = (k as f64 * step).min(trajectory.duration());
+                trajectory.sample(time)
+            });
+            let (points, joints) = states
+                .map(|state| {
+                    let point = planner.chain().forward(&state.position).translation.vector;
+                    let lists = [&state.position, &state.velocity, &state.acceleration].map(list);
+                    (<[f64; 3]>::from(point), lists)
+                })
+                .unzip();
+            let traced = Traced {
+                poses: places(&placed),
+                duration: trajectory.duration(),
+                lower_bound: 0.0,
+                exact_stop: stops.map(|stops| stops.trajectory.duration()),
+                step,
+                points,
+                joints,
+                passes: Vec::new(),
+                active: Vec::new(),
+            };
+            traced.certified(&found.planned.certificate)
+        }))
+    }
+
+    /// The first motion that can be planned from a configuration at the first pose; otherwise why
+    /// there is none, and the time of the last attempt (s).
+    fn find<const N: usize>(
+        &self,
+        planner: &Planner<N>,
+        home: &SVector<f64, N>,
+    ) -> Result<Found<N>, (String, f64)> {
+        let placed = self.placed(&planner.chain().forward(home));
         let Some((first, rest)) = placed.split_first().filter(|(_, rest)| !rest.is_empty()) else {
-            return Ok(self.unplanned("at least two poses are needed".into(), 0.0));
+            return Err(("at least two poses are needed".into(), 0.0));
         };
         let motion = Move {
             shape: Shape::Smooth,
@@ -82,25 +143,24 @@ impl Trial {
             tolerance: self.tolerance,
             limits: self.limits,
         };
-        let mut reason = "the first pose is out of reach".to_owned();
-        let mut planning = 0.0;
-        for start in planner.postures(first, &home).into_iter().take(STARTS) {
+        let mut failed = ("the first pose is out of reach".to_owned(), 0.0);
+        for start in planner.postures(first, home).into_iter().take(STARTS) {
             let clock = Instant::now();
             let planned = planner.plan(&motion, &start);
-            planning = clock.elapsed().as_secs_f64();
+            let planning = clock.elapsed().as_secs_f64();
             match planned {
                 Ok(planned) => {
-                    let stops = Move {
-                        tolerance: 0.0,
-                        ..motion
-                    };
-                    let stops = planner.plan(&stops, &start).ok();
-                    return Ok(self.measured(&planned, stops.as_ref(), planning));
+                    return Ok(Found {
+                        motion,
+                        start,
+                        planned,
+                        planning,
+                    });
                 }
-                Err(error) => reason = error.to_string(),
+                Err(error) => failed = (error.to_string(), planning),
             }
         }
-        Ok(self.unplanned(reason, planning))
+        Err(failed)
     }
 
     fn measured<const N: usize>(
@@ -145,6 +205,35 @@ impl Trial {
             ..Measure::unplanned(self.poses.len(), reason)
         }
     }
+}
+
+/// A motion that could be planned.
+struct Found<const N: usize> {
+    motion: Move,
+    start: SVector<f64, N>,
+    planned: PlannedMove<N>,
+    /// Time that planning took (s).
+    planning: f64,
+}
+
+impl<const N: usize> Found<N> {
+    /// The same with a stop at each pose.
+    fn with_stops(&self, planner: &Planner<N>) -> Option<PlannedMove<N>> {
+        let stops = Move {
+            tolerance: 0.0,
+            ..self.motion.clone()
+        };
+        planner.plan(&stops, &self.start).ok()
+    }
+}
+
+fn planner_of<const N: usize>(robot: &Robot) -> Result<Planner<N>, RobotError> {
+    Ok(Planner::new(
+        &robot.chain::<N>()?,
+        Isometry3::identity(),
+        robot.joint_limits::<N>(),
+        robot.joint_names(),
+    ))
 }
 
 #[cfg(test)]
@@ -217,6 +306,30 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// What is drawn is what was measured: from the first pose to the last, within the certificate.
+    #[test]
+    fn a_traced_motion_is_the_measured_one() {
+        let robot = planner::robot::load("ur5e").unwrap();
+        let trial = corner();
+        let row = trial.measure(&robot).unwrap();
+        let traced = trial.trace(&robot).unwrap().unwrap();
+        assert_eq!(Some(traced.duration), row.motion);
+        assert_eq!(traced.exact_stop, row.exact_stop);
+        let near = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(near(&traced.points[0], &traced.poses[0]), "{traced:?}");
+        assert!(near(traced.points.last().unwrap(), &traced.poses[2]));
+        assert_eq!(traced.points.len(), traced.joints.len());
+        assert_eq!((traced.passes.len(), traced.passes[0].index), (1, 1));
+        let far = Trial {
+            poses: vec![
+                Isometry3::translation(0.0, 0.0, 0.0),
+                Isometry3::translation(9.0, 0.0, 0.0),
+            ],
+            ..trial
+        };
+        assert!(far.trace(&robot).unwrap().is_err());
     }
 
     #[test]

@@ -52,6 +52,11 @@ pub struct CommandError {
 }
 
 impl CommandError {
+    /// A motion that did not end as its command says.
+    pub fn motion(message: impl Into<String>) -> Self {
+        Self::new(ErrorClass::Motion, message)
+    }
+
     pub(crate) fn new(class: ErrorClass, message: impl Into<String>) -> Self {
         Self {
             class,

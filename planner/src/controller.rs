@@ -5,13 +5,15 @@ use std::any::Any;
 use crcl::LengthUnit;
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
-use trajectory::JointLimits;
+use realtime::Sample;
+use trajectory::{JointLimits, ToolLimits};
 
 use crate::command_error::{CommandError, ErrorClass};
 use crate::modal::Modal;
 use crate::motion::{MotionError, PlannedMove, Planner};
 use crate::robot::{Robot, RobotError, vector};
-use crate::task::{Move, Task};
+use crate::task::{Move, Shape, Task};
+use crate::timed::TimedTrajectory;
 
 /// A command that has left the queue: its task and, for a move, its trajectory.
 #[derive(Clone, Debug)]
@@ -22,6 +24,8 @@ pub struct Step<const N: usize> {
     pub planned: Option<PlannedMove<N>>,
     /// Nominal length in servo ticks, without the time until a driver's answer.
     pub ticks: u64,
+    /// Conditions on sensors that end it before its time; their limits are SI.
+    pub guards: Vec<crcl::Guard>,
 }
 
 /// A step that was planned ahead, with the state it was planned for and the state after it.
@@ -165,10 +169,47 @@ impl<const N: usize> Controller<N> {
     /// Resolves a command with the present settings and plans it as a whole.
     ///
     /// # Errors
-    /// A [`CommandError`]; the controller is then unchanged.
+    /// A [`CommandError`]; the controller is then unchanged, but for guards of the command.
     pub fn step(&mut self, command: &crcl::Command) -> Result<Step<N>, CommandError> {
         let flange = self.workstation_from_flange.forward(&self.joints);
         let task = self.modal.resolve(command, &flange)?;
+        let guards = if command.takes_guards() {
+            self.modal.take_guards()
+        } else {
+            Vec::new()
+        };
+        let step = self.plan(task)?;
+        Ok(Step { guards, ..step })
+    }
+
+    /// As [`Self::step`], for a move that begins in a state of motion: it takes the place of one that
+    /// is under way.
+    ///
+    /// # Errors
+    /// A [`CommandError`] for a command that is no single move without guards, or that cannot begin
+    /// in that state.
+    pub fn step_moving(
+        &mut self,
+        command: &crcl::Command,
+        start: &Sample<N>,
+    ) -> Result<Step<N>, CommandError> {
+        let flange = self.workstation_from_flange.forward(&start.position);
+        let task = self.modal.resolve(command, &flange)?;
+        let guards = self.modal.take_guards();
+        let Task::Move(motion) = task else {
+            return Err(CommandError::motion(
+                "only a single move begins while the arm moves",
+            ));
+        };
+        if !guards.is_empty() {
+            return Err(CommandError::motion("a guarded move begins at rest"));
+        }
+        let planned = self.planner.moving(&motion, start);
+        self.moved(motion, planned)
+    }
+
+    /// The step of a task, from where the arm is.
+    fn plan(&mut self, task: Task) -> Result<Step<N>, CommandError> {
         let (planner, start) = (&self.planner, &self.joints);
         match task {
             Task::Move(motion) => {
@@ -193,6 +234,7 @@ impl<const N: usize> Controller<N> {
             Task::Dwell { seconds } => Ok(Step {
                 ticks: self.ticks(seconds),
                 planned: None,
+                guards: Vec::new(),
                 task,
             }),
             Task::Tool(action) => {
@@ -201,15 +243,38 @@ impl<const N: usize> Controller<N> {
                 Ok(Step {
                     ticks: self.ticks(time),
                     planned: None,
+                    guards: Vec::new(),
                     task,
                 })
             }
             _ => Ok(Step {
                 ticks: 0,
                 planned: None,
+                guards: Vec::new(),
                 task,
             }),
         }
+    }
+
+    /// Plans a joint trajectory whose times are given, as a whole, within the limits `most` of the
+    /// controlled point. It needs no InitCanon and changes no mode.
+    ///
+    /// # Errors
+    /// A [`CommandError`]; the controller is then unchanged.
+    pub fn step_timed(
+        &mut self,
+        timed: &TimedTrajectory,
+        most: &ToolLimits,
+    ) -> Result<Step<N>, CommandError> {
+        let planned = self.planner.timed(timed, &self.joints, most);
+        let end = planned.as_ref().map_or(self.joints, |planned| planned.end);
+        let motion = Move {
+            shape: Shape::Joint,
+            poses: vec![self.chain().forward(&end)],
+            tolerance: 0.0,
+            limits: *most,
+        };
+        self.moved(motion, planned)
     }
 
     /// The step of a motion that was planned; the joints are then where it ends.
@@ -227,6 +292,7 @@ impl<const N: usize> Controller<N> {
             ticks: self.ticks(planned.trajectory.duration()),
             task: Task::Move(motion),
             planned: Some(planned),
+            guards: Vec::new(),
         })
     }
 

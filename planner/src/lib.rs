@@ -2,8 +2,8 @@
 //!
 //! [`modal`] applies the modes to a command, [`motion`] plans it as a whole. The [`controller`]
 //! uses both and knows where the arm is after each command; the [`dry_run`] and a real run both use
-//! it. [`way`] plans the commands of a plan, which leave the way open. [`recorded`] checks a
-//! recorded motion against its program.
+//! it. [`way`] plans the commands of a plan, which leave the way open; [`timed`] is a joint trajectory
+//! whose times others give. [`recorded`] checks a recorded motion against its program.
 //!
 //! This crate is a pure function of robot, program and start: it never starts a thread, reads a
 //! clock, touches shared memory, prints, or reads an environment variable. Only [`robot`] reads
@@ -21,5 +21,6 @@ pub mod motion;
 pub mod recorded;
 pub mod robot;
 pub mod task;
+pub mod timed;
 pub mod tooling;
 pub mod way;

@@ -4,6 +4,7 @@
 //! Robots that come with Canter are part of the binary; [`load`] finds them by
 //! name, and any other by its folder.
 
+mod arrival;
 mod effort;
 mod error;
 mod file;
@@ -12,6 +13,7 @@ mod import;
 mod meshes;
 mod shipped;
 
+pub use arrival::Arrival;
 pub use effort::EffortLimits;
 pub use error::RobotError;
 pub use import::{from_urdf, import};
@@ -135,6 +137,8 @@ pub struct Robot {
     pub tool: ToolLimits,
     /// Limits of the efforts of the joints, if the robot asks for them.
     pub efforts: Option<EffortLimits>,
+    /// When a command is done: the measured arm has arrived.
+    pub arrival: Arrival,
     /// Pose of the robot's base in the workstation.
     pub workstation_from_base: Isometry3<f64>,
     /// A ready position: well inside the limits and away from singular poses.

@@ -13,9 +13,10 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from . import errors as errors
+
 if TYPE_CHECKING:
     from . import aio as aio
-    from . import errors as errors
     from . import otg as otg
     from . import timing as timing
     from ._arms import Arm as Arm
@@ -84,23 +85,8 @@ _WHERE = {
     "smooth": "_smoothing",
     "time_path": "timing",
 }
-_MODULES = ("aio", "driver", "errors", "otg", "timing")
-_ERRORS = (
-    "Error",
-    "InternalError",
-    "RobotError",
-    "IkError",
-    "OtgError",
-    "TimingError",
-    "SmoothError",
-    "ProgramError",
-    "PlanError",
-    "ConnectionFailed",
-    "NoEngine",
-    "Refused",
-    "Stopped",
-    "Fault",
-)
+_MODULES = ("aio", "driver", "otg", "timing")
+_ERRORS = tuple(errors.__all__)
 
 __all__ = [*_WHERE, *_ERRORS, "aio", "errors", "otg", "timing"]
 
@@ -109,7 +95,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return importlib.import_module(f".{name}", __name__)
     if name in _ERRORS:
-        return getattr(importlib.import_module(".errors", __name__), name)
+        return getattr(errors, name)
     if name in _WHERE:
         found = getattr(importlib.import_module(f".{_WHERE[name]}", __name__), name)
         globals()[name] = found

@@ -94,6 +94,25 @@ impl<const N: usize, const B: usize> Buffer<N, B> {
         }
     }
 
+    /// Drops everything behind a place: the segment there ends at it, and ends no command.
+    pub(crate) fn cut(&mut self, at: Cursor) {
+        if at.index >= self.count {
+            return;
+        }
+        if let Some(segment) = self.segments.get_mut((self.first + at.index) % B) {
+            segment.piece.duration = segment.piece.duration.min(at.offset);
+            segment.last = false;
+        }
+        self.count = at.index + 1;
+        (self.horizon, self.ends) = (0.0, 0);
+        for index in 0..self.count {
+            if let Some(segment) = self.segments.get((self.first + index) % B) {
+                self.horizon += segment.piece.duration;
+                self.ends += usize::from(segment.last);
+            }
+        }
+    }
+
     pub(crate) fn clear(&mut self) {
         self.count = 0;
         self.ends = 0;

@@ -30,7 +30,7 @@ pub struct Step<const N: usize> {
     pub time_scaling: f64,
     /// A command that ended at rest with this setpoint.
     pub finished: Option<u32>,
-    /// A command that starts with this setpoint, at rest.
+    /// A command that starts with this setpoint: at rest, or in the place of the one before.
     pub started: Option<u32>,
     /// Whether the setpoint rests.
     pub resting: bool,
@@ -174,6 +174,27 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         self.setpoint = Sample::rest(position);
     }
 
+    /// Forgets what is planned behind a time of the current command (s since its start), so that
+    /// another motion, which begins there in the same state of motion, can be pushed behind it.
+    /// Says whether it did: only while `command` moves at a steady share of the planned speed, for
+    /// a time that is still to come and is in the buffer.
+    pub fn cut(&mut self, command: u32, path_time: f64) -> bool {
+        let left = path_time - self.path_time;
+        let moves = self.mode == Mode::Path && self.command == command;
+        let steady = self.governor.rate == 0.0 && self.governor.factor > 0.0;
+        if !(moves && steady && left > self.period) {
+            return false;
+        }
+        let (at, starved) = self.buffer.advance(self.at, left);
+        let ahead = self.buffer.get(at.index);
+        let inside = |segment: &Segment<N>| at.offset < segment.piece.duration || !segment.last;
+        if starved || !ahead.is_some_and(inside) {
+            return false;
+        }
+        self.buffer.cut(at);
+        true
+    }
+
     /// Leaves the path: each joint brakes by itself from the next period on.
     pub fn brake(&mut self) {
         if self.mode != Mode::Rest {
@@ -184,11 +205,13 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
     /// Makes the next setpoint.
     pub fn step(&mut self, demand: Demand) -> Step<N> {
         let (mut finished, mut started, mut trip) = (None, None, None);
+        let before = self.command;
         let next = match self.mode {
             Mode::Brake => brake(&self.setpoint, &self.limits, self.period),
             Mode::Path => {
                 let (next, over) = self.follow(demand);
                 finished = over;
+                started = (self.command != before).then_some(self.command);
                 next
             }
             Mode::Rest => Sample::rest(self.setpoint.position),
@@ -196,7 +219,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         let next = match check(&self.setpoint, &next, &self.limits, self.period) {
             Some(found) if self.mode != Mode::Brake => {
                 trip = Some(found);
-                finished = None;
+                (finished, started) = (None, None);
                 self.mode = Mode::Brake;
                 brake(&self.setpoint, &self.limits, self.period)
             }
@@ -205,9 +228,6 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         self.setpoint = next;
         if self.mode == Mode::Rest && trip.is_none() {
             started = self.start(demand);
-        }
-        if started.is_some() {
-            self.path_time = 0.0;
         }
         self.report([finished, started], trip)
     }
@@ -238,6 +258,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
             return None;
         }
         self.command = first.command;
+        self.path_time = 0.0;
         self.at = Cursor {
             index: 0,
             offset: 0.0,
@@ -261,6 +282,10 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         let Some(segment) = self.buffer.get(at.index).copied() else {
             return (brake(&self.setpoint, &self.limits, self.period), None);
         };
+        if segment.command != self.command {
+            // Another motion has taken the place of this one.
+            (self.command, self.path_time) = (segment.command, at.offset);
+        }
         let end = segment.piece.duration;
         if segment.last && at.offset >= end - 1e-9 {
             self.buffer.drop_before(at.index + 1);

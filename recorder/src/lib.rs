@@ -34,5 +34,5 @@ pub use read::{Recorded, RecordedNote, read};
 pub use recording::{Recording, Summary};
 pub use recover::{Recovered, recover};
 pub use ring::Ring;
-pub use sample::{MAX_JOINTS, Periods, Sample};
+pub use sample::{MAX_JOINTS, Period, Periods, Sample};
 pub use writer::{Rotation, Writer};

@@ -16,7 +16,7 @@ const BATCHES: usize = 1024;
 const SAMPLES: usize = 32_768;
 
 /// Time between two ends of chunks: what a kill may cost.
-const FLUSH: Duration = Duration::from_millis(450);
+const FLUSH: Duration = Duration::from_millis(200);
 
 /// Time between two waits for the disk: what a power cut may cost.
 const SYNC: Duration = Duration::from_secs(5);

@@ -61,7 +61,7 @@ pub struct ExecutorConfig<const N: usize> {
     /// so that the same program gives the same periods. The planner must call
     /// [`super::SegmentSender::settle`].
     pub wait_for_planner: bool,
-    /// Whether each setpoint and measured position is recorded for [`super::Monitor::sample`].
+    /// Whether each setpoint and measured position is recorded for [`super::Samples`].
     pub record: bool,
     /// The efforts that setpoints carry as feed-forward; zeros without.
     pub feed_forward: Option<FeedForward<N>>,

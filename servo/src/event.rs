@@ -152,6 +152,15 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
+    /// Whether a command has taken the place of the one that moves.
+    Spliced {
+        /// Index of the new command.
+        by: u32,
+        /// Whether it was in time; otherwise the one that moves goes on.
+        accepted: bool,
+        /// The period.
+        tick: u64,
+    },
     /// The arm has not arrived at the end of a command within the patience; the command counts as
     /// finished.
     NotArrived {

@@ -22,6 +22,7 @@ mod config;
 mod control;
 mod event;
 mod feed_forward;
+mod guard;
 mod handle;
 mod histogram;
 mod monitor;
@@ -35,10 +36,13 @@ pub use config::{Arrival, ExecutorConfig, ExecutorError};
 pub use control::Control;
 pub use event::{Event, Fault, Recorded, ShortText};
 pub use feed_forward::FeedForward;
+pub use guard::{
+    GuardKind, GuardOrder, GuardOutcome, GuardSource, Guarded, MAX_GUARDS, SETTLED, SensorGuard,
+};
 pub use handle::Executor;
 pub use histogram::Histogram;
-pub use monitor::Monitor;
+pub use monitor::{Events, Monitor, Samples};
 pub use orders::{NoFault, Progress, Steering};
 pub use remote::{Counters, Measured, Remote};
 pub use runner::{Runner, Tick};
-pub use segment_sender::{Full, SegmentSender, ToolOrder, Work};
+pub use segment_sender::{Full, SegmentSender, Splice, ToolOrder, Work};

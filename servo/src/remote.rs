@@ -32,6 +32,10 @@ pub struct Measured<const N: usize> {
     pub tools: [u32; 2],
     /// Share of the planned speed that the arm asks for.
     pub speed_asked: f64,
+    /// The current command, or the last one.
+    pub command: u32,
+    /// Planned time since its start (s).
+    pub path_time: f64,
 }
 
 /// How many periods there were.
@@ -69,6 +73,8 @@ pub(super) struct Shared<const N: usize> {
     flags: AtomicU32,
     tools: [AtomicU32; 2],
     speed_asked: AtomicU64,
+    command: AtomicU32,
+    path_time: AtomicU64,
     pub(super) published: AtomicU64,
     pub(super) skipped: AtomicU64,
     pub(super) unsent: AtomicU64,
@@ -95,6 +101,8 @@ impl<const N: usize> Shared<N> {
             flags: AtomicU32::new(0),
             tools: [AtomicU32::new(0), AtomicU32::new(0)],
             speed_asked: AtomicU64::new(1.0_f64.to_bits()),
+            command: AtomicU32::new(0),
+            path_time: AtomicU64::new(0),
             published: AtomicU64::new(0),
             skipped: AtomicU64::new(0),
             unsent: AtomicU64::new(0),
@@ -150,6 +158,9 @@ impl<const N: usize> Shared<N> {
             .store(now.time_scaling.to_bits(), Ordering::Relaxed);
         self.speed_asked
             .store(now.speed_asked.to_bits(), Ordering::Relaxed);
+        self.command.store(now.command, Ordering::Relaxed);
+        self.path_time
+            .store(now.path_time.to_bits(), Ordering::Relaxed);
         let flags = [now.resting, now.idle, now.faulted];
         let bits = flags
             .iter()
@@ -190,6 +201,8 @@ impl<const N: usize> Shared<N> {
                     .each_ref()
                     .map(|tool| tool.load(Ordering::Relaxed)),
                 speed_asked: f64::from_bits(self.speed_asked.load(Ordering::Relaxed)),
+                command: self.command.load(Ordering::Relaxed),
+                path_time: f64::from_bits(self.path_time.load(Ordering::Relaxed)),
             };
             core::sync::atomic::fence(Ordering::Acquire);
             if before.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == before {

@@ -1,7 +1,9 @@
 //! One period of the real-time thread, without a clock and without a channel.
 
 mod arrival;
+mod guards;
 mod message;
+mod splices;
 mod states;
 mod tools;
 
@@ -16,6 +18,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::config::ExecutorConfig;
 use super::event::{Event, Fault, Recorded};
+use super::guard::{Guarded, Watch};
 use super::monitor::Monitor;
 use super::orders::Asked;
 use super::remote::{Remote, Shared};
@@ -32,6 +35,9 @@ const RING: usize = 4096;
 
 /// Events and samples that wait for their reader.
 const REPORTS: usize = 1 << 14;
+
+/// Guarded commands that wait for their reader.
+const GUARDED: usize = 64;
 
 /// Largest number of items taken from the ring per period.
 const A_PERIOD: usize = 64;
@@ -60,6 +66,9 @@ struct Working {
     left: u64,
 }
 
+/// The largest delay of a driver that following errors are forgiven for (s).
+const LARGEST_DELAY: f64 = 0.2;
+
 /// The work of the real-time thread in a period: it gets states and planned work, and returns
 /// setpoints and events. After [`Runner::open`] nothing allocates or waits.
 #[derive(Debug)]
@@ -70,6 +79,7 @@ pub struct Runner<const N: usize> {
     items: Consumer<Item<N>>,
     events: Producer<Event>,
     samples: Option<Producer<Recorded<N>>>,
+    guarded: Producer<Guarded<N>>,
     shared: Arc<Shared<N>>,
     epoch: u32,
     session: u64,
@@ -81,6 +91,8 @@ pub struct Runner<const N: usize> {
     ready: bool,
     /// What is reported when the measured arm has arrived, in order.
     awaited: VecDeque<Awaited<N>>,
+    /// How late the arm is by the driver's own delay (s).
+    delay: f64,
     /// Whether the arm asks for less speed.
     slowed: bool,
     asked: Asked,
@@ -89,6 +101,12 @@ pub struct Runner<const N: usize> {
     stopped: bool,
     fault: Option<Fault>,
     tool: Option<Working>,
+    /// The guards of the command that moves.
+    watch: Option<Watch<N>>,
+    /// A command that a guard has ended: the rest of its segments is dropped.
+    dropping: Option<u32>,
+    /// A command that came too late to take the place of another: its segments are dropped.
+    refused: Option<u32>,
     orders: u32,
     tools: [ToolCommand; MAX_TOOLS],
     published: Sample<N>,
@@ -105,6 +123,7 @@ impl<const N: usize> Runner<N> {
         let (ring, items) = RingBuffer::new(RING);
         let (events, event_reader) = RingBuffer::new(REPORTS);
         let (samples, sample_reader) = RingBuffer::new(if config.record { REPORTS } else { 1 });
+        let (guarded, guarded_reader) = RingBuffer::new(GUARDED);
         let rest = SVector::zeros();
         let runner = Self {
             period: config.period(),
@@ -112,6 +131,7 @@ impl<const N: usize> Runner<N> {
             items,
             events,
             samples: config.record.then_some(samples),
+            guarded,
             shared: Arc::clone(&shared),
             epoch: 0,
             session: 0,
@@ -121,6 +141,7 @@ impl<const N: usize> Runner<N> {
             blind: 0,
             ready: false,
             awaited: VecDeque::with_capacity(WAITING),
+            delay: 0.0,
             slowed: false,
             asked: shared.orders.asked(),
             aborting: None,
@@ -128,6 +149,9 @@ impl<const N: usize> Runner<N> {
             stopped: false,
             fault: None,
             tool: None,
+            watch: None,
+            dropping: None,
+            refused: None,
             orders: 0,
             tools: [ToolCommand::default(); MAX_TOOLS],
             published: Sample::rest(rest),
@@ -141,11 +165,7 @@ impl<const N: usize> Runner<N> {
             shared: Arc::clone(&shared),
             epoch: 0,
         };
-        let monitor = Monitor {
-            events: event_reader,
-            samples: sample_reader,
-            seen: 0,
-        };
+        let monitor = Monitor::new(event_reader, guarded_reader, sample_reader);
         (runner, sender, Remote { shared }, monitor)
     }
 
@@ -163,11 +183,13 @@ impl<const N: usize> Runner<N> {
         };
         (self.quiet, self.blind) = (0, 0);
         self.ready = false;
+        self.delay = (ack.delay_ns as f64 * 1e-9).min(LARGEST_DELAY);
         self.slowed = false;
         self.awaited.clear();
         self.fault = None;
         self.shared.orders.clear();
         self.tool = None;
+        self.forget_guards();
         self.orders = 0;
         self.tools = [ToolCommand::default(); MAX_TOOLS];
         self.ahead = 0.0;
@@ -250,6 +272,7 @@ impl<const N: usize> Runner<N> {
             self.fault = Some(fault);
             // The arm will not arrive.
             self.awaited.clear();
+            self.forget_guards();
             self.shared.orders.latch();
             self.epoch = self.shared.new_epoch();
             self.report(Event::Faulted {
@@ -267,6 +290,7 @@ impl<const N: usize> Runner<N> {
         self.record();
         self.obey();
         self.feed();
+        self.watch_guards();
         self.move_on();
         self.watch_arrival();
         self.watch_tool();
@@ -297,6 +321,7 @@ impl<const N: usize> Runner<N> {
             self.cycle.flush();
             self.tool = None;
             self.arrive_at_once();
+            self.forget_guards();
             self.epoch = self.shared.new_epoch();
             self.report(Event::Aborted {
                 aborts: asked.aborts(),
@@ -314,9 +339,13 @@ impl<const N: usize> Runner<N> {
                 true
             } else {
                 match item.work {
+                    Work::Motion(segment) if self.drops(&segment) => true,
                     Work::Motion(segment) if self.tool.is_none() => {
                         match self.cycle.push(&segment) {
-                            Pushed::Taken => true,
+                            Pushed::Taken => {
+                                self.note_pushed(&segment);
+                                true
+                            }
                             Pushed::Full => false,
                             Pushed::Broken => {
                                 self.latch(Fault::BrokenSegment);
@@ -331,6 +360,8 @@ impl<const N: usize> Runner<N> {
                     {
                         self.start_tool(order)
                     }
+                    Work::Guards(order) => self.start_guards(&order),
+                    Work::Splice(splice) => self.splice(&splice),
                     _ => false,
                 }
             };
@@ -343,6 +374,9 @@ impl<const N: usize> Runner<N> {
     /// What the cycle shall do now.
     fn demand(&self) -> Demand {
         if self.fault.is_some() {
+            return Demand::Stop(StopCategory::Fast);
+        }
+        if self.watch.is_some_and(|watch| watch.stops()) {
             return Demand::Stop(StopCategory::Fast);
         }
         match (self.asked.demand(), self.aborting) {
@@ -389,6 +423,7 @@ impl<const N: usize> Runner<N> {
     /// Reports what a step brought.
     fn tell(&mut self, made: &Step<N>, tick: u64) {
         if let Some(command) = made.finished {
+            self.note_finished(command);
             self.await_arrival(command);
         }
         if let Some(command) = made.started {

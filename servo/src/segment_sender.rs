@@ -7,6 +7,7 @@ use realtime::Segment;
 use rtrb::Producer;
 use thiserror::Error;
 
+use super::guard::GuardOrder;
 use super::remote::Shared;
 
 /// An order to a gripper or tool changer. It is carried out at rest, after all that was pushed
@@ -47,6 +48,18 @@ impl ToolOrder {
     }
 }
 
+/// A command takes the place of the one that moves, from a moment of its plan on. The answer is
+/// [`super::Event::Spliced`]; refused, the pieces that follow are dropped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splice {
+    /// Index of the command that moves.
+    pub command: u32,
+    /// When its plan ends (s since its start).
+    pub path_time: f64,
+    /// Index of the command that begins there, in the same state of motion.
+    pub by: u32,
+}
+
 /// What goes through the ring.
 #[derive(Clone, Copy, Debug)]
 pub enum Work<const N: usize> {
@@ -54,6 +67,10 @@ pub enum Work<const N: usize> {
     Motion(Segment<N>),
     /// An order to a tool.
     Tool(ToolOrder),
+    /// Guards of the command whose pieces follow.
+    Guards(GuardOrder),
+    /// The command whose pieces follow takes the place of the one that moves.
+    Splice(Splice),
 }
 
 /// Work and the epoch it belongs to: an abort begins a new epoch and drops what is older.

@@ -240,6 +240,20 @@ impl Tab {
         );
     }
 
+    /// Minimises the window of the tab, or shows it again: the browser takes focus and visibility.
+    pub(crate) fn minimise(&mut self, minimised: bool) {
+        let window = self.call("Browser.getWindowForTarget", json!({}))["windowId"].clone();
+        let state = if minimised { "minimized" } else { "normal" };
+        let params = json!({"windowId": window, "bounds": {"windowState": state}});
+        self.call("Browser.setWindowBounds", params);
+    }
+
+    /// Freezes the tab as a browser does with those in the background, or wakes it.
+    pub(crate) fn freeze(&mut self, frozen: bool) {
+        let state = if frozen { "frozen" } else { "active" };
+        self.call("Page.setWebLifecycleState", json!({"state": state}));
+    }
+
     /// Presses or releases the space bar.
     pub(crate) fn space(&mut self, kind: &str) {
         let params =

@@ -13,6 +13,7 @@ mod crowd;
 mod devtools;
 mod jogs;
 mod pages;
+mod planned;
 mod relay;
 mod scene;
 mod shapes;
@@ -36,7 +37,7 @@ fn main() {
     };
     // Minutes: --run-ignored (nextest) or --ignored runs it.
     let long: Vec<(&str, fn())> = trials! {
-        crowd::ten_pages_for_ten_minutes
+        crowd::ten_pages_for_half_an_hour
     };
     let seen: Vec<(&str, fn())> = trials! {
         pages::the_arm_stands_where_the_engine_says
@@ -51,6 +52,8 @@ fn main() {
         pages::two_pages_fight_for_the_hand
         pages::a_page_of_another_origin_gets_nothing
         pages::a_recording_is_shown
+        planned::a_planned_program_is_shown
+        planned::lists_of_poses_are_shown
     };
     let mut arguments = Arguments::from_args();
     // Each has an engine and a browser: side by side they would take each other's time.

@@ -23,7 +23,7 @@ pub(crate) fn take_hand(tab: &mut Tab) {
 }
 
 /// Renews a picture of the documentation where that is asked for.
-fn keep(tab: &mut Tab, name: &str) {
+pub(crate) fn keep(tab: &mut Tab, name: &str) {
     let picture = tab.picture();
     assert!(
         picture.len() < 300_000,
@@ -43,6 +43,8 @@ pub(crate) fn the_arm_stands_where_the_engine_says() {
     let browser = Browser::start();
     let mut tab = browser.open(&scene.hand, SIZE);
     ready(&mut tab);
+    let opened = tab.number("__view.opened");
+    println!("the arm is drawn {opened:.0} ms after the page was asked for");
     assert_eq!(tab.eval("location.hash + location.pathname"), "/");
     let status = scene.status();
     for axis in 0..3 {
@@ -59,6 +61,12 @@ pub(crate) fn the_arm_stands_where_the_engine_says() {
         );
     }
     // The arm is drawn: without it, other pixels are there.
+    let lost = tab.number("__view.samples.lost");
+    let shown = tab.eval("document.querySelector('#losses').textContent");
+    assert!(
+        shown.as_str().unwrap().contains(" lost, "),
+        "{shown}, {lost} lost"
+    );
     let count = "(() => { const s = __view.stage; const g = s.renderer.getContext(); \
         const read = () => { s.dirty = true; s.draw(); const b = new Uint8Array(4 * g.drawingBufferWidth * g.drawingBufferHeight); \
         g.readPixels(0, 0, g.drawingBufferWidth, g.drawingBufferHeight, g.RGBA, g.UNSIGNED_BYTE, b); return b; }; \

@@ -172,17 +172,18 @@ pub(crate) fn meshes_of_an_imported_robot_are_drawn() {
 
 /// What stands in the workstation is drawn where the world says, with its name under the pointer.
 pub(crate) fn objects_of_the_world_are_drawn() {
-    let scene = Scene::start("world");
-    let mut view = Peer::start(&[
-        "view",
+    let arm = format!("browser{}/world", std::process::id());
+    let mut engine = Peer::start(&[
+        "engine",
+        "--robot",
+        "ur5e",
         "--arm",
-        &scene.arm,
-        "--port",
-        "0",
+        &arm,
+        "--view",
         "--world",
         "examples/kitting/workstation.toml",
     ]);
-    let address = view.line("http://");
+    let address = engine.line("http://");
     let browser = Browser::start();
     let mut tab = browser.open(&address, SIZE);
     ready(&mut tab);

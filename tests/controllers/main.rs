@@ -1,38 +1,86 @@
-//! Drivers of real arms against foreign controllers, as real processes.
+//! Drivers of real arms against foreign controllers, or stand-ins for them, as real processes.
 //!
-//! Where a controller is not installed, its tests are reported as ignored:
-//! `pip install franka-sim==1.1.7` brings the one of Franka arms, and `CANTER_FRANKA_PYTHON` names the
-//! Python that has it. They need a machine that is nearly idle: the controller stops the arm at the
-//! first step that is beyond its maker's limits, and a machine that stalls brings such steps.
+//! Where a controller or a client is not installed, its tests are reported as ignored:
+//! `pip install franka-sim==1.1.7` brings the one of Franka arms, `pip install ur_rtde==1.6.5` a
+//! client for the arms of Universal Robots, `pip install RSIPI==0.3.0` the echo server of KUKA arms;
+//! `CANTER_FRANKA_PYTHON`, `CANTER_UR_PYTHON` and `CANTER_RSI_PYTHON` name the Python that has them. The tests of Franka need a machine that is nearly idle: the controller stops
+//! the arm at the first step that is beyond its maker's limits, and a machine that stalls brings such
+//! steps.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
+#![allow(clippy::print_stdout, reason = "figures of a test")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
 
 #[path = "../suite/canter.rs"]
 mod canter;
 mod franka;
+mod kuka;
+mod ur;
+mod ur_controller;
 
 use libtest_mimic::{Arguments, Trial};
 
+/// A test and its name.
+type Test = (&'static str, fn());
+
 fn main() {
-    let tests: Vec<(&str, fn())> = vec![
+    let franka: [Test; 3] = [
         ("franka::pick_and_place", franka::pick_and_place),
         ("franka::kills_and_restarts", franka::kills_and_restarts),
         ("franka::the_driver_conforms", franka::the_driver_conforms),
     ];
+    let universal: [Test; 8] = [
+        (
+            "motion::servoj_obeys_its_law",
+            ur_controller::motion::servoj_obeys_its_law,
+        ),
+        ("ur::programs_at_500_hz", ur::programs_at_500_hz),
+        ("ur::programs_at_125_hz", ur::programs_at_125_hz),
+        (
+            "ur::the_slider_slows_down_on_the_path",
+            ur::the_slider_slows_down_on_the_path,
+        ),
+        (
+            "ur::a_protective_stop_is_unlocked_by_the_next_run",
+            ur::a_protective_stop_is_unlocked_by_the_next_run,
+        ),
+        (
+            "ur::a_program_that_ends_is_started_again",
+            ur::a_program_that_ends_is_started_again,
+        ),
+        (
+            "ur::what_cannot_be_driven_is_refused_in_words",
+            ur::what_cannot_be_driven_is_refused_in_words,
+        ),
+        ("ur::the_driver_conforms", ur::the_driver_conforms),
+    ];
+    let outside: [Test; 1] = [(
+        "ur::a_client_from_outside_reads_the_states",
+        ur::a_client_from_outside_reads_the_states,
+    )];
+    let rsi: [Test; 1] = [(
+        "kuka::programs_and_a_pulled_cable",
+        kuka::programs_and_a_pulled_cable,
+    )];
     let mut arguments = Arguments::from_args();
     // The gripper of the controller has a fixed port.
     arguments.test_threads = Some(1);
-    let missing = franka::missing();
-    if let Some(reason) = &missing {
-        eprintln!("ignored: {reason}");
+    let mut trials = Vec::new();
+    for (tests, missing) in [
+        (&franka[..], franka::missing()),
+        (&universal, None),
+        (&outside, ur::missing()),
+        (&rsi, kuka::missing()),
+    ] {
+        if let Some(reason) = &missing {
+            eprintln!("ignored: {reason}");
+        }
+        trials.extend(tests.iter().map(|&(name, test)| {
+            let run = move || {
+                test();
+                Ok(())
+            };
+            Trial::test(name, run).with_ignored_flag(missing.is_some())
+        }));
     }
-    let trial = |(name, test): (&str, fn())| {
-        Trial::test(name, move || {
-            test();
-            Ok(())
-        })
-        .with_ignored_flag(missing.is_some())
-    };
-    let trials = tests.into_iter().map(trial).collect();
     libtest_mimic::run(&arguments, trials).exit();
 }

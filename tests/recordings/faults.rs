@@ -1,12 +1,18 @@
 //! A fault at any moment leaves the time before it.
 
 use std::fs;
-use std::path::PathBuf;
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::canter::canter;
-use crate::{PATIENCE, arm, engine, send, wait_for};
+use crate::canter::{canter, command};
+use crate::{PATIENCE, PROGRAM, arm, engine, send, wait_for};
+use system_tests::killed::Killed;
 use system_tests::signal;
+use tungstenite::Message;
+use tungstenite::client::IntoClientRequest;
 
 /// How long the engine is stopped: longer than the watchdogs of engine and driver.
 const STOPPED: Duration = Duration::from_millis(600);
@@ -18,7 +24,7 @@ fn fault_after(name: &str, after_ms: u64) -> f64 {
     let folder = tempfile::tempdir().unwrap();
     let faults = format!("--faults={}", folder.path().display());
     let engine = engine(&arm, &[faults]);
-    let _program = send(&arm);
+    let _program = send(&arm, PROGRAM);
     wait_for(&arm, |now| now["idle"] == false);
     std::thread::sleep(Duration::from_millis(after_ms));
     signal::send(&engine.0, libc::SIGSTOP);
@@ -52,7 +58,49 @@ fn fault_after(name: &str, after_ms: u64) -> f64 {
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.stdout.contains("1 programs"), "{}", ran.stdout);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(replayed(&named, recorded.samples[0].tick), "ur5e");
     seconds
+}
+
+/// Opens a file in replay, as a page does, and waits for its first period; gives the robot.
+fn replayed(file: &Path, first: u64) -> String {
+    let mut replay = command(["replay", &file.display().to_string(), "--port", "0"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut stderr = BufReader::new(replay.stderr.take().unwrap());
+    let _replay = Killed(replay);
+    let mut line = String::new();
+    while !line.contains("http://") {
+        line.clear();
+        assert!(stderr.read_line(&mut line).unwrap() > 0, "no address");
+    }
+    let (_, address) = line.trim().split_once("http://").unwrap();
+    let (host, token) = address.split_once("/#").unwrap();
+    let mut request = format!("ws://{host}/live").into_client_request().unwrap();
+    let protocols = format!("canter, token.{token}").parse().unwrap();
+    let headers = request.headers_mut();
+    headers.insert("Sec-WebSocket-Protocol", protocols);
+    let stream = TcpStream::connect(host).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    let (mut socket, _) = tungstenite::client(request, stream).unwrap();
+    let wish = r#"{"number":1,"do":"seek","at":0}"#;
+    socket.send(Message::Text(wish.into())).unwrap();
+    let mut robot = None;
+    loop {
+        match socket.read().unwrap() {
+            Message::Text(text) => {
+                let message: serde_json::Value = serde_json::from_str(text.as_str()).unwrap();
+                let name = message["robot"]["name"].as_str();
+                robot = robot.or(name.map(str::to_owned));
+            }
+            Message::Binary(bytes) if bytes[16..24] == first.to_le_bytes() => {
+                return robot.expect("the robot comes first");
+            }
+            _ => {}
+        }
+    }
 }
 
 /// The file that the fault's message names.

@@ -48,9 +48,9 @@ fn engine(arm: &str, options: &[String]) -> Killed {
     Killed(child)
 }
 
-/// Gives the program to an engine and looks on while it runs.
-fn send(arm: &str) -> Killed {
-    let child = command(["send", PROGRAM, "--arm", arm])
+/// Gives a program to an engine and looks on while it runs.
+fn send(arm: &str, program: &str) -> Killed {
+    let child = command(["send", program, "--arm", arm])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -208,6 +208,7 @@ fn main() {
         a_recorded_run_is_judged_and_executed_again,
         an_arm_is_recorded_from_outside,
         kills::a_kill_loses_a_moment_at_most,
+        kills::a_busy_planner_keeps_nothing_back,
         faults::a_fault_leaves_the_minute_before_it,
     };
     // Minutes each: --run-ignored (nextest) or --ignored runs them.

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 21] = [
+const ARROWS: [(&str, &[&str]); 24] = [
     (
         "cli",
         &[
@@ -27,6 +27,8 @@ const ARROWS: [(&str, &[&str]); 21] = [
             "scheduling",
             "driver-sim",
             "driver-franka",
+            "driver-ur",
+            "driver-kuka",
             "driver-conformance",
         ],
     ),
@@ -42,10 +44,14 @@ const ARROWS: [(&str, &[&str]); 21] = [
             "scheduling",
         ],
     ),
-    ("view", &["planner", "crcl", "ipc", "recorder"]),
+    (
+        "view",
+        &["planner", "crcl", "ipc", "recorder", "scheduling"],
+    ),
     ("measure", &["planner", "kinematics", "trajectory"]),
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
+    ("canter-ros2", &["ipc", "scheduling"]),
     (
         "engine",
         &[
@@ -67,6 +73,8 @@ const ARROWS: [(&str, &[&str]); 21] = [
     ("driver-kit", &["ipc", "scheduling"]),
     ("driver-sim", &["driver-kit", "ipc", "scheduling"]),
     ("driver-franka", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-ur", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-kuka", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
     ("kinematics", &["simd"]),
@@ -79,20 +87,25 @@ const ARROWS: [(&str, &[&str]); 21] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 14] = [
+const FENCES: [(&str, &[&str]); 16] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
-    ("clap", &["cli"]),
+    ("clap", &["cli", "canter-ros2"]),
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
     ("pyo3", &["canter-python"]),
     ("numpy", &["canter-python"]),
-    ("rtrb", &["servo", "driver-franka"]),
+    ("ros2-client", &["canter-ros2"]),
+    ("socket2", &["canter-ros2"]),
+    (
+        "rtrb",
+        &["servo", "driver-franka", "driver-ur", "driver-kuka"],
+    ),
     ("libc", &["ipc", "scheduling"]),
 ];
 

@@ -57,11 +57,14 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new(name: &str, options: &[&str]) -> Self {
+        Self::with_engine(name, &[], options)
+    }
+
+    /// With options of the engine too.
+    pub(crate) fn with_engine(name: &str, engine: &[&str], options: &[&str]) -> Self {
         let arm = format!("crcl{}/{name}", std::process::id());
-        let (engine, _) = start(
-            &["engine", "--robot", "ur5e", "--arm", &arm],
-            "engine of ur5e",
-        );
+        let fixed = ["engine", "--robot", "ur5e", "--arm", &arm];
+        let (engine, _) = start(&[&fixed, engine].concat(), "engine of ur5e");
         let (server, address) = serve(&arm, options);
         Self {
             address,
@@ -82,6 +85,11 @@ impl Scene {
         let (server, address) = serve(&self.arm, &[]);
         self.server = Some(server);
         self.address = address;
+    }
+
+    /// Where the server listens.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
     }
 
     pub(crate) fn connect(&self) -> Connection {

@@ -19,13 +19,13 @@ const COUNT: usize = 200;
 const TOLERANCE: f64 = 2.0;
 
 /// Everything that the engine publishes while it lives.
-struct Recorder {
+pub(crate) struct Recorder {
     ends: Arc<AtomicBool>,
     thread: JoinHandle<Vec<[f64; 6]>>,
 }
 
 impl Recorder {
-    fn start(arm: &str) -> Self {
+    pub(crate) fn start(arm: &str) -> Self {
         let arm = system_tests::domain::arm(arm);
         let ends = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&ends);
@@ -44,13 +44,13 @@ impl Recorder {
     }
 
     /// The joint positions, one row a period.
-    fn joints(self) -> Vec<[f64; 6]> {
+    pub(crate) fn joints(self) -> Vec<[f64; 6]> {
         self.ends.store(true, Ordering::Release);
         self.thread.join().unwrap()
     }
 
     /// The way of the controlled point (mm).
-    fn points(self) -> Vec<Point3<f64>> {
+    pub(crate) fn points(self) -> Vec<Point3<f64>> {
         let robot = planner::robot::load("ur5e").unwrap();
         let flange_from_tool = robot.tooling().flange_from_tool();
         let chain = robot.chain::<6>().unwrap().with_tool(&flange_from_tool);

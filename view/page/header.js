@@ -6,7 +6,7 @@ const get = (id) => document.getElementById(id);
 function stateOf(message) {
   const now = message.status;
   if (!message.engine) return ['no engine', 'off'];
-  if (message.replay) return [message.replay.plays ? 'replay' : 'replay, standing', 'off'];
+  if (message.replay) return [message.replay.plays ? 'replay' : 'replay, paused', 'off'];
   if (message.dry) return ['preview, nothing moves', 'off'];
   if (now.fault) return [now.fault, 'fault'];
   if (now.held) return [now.time_scaling > 0 ? 'stopping' : 'held', 'held'];

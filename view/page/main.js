@@ -4,6 +4,7 @@ import { drawRamp, JOINTS } from './colours.js';
 import { Gamepads } from './gamepad.js';
 import { Header } from './header.js';
 import { Link, token } from './link.js';
+import { Lists } from './lists.js';
 import { Measure } from './measure.js';
 import { Meshes } from './mesh.js';
 import { Pendant } from './pendant.js';
@@ -25,6 +26,7 @@ let status = null;
 let replay = false;
 let dry = false;
 let drawnRow = -1;
+let opened = 0;
 let command = null;
 
 // Dark or light: as the system says, until somebody chooses.
@@ -50,6 +52,7 @@ const gamepads = new Gamepads(pendant);
 const header = new Header(order, () => pendant.end('stopped'));
 const player = new Player(act.ask, (time) => showPlanned(time));
 const queue = new Queue(program);
+const lists = new Lists(act.ask);
 const measure = new Measure(stage, (text) => hint(text));
 const poses = new Poses({
   program,
@@ -74,6 +77,8 @@ readout.onnote = (text, kind) => {
   tabs.mark('messages', kind);
   // What went wrong stays until something else is said.
   if (kind === '' && get('said').dataset.kind === 'bad') return;
+  // Of a recording all notes come at once.
+  if (replay || dry) return;
   get('said').textContent = text;
   get('said').dataset.kind = kind;
   get('said').hidden = false;
@@ -89,6 +94,11 @@ function setRobot(about) {
   readout.setRobot(about);
   pendant.setRobot(about);
   poses.setRobot(about);
+  offer();
+}
+
+/** Buttons for what can be plotted. */
+function offer() {
   get('quantities').replaceChildren(...plots.all.map((quantity, index) => {
     const button = document.createElement('button');
     button.setAttribute('role', 'radio');
@@ -124,13 +134,30 @@ function setStatus(message) {
   notice(message.engine ? '' : message.reason);
   if (message.replay) player.set(message.replay);
   if (!status || !robot) return;
-  readout.joints(status.joints);
+  if (!player.here) readout.joints(status.joints);
   if (status.position_m) {
     const angles = rollPitchYaw(status.orientation_wxyz);
     readout.pose(status.position_m, angles);
-    pendant.values(status.joints, [...status.position_m, ...angles]);
+    pendant.values(status.joints, status.position_m, status.orientation_wxyz);
   }
   if (samples.count === 0 && !player.here) stage.setJoints(status.joints);
+}
+
+/** Nothing runs: plots and time controls are those of the plan. */
+function setPlan(plan) {
+  if (!robot) {
+    document.body.dataset.bare = 'yes';
+    get('robot-name').textContent = 'a tool without an arm';
+    plots.setTool(plan.speed_m_s);
+    stage.most = plan.speed_m_s;
+    get('legend-most').textContent = `${Number(plan.speed_m_s.toFixed(3))} m/s`;
+    stage.setPlan(plan);
+    stage.frameOn(plan.path.points);
+  }
+  samples.fill(plan, robot ? robot.joints.length : 0);
+  plots.setPlan(plan.duration_s);
+  offer();
+  player.setPlan(plan.duration_s);
 }
 
 /** What stands in the workstation, and the plan that is executed there. */
@@ -139,6 +166,8 @@ function setWorld(about) {
   get('objects-layer').hidden = false;
   get('plan-now').hidden = !about.plan;
   get('plan-now').textContent = about.plan || '';
+  // A plan gives its commands one by one: there is no program.
+  if (about.plan) get('text').placeholder = about.plan;
 }
 
 function notice(text) {
@@ -152,10 +181,11 @@ const handlers = {
   status: setStatus,
   world: (message) => setWorld(message.world),
   program: (message) => program.given(message.program),
+  lists: (message) => lists.set(message),
   preview: (message) => {
     program.planned(message);
     stage.setPlan(message.ok ? message : null);
-    if (dry && message.ok) player.setPlan(message.duration_s);
+    if (dry && message.ok) setPlan(message);
   },
   notes: (message) => readout.notes(message.notes),
   hand: (message) => pendant.setHolder(message.page),
@@ -179,7 +209,7 @@ act.link = new Link({
 /** Takes the new rows into picture and program. */
 function follow() {
   const last = samples.dropped + samples.count - 1;
-  if (last <= drawnRow || samples.count === 0) return;
+  if (dry || last <= drawnRow || samples.count === 0) return;
   const from = Math.max(drawnRow + 1 - samples.dropped, 0);
   // A few points a picture are enough for the path travelled.
   const step = Math.max(1, Math.min(8, Math.floor((samples.count - from) / 4)));
@@ -199,9 +229,18 @@ function follow() {
 /** Shows the arm at a time of a plan that is played here. */
 function showPlanned(time) {
   const { plan } = program;
-  if (!plan || plan.path.joints.length === 0) return;
-  const row = Math.min(Math.round(time / plan.path.step_s), plan.path.joints.length - 1);
-  stage.setJoints(plan.path.joints[row]);
+  if (!plan || plan.path.points.length === 0) return;
+  const row = Math.min(Math.round(time / plan.path.step_s), plan.path.points.length - 1);
+  if (robot) {
+    const joints = plan.path.joints[row];
+    stage.setJoints(joints);
+    readout.joints(joints);
+    readout.pose(plan.path.points[row], rollPitchYaw(stage.robot.turn()));
+  } else {
+    stage.showPoint(plan.path.points[row]);
+  }
+  plots.mark = time;
+  plots.dirty = true;
   const now = plan.commands.findLast((found) => found.start_s <= time);
   if (now) {
     program.show(now, time - now.start_s);
@@ -228,7 +267,8 @@ function lookBack() {
 function progress(time) {
   const plan = program.plan;
   const active = command && plan && (replay || (status && !status.idle));
-  header.progress(active ? command.start_s + time : null, plan?.duration_s);
+  // A recording has its own time controls.
+  if (!replay) header.progress(active ? command.start_s + time : null, plan?.duration_s);
   queue.set(active ? command : null, time, replay ? null : status);
 }
 
@@ -239,10 +279,26 @@ function frame() {
     lookBack();
     player.turn();
     if (performance.now() > saidUntil) get('said').hidden = true;
-    stage.draw();
+    // An empty picture is not worth the time that the first one takes; without an engine it comes.
+    if (robot || dry || performance.now() > 3000) stage.draw();
+    // With the arm the page is open: how long that took (ms).
+    if (!opened && robot && stage.frames > 0) opened = performance.now();
     plots.draw();
+    tellLosses();
   }
   requestAnimationFrame(frame);
+}
+
+/** How many periods did not get here, and how many there never were. */
+let toldLosses = '';
+function tellLosses() {
+  const { lost, skipped } = samples;
+  const text = replay || dry ? '' : `${lost} lost, ${skipped} skipped`;
+  if (text === toldLosses) return;
+  toldLosses = text;
+  get('losses').hidden = text === '';
+  get('losses').textContent = text;
+  get('losses').title = `Of the periods since this page was opened, ${lost} did not reach it; ${skipped} were left out by the engine because it woke up late.`;
 }
 
 async function order(wish) {
@@ -275,7 +331,12 @@ for (const box of document.querySelectorAll('[data-layer]')) {
 }
 get('view').addEventListener('keydown', (event) => {
   const name = ['iso', 'front', 'side', 'top'][Number(event.key) - 1];
+  const turn = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+  const zoom = { '+': 0.85, '-': 1 / 0.85 }[event.key];
   if (name) stage.look(name);
+  if (turn) stage.turn(turn[0] * 0.1, turn[1] * 0.1);
+  if (zoom) stage.zoom(zoom);
+  if (turn || zoom) event.preventDefault();
 });
 get('view').addEventListener('pointermove', (event) => {
   if (measure.on) return;
@@ -305,4 +366,4 @@ drawRamp(get('legend'));
 requestAnimationFrame(frame);
 
 // What tests look at.
-window.__view = { act, samples, stage, world, plots, pendant, program, poses, queue, measure, gamepads, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; } };
+window.__view = { act, samples, stage, world, plots, pendant, program, poses, queue, lists, player, measure, gamepads, get status() { return status; }, get robot() { return robot; }, get dry() { return dry; }, get opened() { return opened; } };

@@ -1,6 +1,6 @@
 // The pendant: moving by hand. A jog lives from beat to beat and ends with the first doubt.
 
-import { digits } from './readout.js';
+import { digits, inFrame, rollPitchYaw } from './readout.js';
 
 const BEAT_MS = 50;
 /** How long a beat may stay without an answer: then the link, the view or the engine stands still. */
@@ -200,15 +200,26 @@ export class Pendant {
     get('hand-state').textContent = this.mayMove ? state : 'watching';
   }
 
-  /** Shows where the axes are: joints (rad or m), point (m), turn (rad). */
-  values(joints, pose) {
+  /** Shows where the axes are: joints (rad or m), point (m) and turn (w, x, y, z) of the tool. */
+  values(joints, point, turn) {
+    const list = this.space === 'joint' ? joints : this.place(point, turn);
     for (const output of document.querySelectorAll('output[data-axis]')) {
       const index = Number(output.dataset.axis);
-      const list = this.space === 'joint' ? joints : pose;
+      const name = this.space === 'joint' ? `J${index + 1}` : AXES[index];
+      // Along its own axes a tool is nowhere.
+      if (list === null) { output.textContent = name; continue; }
       const text = this.turns(index) ? `${digits(list[index] * 180 / Math.PI, 2)}\u00b0` : `${digits(list[index] * 1000, 1)} mm`;
+      if (output.childNodes.length < 2) output.replaceChildren(document.createTextNode(''), document.createElement('small'));
       output.firstChild.nodeValue = text;
-      if (output.childNodes.length < 2) output.append(document.createElement('small'));
-      output.lastChild.textContent = this.space === 'joint' ? `J${index + 1}` : AXES[index];
+      output.lastChild.textContent = name;
     }
+  }
+
+  /** The tool in the axes that are chosen; null in its own. */
+  place(point, turn) {
+    if (this.space === 'tool') return null;
+    const frame = this.space === 'base' ? this.robot.workstation_from_base : [0, 0, 0, 1, 0, 0, 0];
+    const seen = inFrame(point, turn, frame);
+    return [...seen.point, ...rollPitchYaw(seen.turn)];
   }
 }

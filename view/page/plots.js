@@ -6,18 +6,37 @@ import { LATE, POINT, Q, RATE } from './samples.js';
 const MOST_S = 600;
 const LEAST_S = 0.05;
 
-/** What can be plotted: title, unit, one value of a row for each line. */
+/** Speed of the controlled point at a row (m/s). */
+function speedAt(samples, row) {
+  if (row === 0) return 0;
+  let sum = 0;
+  for (let axis = 0; axis < 3; axis += 1) sum += (samples.at(row, POINT + axis) - samples.at(row - 1, POINT + axis)) ** 2;
+  return Math.sqrt(sum) / samples.period;
+}
+
+/** What can be plotted of a tool without an arm, at most `speed` m/s fast. */
+function ofTool(speed, samples) {
+  const slope = (row) => (row === 0 ? 0 : (speedAt(samples, row) - speedAt(samples, row - 1)) / samples.period);
+  return [
+    { title: 'Tool speed', unit: 'mm/s', scale: 1000, lines: ['tool'], limit: speed * 1000, value: (row) => speedAt(samples, row) },
+    { title: 'Change of speed', unit: 'm/s\u00b2', scale: 1, lines: ['along the path'], value: slope },
+  ];
+}
+
+/** What can be plotted: title, unit, one value of a row for each line. What is `live` only means
+ * nothing of a plan. */
 function quantities(robot, samples) {
   const n = robot.joints.length;
   const joint = (list) => (row, k) => samples.at(row, Q + list * n + k);
   const share = (value, limits) => (row, k) => value(row, k) / limits[k];
   const span = robot.lower.map((low, k) => (low === null || robot.upper[k] === null ? Math.PI : Math.max(Math.abs(low), Math.abs(robot.upper[k]))));
   const jerk = (row, k) => (row === 0 ? 0 : (samples.at(row, Q + 2 * n + k) - samples.at(row - 1, Q + 2 * n + k)) / samples.period);
-  const speed = (row) => {
-    if (row === 0) return 0;
-    let sum = 0;
-    for (let axis = 0; axis < 3; axis += 1) sum += (samples.at(row, POINT + axis) - samples.at(row - 1, POINT + axis)) ** 2;
-    return Math.sqrt(sum) / samples.period;
+  /** How late a setpoint was published, and how much longer than a period the time since the last. */
+  const timing = (row, k) => {
+    const late = samples.at(row, LATE);
+    if (k === 0) return late;
+    const follows = row > 0 && samples.tick(row) === samples.tick(row - 1) + 1;
+    return follows ? late - samples.at(row - 1, LATE) : 0;
   };
   const names = robot.joints.map((_, k) => `J${k + 1}`);
   return [
@@ -25,11 +44,17 @@ function quantities(robot, samples) {
     { title: 'Velocity', unit: '% of limit', scale: 100, lines: names, limit: 100, value: share(joint(1), robot.velocity) },
     { title: 'Acceleration', unit: '% of limit', scale: 100, lines: names, limit: 100, value: share(joint(2), robot.acceleration) },
     { title: 'Jerk', unit: '% of limit', scale: 100, lines: names, limit: 100, value: share(jerk, robot.jerk) },
-    { title: 'Tool speed', unit: 'mm/s', scale: 1000, lines: ['tool'], limit: robot.tool.speed * 1000, value: speed },
-    { title: 'Following', unit: 'mrad or mm', scale: 1000, lines: names, value: (row, k) => samples.at(row, Q + k) - samples.at(row, Q + 3 * n + k) },
-    { title: 'Path speed', unit: '%', scale: 100, lines: ['override'], limit: 100, value: (row) => samples.at(row, RATE) },
-    { title: 'Period', unit: 'us late', scale: 1, lines: ['published'], value: (row) => samples.at(row, LATE) },
+    { title: 'Tool speed', unit: 'mm/s', scale: 1000, lines: ['tool'], limit: robot.tool.speed * 1000, value: (row) => speedAt(samples, row) },
+    { title: 'Following', live: true, unit: 'mrad or mm', scale: 1000, lines: names, value: (row, k) => samples.at(row, Q + k) - samples.at(row, Q + 3 * n + k) },
+    { title: 'Path speed', live: true, unit: '%', scale: 100, lines: ['override'], limit: 100, value: (row) => samples.at(row, RATE) },
+    { title: 'Period', live: true, unit: '\u00b5s', scale: 1, lines: ['published late', 'longer than a period'], value: timing },
   ];
+}
+
+/** The next larger of 1, 2, 5, 10, 20, ... */
+function round(value) {
+  const step = 10 ** Math.floor(Math.log10(value));
+  return [1, 2, 5, 10].map((k) => k * step).find((found) => found >= value * 0.999999);
 }
 
 export class Plots {
@@ -43,6 +68,8 @@ export class Plots {
     this.all = [];
     this.dirty = true;
     this.cursor = null;
+    /** A time (s) that is marked where the rows are those of a plan; none while the arm is live. */
+    this.mark = null;
     canvas.addEventListener('wheel', (event) => this.zoom(event), { passive: false });
     canvas.addEventListener('pointerdown', (event) => { canvas.setPointerCapture(event.pointerId); this.drag = { x: event.clientX, end: this.right() }; });
     canvas.addEventListener('pointermove', (event) => this.move(event));
@@ -54,6 +81,18 @@ export class Plots {
   }
 
   setRobot(robot) { this.all = quantities(robot, this.samples); this.dirty = true; }
+
+  /** A tool without an arm (m/s). */
+  setTool(speed) { this.all = ofTool(speed, this.samples); this.chosen = 0; this.dirty = true; }
+
+  /** The rows are those of a plan: all of it is shown, by its own time. */
+  setPlan(duration) {
+    this.mark = 0;
+    this.all = this.all.filter((quantity) => !quantity.live);
+    this.chosen = Math.min(this.chosen, this.all.length - 1);
+    this.end = null;
+    this.setWindow(Math.max(duration, (this.samples.count - 1) * this.samples.period));
+  }
 
   choose(index) { this.chosen = index; this.dirty = true; }
 
@@ -106,7 +145,7 @@ export class Plots {
 
   /** The row that is looked back at: the one under the pointer, or the last one shown. */
   lookedAt() {
-    if (!this.frozen || this.samples.count === 0) return null;
+    if (this.mark !== null || !this.frozen || this.samples.count === 0) return null;
     const [, last, left, right] = this.rows();
     if (this.cursor === null || this.cursor < 58) return last;
     return this.samples.rowAt(left + (this.cursor - 58) / (this.canvas.clientWidth - 70) * (right - left));
@@ -133,7 +172,7 @@ export class Plots {
   }
 
   draw() {
-    if (!this.dirty && this.frozen) return;
+    if (!this.dirty && (this.frozen || this.mark !== null)) return;
     this.dirty = false;
     const ratio = Math.min(devicePixelRatio, 2);
     const { clientWidth, clientHeight } = this.canvas;
@@ -158,6 +197,7 @@ export class Plots {
     context.clip();
     for (const [k, column] of columns.entries()) this.line(context, area, column, range, JOINTS[k % JOINTS.length]);
     context.restore();
+    this.drawMark(context, area);
     this.tellCursor(context, area, quantity);
   }
 
@@ -195,8 +235,7 @@ export class Plots {
   }
 
   frame(context, area, quantity, [low, high]) {
-    const step = 10 ** Math.floor(Math.log10((high - low) / 2));
-    const nice = [1, 2, 5, 10].map((k) => k * step).find((value) => (high - low) / value <= 5);
+    const nice = round((high - low) / 5);
     context.font = '11px system-ui, "DejaVu Sans", sans-serif';
     context.lineWidth = 1;
     context.textBaseline = 'middle';
@@ -237,11 +276,14 @@ export class Plots {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     context.fillStyle = styled('--dim');
-    const behind = (this.samples.count > 0 ? this.samples.tick(this.samples.count - 1) : 0) - this.right();
-    for (let k = 0; k <= 5; k += 1) {
-      const ago = -this.window * (1 - k / 5) - behind * this.samples.period;
-      const text = Math.abs(ago) < 1e-9 ? 'now' : `${Number(ago.toPrecision(3))} s`;
-      context.fillText(text, Math.min(area.x + area.width * k / 5, area.x + area.width - 14), area.y + area.height + 6);
+    const live = this.mark === null;
+    const newest = live && this.samples.count > 0 ? this.samples.tick(this.samples.count - 1) : 0;
+    const right = (this.right() - newest) * this.samples.period;
+    const step = round(this.window / 6);
+    for (let time = Math.ceil((right - this.window) / step - 1e-6) * step; time <= right + step * 1e-6; time += step) {
+      const text = live && Math.abs(time) < step * 1e-6 ? 'now' : `${Number(time.toFixed(4))} s`;
+      const x = area.x + area.width * (1 - (right - time) / this.window);
+      context.fillText(text, Math.min(x, area.x + area.width - 14), area.y + area.height + 6);
     }
   }
 
@@ -262,6 +304,19 @@ export class Plots {
       if (high[x] > low[x]) context.lineTo(area.x + x, y(low[x]));
       drawn = true;
     }
+    context.stroke();
+  }
+
+  /** Where the time is that is played of a plan. */
+  drawMark(context, area) {
+    if (this.mark === null) return;
+    const x = area.x + area.width * (1 - (this.right() * this.samples.period - this.mark) / this.window);
+    if (x < area.x || x > area.x + area.width) return;
+    context.strokeStyle = styled('--accent');
+    context.lineWidth = 2;
+    context.beginPath();
+    context.moveTo(x, area.y);
+    context.lineTo(x, area.y + area.height);
     context.stroke();
   }
 

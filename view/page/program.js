@@ -3,20 +3,29 @@
 import { JOINTS } from './colours.js';
 
 const get = (id) => document.getElementById(id);
+/** How many limits of a move are named one by one. */
+const MOST_LIMITS = 4;
 
 export class Program {
   /** `act` has ask(wish), tell(text), joints(), status(). */
   constructor(act) {
     this.act = act;
     this.running = null;
+    /** The command under way, and its time (s). */
+    this.command = null;
+    this.at_s = 0;
     this.plan = null;
     this.edited = false;
+    /** Whether the text is another one than that of the plan. */
+    this.stale = false;
     this.line = 0;
     this.bad = new Set();
     this.name = 'page.canon';
     this.text = get('text');
-    this.text.addEventListener('input', () => { this.edited = true; this.bad.clear(); this.draw(); });
+    this.text.addEventListener('input', () => { this.edited = true; this.stale = true; this.bad.clear(); this.draw(); });
     this.text.addEventListener('scroll', () => this.scrolled());
+    // The move of the cursor's line tells why it takes as long as it does.
+    for (const event of ['click', 'keyup', 'focus', 'blur']) this.text.addEventListener(event, () => this.certify(this.command, this.at_s));
     get('plan').addEventListener('click', () => this.preview());
     get('run').addEventListener('click', () => this.run(false));
     get('step-on').addEventListener('click', () => this.step());
@@ -114,6 +123,7 @@ export class Program {
   /** A plan has come: findings, certificates. */
   planned(plan) {
     this.plan = plan.ok ? plan : null;
+    this.stale = false;
     const found = [
       ...(plan.findings || []),
       ...(plan.refusals || []).map((refusal) => ({ severity: 'error', ...refusal, message: `${refusal.name}: ${refusal.message}` })),
@@ -154,6 +164,8 @@ export class Program {
 
   /** Shows that a command of the plan is at `time` s of its path; none without. */
   show(command, time) {
+    this.at_s = time;
+    this.command = command || null;
     const line = command && !this.edited ? command.line : 0;
     if (line !== this.line) { this.line = line; this.draw(); }
     this.follow(line);
@@ -162,6 +174,8 @@ export class Program {
   }
 
   follow(line) {
+    // The browser moves the text by itself where the place for it becomes larger or smaller.
+    if (this.text.scrollTop !== this.drawnTop) this.scrolled();
     const top = (line - 1) * 19;
     const { scrollTop, clientHeight } = this.text;
     if (line > 0 && document.activeElement !== this.text && (top < scrollTop || top > scrollTop + clientHeight - 40)) {
@@ -183,22 +197,40 @@ export class Program {
 
   scrolled() {
     // Their own scrolling would end where the text has a scroll bar.
+    this.drawnTop = this.text.scrollTop;
     for (const id of ['gutter', 'marks']) get(id).style.transform = `translateY(${-this.text.scrollTop}px)`;
   }
 
-  /** Why the move takes as long as it does. */
+  /** Why the move takes as long as it does: the one under way, else the one of the cursor's line. */
   certify(command, time) {
     const place = get('certificate');
-    const certificate = command && command.certificate;
+    const still = this.act.status()?.idle !== false;
+    const shown = (still ? this.atCursor() || command : command || this.atCursor());
+    const under = shown === command;
+    const certificate = shown && shown.certificate;
     if (!certificate) {
       if (this.shown !== null) { place.replaceChildren(); this.shown = null; }
-      if (this.plan && !command && this.shown === null) this.sum(place);
+      if (this.plan && !shown && place.childElementCount === 0) this.sum(place);
       return;
     }
-    if (this.shown !== command) { this.shown = command; place.replaceChildren(...this.why(command)); }
-    const active = certificate.active.find((stretch) => time >= stretch.start_s && time <= stretch.end_s);
-    const now = place.querySelector('[data-now]');
-    if (now) now.textContent = active ? active.limit : '-';
+    if (this.shown !== shown) { this.shown = shown; place.replaceChildren(...why(shown)); }
+    place.querySelector('.needle').hidden = !under;
+    place.querySelector('.needle').style.left = `${Math.min(time / Math.max(certificate.duration_s, 1e-9), 1) * 100}%`;
+    const active = (names) => certificate.active.some((stretch) => names.split('|').includes(stretch.limit) && time >= stretch.start_s && time <= stretch.end_s);
+    const rows = [...place.querySelectorAll('[data-limit]')];
+    const now = rows.filter((found) => under && active(found.dataset.limit));
+    for (const found of rows) {
+      const none = found.dataset.limit === '' && under && now.length === 0;
+      found.classList.toggle('now', now.includes(found) || none);
+    }
+  }
+
+  /** The move in whose lines the cursor stands, where nothing is under way. */
+  atCursor() {
+    if (!this.plan || this.stale || document.activeElement !== this.text) return null;
+    const line = this.text.value.slice(0, this.text.selectionStart).split('\n').length;
+    const begun = this.plan.commands.filter((command) => command.line <= line);
+    return begun.length > 0 ? begun[begun.length - 1] : null;
   }
 
   sum(place) {
@@ -207,29 +239,66 @@ export class Program {
     place.replaceChildren(row('planned', `${this.plan.duration_s.toFixed(3)} s, ${moves.length} moves`),
       row('nearest to a limit', `${(largest * 100).toFixed(1)} %`));
   }
+}
 
-  why({ name, line, certificate }) {
-    const bar = document.createElement('div');
-    bar.className = 'why';
-    const limits = [...new Set(certificate.active.map((stretch) => stretch.limit))];
-    for (const stretch of certificate.active) {
-      const part = document.createElement('div');
-      part.style.left = `${stretch.start_s / certificate.duration_s * 100}%`;
-      part.style.width = `${(stretch.end_s - stretch.start_s) / certificate.duration_s * 100}%`;
-      part.style.background = JOINTS[limits.indexOf(stretch.limit) % JOINTS.length];
-      part.title = `${stretch.limit}: ${stretch.start_s.toFixed(3)} to ${stretch.end_s.toFixed(3)} s`;
-      bar.append(part);
-    }
-    const now = row('limited by', '-');
-    now.lastChild.dataset.now = 'true';
-    const parts = [row(`line ${line}: ${name}`, `${certificate.duration_s.toFixed(3)} s`), bar, now,
-      row('no motion is shorter than', `${certificate.lower_bound_s.toFixed(3)} s`)];
-    if (certificate.poses.length > 0) {
-      const worst = Math.max(...certificate.poses.map((pass) => pass.deviation_m / Math.max(pass.tolerance_m, 1e-12)));
-      parts.push(row('poses', `${certificate.poses.length}, passed within ${(worst * 100).toFixed(0)} % of the tolerance`));
-    }
-    return parts;
+/** How much of a time is in at least one of the stretches. */
+function covered(stretches) {
+  let [sum, end] = [0, 0];
+  for (const { start_s: from, end_s: to } of [...stretches].sort((a, b) => a.start_s - b.start_s)) {
+    sum += Math.max(0, to - Math.max(from, end));
+    end = Math.max(end, to);
   }
+  return sum;
+}
+
+/** A bar of the limits over the time of a move, and what they are. */
+function why({ name, line, certificate }) {
+  const { active, duration_s: whole, poses } = certificate;
+  const of = (limit) => active.filter((stretch) => stretch.limit === limit);
+  const share = (stretches) => covered(stretches) / Math.max(whole, 1e-9);
+  const limits = [...new Set(active.map((stretch) => stretch.limit))].sort((a, b) => share(of(b)) - share(of(a)));
+  const bar = document.createElement('div');
+  bar.className = 'why';
+  for (const stretch of active) {
+    const part = document.createElement('div');
+    part.style.left = `${stretch.start_s / whole * 100}%`;
+    part.style.width = `${(stretch.end_s - stretch.start_s) / whole * 100}%`;
+    part.style.background = colourOf(limits.indexOf(stretch.limit));
+    part.title = `${stretch.limit}: ${stretch.start_s.toFixed(3)} to ${stretch.end_s.toFixed(3)} s`;
+    bar.append(part);
+  }
+  const needle = document.createElement('div');
+  needle.className = 'needle';
+  bar.append(needle);
+  const rows = limits.map((limit, index) => [limit, limit, share(of(limit)), colourOf(index)]);
+  rows.push(['', 'none: a tolerance, or a change of limits', 1 - share(active), 'transparent']);
+  const seen = rows.filter(([, , part]) => part > 0.005).sort((a, b) => b[2] - a[2]);
+  const rest = seen.splice(MOST_LIMITS).map(([limit]) => limit);
+  if (rest.length > 0) {
+    const part = share(active.filter((stretch) => rest.includes(stretch.limit)));
+    seen.push([rest.join('|'), `${rest.length} more: ${rest.join(', ')}`, part, 'transparent']);
+  }
+  const list = document.createElement('div');
+  list.className = 'limits';
+  list.append(...seen.map((row) => limitRow(...row)));
+  const parts = [row(`${line ? `line ${line}: ` : ''}${name}`, `${whole.toFixed(3)} s`), bar, list,
+    row('no motion is shorter than', `${certificate.lower_bound_s.toFixed(3)} s`)];
+  if (poses.length > 0) {
+    const worst = Math.max(...poses.map((pass) => pass.deviation_m / Math.max(pass.tolerance_m, 1e-12)));
+    parts.push(row('poses', `${poses.length}, passed within ${(worst * 100).toFixed(0)} % of the tolerance`));
+  }
+  return parts;
+}
+
+const colourOf = (index) => JOINTS[index % JOINTS.length];
+
+/** One limit: its colour in the bar, its name, its share of the time. */
+function limitRow(limit, text, share, colour) {
+  const made = row(text, `${(share * 100).toFixed(0)} %`);
+  made.dataset.limit = limit;
+  made.title = text;
+  made.style.setProperty('--mark', colour);
+  return made;
 }
 
 function row(name, value) {

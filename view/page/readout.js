@@ -24,6 +24,24 @@ export function axes([w, x, y, z]) {
   };
 }
 
+/** Point (m) and turn (w, x, y, z) in a frame: x, y, z, qw, qx, qy, qz. */
+export function inFrame(point, [w, x, y, z], frame) {
+  const [fw, fx, fy, fz] = frame.slice(3);
+  // The conjugate of the frame's turn, times the turn, and on the point.
+  const turn = [
+    fw * w + fx * x + fy * y + fz * z, fw * x - fx * w - fy * z + fz * y,
+    fw * y + fx * z - fy * w - fz * x, fw * z - fx * y + fy * x - fz * w,
+  ];
+  const away = point.map((value, axis) => value - frame[axis]);
+  const { z: third, x: first } = axes([fw, fx, fy, fz]);
+  const second = [
+    third[1] * first[2] - third[2] * first[1], third[2] * first[0] - third[0] * first[2],
+    third[0] * first[1] - third[1] * first[0],
+  ];
+  const along = (axis) => axis.reduce((sum, value, k) => sum + value * away[k], 0);
+  return { point: [first, second, third].map(along), turn };
+}
+
 export class Readout {
   setRobot(robot) {
     this.robot = robot;
@@ -79,18 +97,24 @@ export class Readout {
   tell(text) { this.notes([{ note: { event: 'page', text } }]); }
 }
 
+/** The line that a note is about; what a plan gives has none. */
+const at = ({ line }) => (line > 0 ? `${line}  ` : '');
+
 /** A note in words, and its kind. */
 export function words(note) {
   switch (note.event) {
-    case 'started': return [`${note.line}  ${note.name}, ${note.planned_s.toFixed(2)} s`, ''];
-    case 'done': return [`${note.line}  ${note.name} done`, ''];
-    case 'refused': return [`${note.line}  ${note.name} refused: ${note.error.message}`, 'bad'];
+    case 'started': return [`${at(note)}${note.name}, ${note.planned_s.toFixed(2)} s`, ''];
+    case 'done': return [`${at(note)}${note.name} done`, ''];
+    case 'refused': return [`${at(note)}${note.name} refused: ${note.error.message}`, 'bad'];
     case 'message': return [note.text, 'said'];
     case 'ended': return [`the program ended with reason ${note.reason}`, note.reason > 0 ? 'warn' : ''];
     case 'stopped': return ['stopped', 'warn'];
     case 'aborted': return [`aborted, ${note.dropped} commands dropped`, 'warn'];
     case 'faulted': return [`fault: ${note.reason}`, 'bad'];
     case 'recovered': return ['recovered', ''];
+    case 'not-arrived': return [`joint ${note.joint} has not arrived: ${digits(note.error * 1000, 1)} mrad or mm are left`, 'warn'];
+    case 'speed-asked': return [`the arm asks for ${digits(note.share * 100, 0)} % of the speed`, 'warn'];
+    case 'closed': return ['the engine has ended', 'warn'];
     case 'page': return [note.text, 'warn'];
     default: return [note.event || JSON.stringify(note), ''];
   }

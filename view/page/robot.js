@@ -177,6 +177,13 @@ export class Robot {
     return this.tool.getWorldPosition(new Vector3());
   }
 
+  /** How the tool is turned in the workstation: w, x, y, z. */
+  turn() {
+    this.root.updateWorldMatrix(true, true);
+    const { w, x, y, z } = this.tool.getWorldQuaternion(new Quaternion());
+    return [w, x, y, z];
+  }
+
   /** Makes all shapes transparent, in one colour. */
   makeGhost(colour) {
     this.ghost = colour;

@@ -96,7 +96,7 @@ export class Stage {
     this.sun.shadow.mapSize.set(1024, 1024);
     Object.assign(this.sun.shadow.camera, { left: -1.8, right: 1.8, top: 1.8, bottom: -1.8, near: 0.5, far: 8 });
     this.scene.add(this.sky, this.sun);
-    const floor = new Mesh(new PlaneGeometry(8, 8), new ShadowMaterial({ opacity: 0.22 }));
+    const floor = new Mesh(new PlaneGeometry(8, 8), new ShadowMaterial({ opacity: 0.22, depthWrite: false }));
     floor.receiveShadow = true;
     floor.position.z = -0.001;
     this.floor = floor;
@@ -106,10 +106,13 @@ export class Stage {
   theme() {
     this.scene.background = new Color(styled('--field'));
     if (this.grid) { this.scene.remove(this.grid); this.grid.dispose(); }
-    this.grid = new GridHelper(4, 40, new Color(styled('--edge')).lerp(new Color(styled('--dim')), 0.35), new Color(styled('--edge')));
+    // A few hundred cells, as large as what is looked at.
+    const size = this.focus ? this.focus.radius * 8 : 4;
+    this.grid = new GridHelper(size, 40, new Color(styled('--edge')).lerp(new Color(styled('--dim')), 0.35), new Color(styled('--edge')));
     this.grid.rotation.x = Math.PI / 2;
     this.grid.material.transparent = true;
     this.grid.material.opacity = 0.55;
+    if (this.focus) this.grid.position.copy(this.focus.middle).setZ(this.focus.low);
     this.scene.add(this.grid);
     this.dirty = true;
   }
@@ -126,13 +129,59 @@ export class Stage {
 
   /** A camera by its name. */
   look(name) {
-    const scale = (this.reach || 1) * Math.max(1, 1.25 / Math.max(this.camera.aspect, 0.3));
+    const reach = this.reach || 1;
+    const scale = (this.focus ? this.focus.radius * 2.2 : reach) * Math.max(1, 1.25 / Math.max(this.camera.aspect, 0.3));
     const [x, y, z] = CAMERAS[name];
-    const middle = new Vector3(0.12, 0, 0.34 * (this.reach || 1));
-    if (this.base) middle.add(this.base);
+    const middle = this.focus ? this.focus.middle.clone() : new Vector3(0.12, 0, 0.34 * reach);
+    if (this.base && !this.focus) middle.add(this.base);
     this.camera.position.set(x, y, z).multiplyScalar(scale).add(middle);
     this.controls.target.copy(middle);
     this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Turns the picture about its middle (rad): to the side and upwards. */
+  turn(aside, upwards) {
+    const from = this.camera.position.clone().sub(this.controls.target);
+    const length = from.length();
+    const around = Math.atan2(from.y, from.x) - aside;
+    const rise = Math.min(Math.max(Math.asin(from.z / length) - upwards, -1.5), 1.5);
+    from.set(Math.cos(rise) * Math.cos(around), Math.cos(rise) * Math.sin(around), Math.sin(rise)).multiplyScalar(length);
+    this.camera.position.copy(this.controls.target).add(from);
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Goes nearer (below 1) or farther. */
+  zoom(factor) {
+    const from = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
+    this.camera.position.copy(this.controls.target).add(from);
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Cameras look at these points (m) in place of the arm. */
+  frameOn(points) {
+    const [low, high] = [new Vector3(Infinity, Infinity, Infinity), new Vector3(-Infinity, -Infinity, -Infinity)];
+    for (const point of points) {
+      low.min(new Vector3(...point));
+      high.max(new Vector3(...point));
+    }
+    this.focus = { middle: low.clone().add(high).multiplyScalar(0.5), radius: Math.max(high.distanceTo(low) / 2, 0.02), low: low.z };
+    this.theme();
+    this.camera.near = 0.002;
+    this.camera.updateProjectionMatrix();
+    this.look('iso');
+  }
+
+  /** Marks the controlled point (m) where there is no arm. */
+  showPoint(point) {
+    if (!this.dot) {
+      this.dot = new Mesh(new SphereGeometry(1, 24, 16), new MeshBasicMaterial({ color: 0xd55e00 }));
+      this.scene.add(this.dot);
+    }
+    this.dot.scale.setScalar((this.focus?.radius ?? 1) * 0.025);
+    this.dot.position.set(...point);
     this.dirty = true;
   }
 
@@ -159,6 +208,7 @@ export class Stage {
     this.surface = about.reach ? reachSurface(about.reach, 0x0072b2) : null;
     if (this.surface) this.scene.add(this.surface);
     this.clearTrail();
+    this.apply();
     this.look('iso');
   }
 
@@ -195,7 +245,7 @@ export class Stage {
     this.hasGoal = false;
     this.plan = plan;
     this.dirty = true;
-    this.ghost && (this.ghost.root.visible = false);
+    if (this.ghost) this.ghost.root.visible = false;
     if (!plan || !plan.path || plan.path.points.length < 2) return;
     const { points, step_s: step, joints } = plan.path;
     this.planned = new Segments(this.scene, points.length, 2.2, 0.75);

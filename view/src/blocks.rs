@@ -6,19 +6,21 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// How many blocks are kept for slow pages: a second of them.
-const KEPT: usize = 64;
+/// How many blocks are kept for slow pages: ten seconds of them, one or two megabytes.
+const KEPT: usize = 640;
 
 /// The first bytes of a block.
 const MAGIC: &[u8; 4] = b"CNTR";
 
 /// Length of the head of a block (bytes).
-const HEAD: usize = 24;
+const HEAD: usize = 32;
 
 /// One servo period for the pages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Row {
     pub(crate) tick: u64,
+    /// Counts the rows that there are: where it jumps, some did not get here.
+    pub(crate) sequence: u64,
     pub(crate) command: u32,
     pub(crate) path_time: f64,
     pub(crate) time_scaling: f64,
@@ -39,6 +41,7 @@ pub(crate) struct Packer {
     joints: usize,
     period_ns: u64,
     first: u64,
+    sequence: u64,
     count: u32,
     bytes: Vec<u8>,
 }
@@ -49,17 +52,22 @@ impl Packer {
             joints,
             period_ns,
             first: 0,
+            sequence: 0,
             count: 0,
             bytes: Vec::new(),
         }
     }
 
-    /// Takes a row. Ticks of a block follow each other: a gap ends it, and it is given back.
+    /// Takes a row. Ticks of a block follow each other, and so do the sequence numbers: a gap ends
+    /// it, and it is given back.
     pub(crate) fn push(&mut self, row: &Row) -> Option<Vec<u8>> {
-        let follows = self.count > 0 && row.tick == self.first + u64::from(self.count);
+        let next = u64::from(self.count);
+        let follows =
+            self.count > 0 && row.tick == self.first + next && row.sequence == self.sequence + next;
         let full = if follows { None } else { self.take() };
         if self.count == 0 {
             self.first = row.tick;
+            self.sequence = row.sequence;
             self.bytes = vec![0; HEAD];
         }
         self.count += 1;
@@ -93,6 +101,7 @@ impl Packer {
         head.extend_from_slice(&self.count.to_le_bytes());
         head.extend_from_slice(&(self.period_ns as u32).to_le_bytes());
         head.extend_from_slice(&self.first.to_le_bytes());
+        head.extend_from_slice(&self.sequence.to_le_bytes());
         let mut bytes = std::mem::take(&mut self.bytes);
         if let Some(place) = bytes.get_mut(..HEAD) {
             place.copy_from_slice(&head);
@@ -144,6 +153,7 @@ mod tests {
     fn row(tick: u64) -> Row {
         Row {
             tick,
+            sequence: tick.min(9),
             command: 3,
             joints: std::array::from_fn(|list| vec![list as f64, 0.5]),
             ..Row::default()
@@ -162,25 +172,32 @@ mod tests {
         assert_eq!(block[4..8], [2, 0, 15, 0]);
         assert_eq!(block[8..12], [2, 0, 0, 0]);
         assert_eq!(block[16..24], 7_u64.to_le_bytes());
+        assert_eq!(block[24..32], 7_u64.to_le_bytes());
         assert_eq!(block[HEAD..HEAD + 4], 3.0_f32.to_le_bytes());
         assert_eq!(
             block[HEAD + width + 4 * FIXED + 16..][..4],
             2.0_f32.to_le_bytes()
         );
-        assert_eq!(packer.take().unwrap()[16..24], 11_u64.to_le_bytes());
+        // A period that was skipped: no row is missing.
+        let late = packer.take().unwrap();
+        assert_eq!(late[16..24], 11_u64.to_le_bytes());
+        assert_eq!(late[24..32], 9_u64.to_le_bytes());
         assert_eq!(packer.take(), None);
     }
 
     #[test]
     fn a_slow_page_loses_the_oldest() {
         let blocks = Blocks::default();
-        for number in 0..100_u8 {
-            blocks.push(vec![number]);
+        for number in 0..700_u32 {
+            blocks.push(number.to_le_bytes().to_vec());
         }
-        let (seen, fresh) = blocks.after(98);
-        assert_eq!((seen, fresh.len(), fresh[0][0]), (100, 2, 98));
+        let first = |blocks: &[Arc<Vec<u8>>]| blocks[0].as_slice().to_vec();
+        let (seen, fresh) = blocks.after(698);
+        assert_eq!((seen, fresh.len()), (700, 2));
+        assert_eq!(first(&fresh), 698_u32.to_le_bytes());
         let (_, late) = blocks.after(3);
-        assert_eq!((late.len(), late[0][0]), (KEPT, 36));
-        assert!(blocks.after(100).1.is_empty());
+        assert_eq!(late.len(), KEPT);
+        assert_eq!(first(&late), 60_u32.to_le_bytes());
+        assert!(blocks.after(700).1.is_empty());
     }
 }

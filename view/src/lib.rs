@@ -2,7 +2,7 @@
 //!
 //! The server is a client of the engine like `canter jog`: the arm waits for nothing here. It serves
 //! one page with a WebSocket, to browsers of this machine only; [`Guard`] says who may come in.
-//! [`Source`] is what is shown: a running arm, a recording, or a planned program.
+//! [`Source`] is what is shown: a running arm, a recording, a planned program, or lists of poses.
 //!
 //! This crate never moves an arm by itself: what a person asks for goes to the engine, which checks
 //! it. It is no safety function.
@@ -16,6 +16,7 @@ mod freshness;
 mod guard;
 mod hand;
 mod http;
+mod lists;
 mod live;
 mod live_periods;
 mod mesh;
@@ -33,6 +34,7 @@ mod world;
 
 pub use error::ViewError;
 pub use guard::{Access, Guard, Refusal, Visitor};
+pub use lists::{ListMotion, PoseList};
 pub use server::{Server, ServerOptions};
 pub use source::Source;
 pub use token::Token;

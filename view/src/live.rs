@@ -12,18 +12,22 @@ use ipc::{
 };
 use nalgebra::Isometry3;
 use planner::robot::Robot;
-use recorder::{Head, MAX_JOINTS, Sample};
+use recorder::{Head, Period, Sample};
+use scheduling::{RealTimeRequest, request_real_time};
 use serde_json::{Value, json};
 
 use crate::ViewError;
 use crate::blocks::{Packer, Row};
 use crate::forward::forward;
-use crate::preview::{Draft, preview};
+use crate::preview::{Detail, Draft, preview};
 use crate::scene;
 use crate::source::Board;
 
 /// How often shared memory is looked at: a reader's buffer has 16 periods.
 const LOOK: Duration = Duration::from_millis(4);
+
+/// `SCHED_FIFO` priority of the thread that reads the periods: the lowest but a few.
+const PRIORITY: i32 = 5;
 
 /// How often a block goes out.
 const BLOCK: Duration = Duration::from_millis(16);
@@ -263,6 +267,7 @@ impl Talk {
             start: start.map(|list| list.iter().filter_map(Value::as_f64).collect()),
             default_length: word("default_length"),
             rate_hz: 1000.0,
+            detail: Detail::Picture,
         };
         let Some(robot) = self.robot.clone() else {
             return;
@@ -304,8 +309,16 @@ fn period_of(body: &Value) -> u64 {
     body["period_ns"].as_u64().unwrap_or(1_000_000)
 }
 
-/// The thread that reads every period.
+/// The thread that reads every period. Among other programs it would come too late for some: where
+/// that is allowed, it goes before them, and behind the threads of the engine.
 fn watch(arm: &Arm, robots: &Receiver<(Robot, u64)>, board: &Board, ends: &AtomicBool) {
+    // Where it is refused, periods may be lost: pages count them.
+    let _granted = request_real_time(RealTimeRequest {
+        priority: PRIORITY,
+        processor: None,
+        lock_memory: false,
+        low_latency: false,
+    });
     while !ends.load(Ordering::Acquire) {
         match robots.recv_timeout(AGAIN) {
             Ok((robot, period_ns)) => {
@@ -387,6 +400,7 @@ impl Stream {
             let list = |values: &[f64]| values.iter().take(self.joints).copied().collect();
             let row = Row {
                 tick: setpoint.tick,
+                sequence: setpoint.sequence,
                 command: setpoint.command,
                 path_time: setpoint.path_time,
                 time_scaling: setpoint.time_scaling,
@@ -407,26 +421,22 @@ impl Stream {
 
     /// A period as recordings have it.
     fn sample(&self, setpoint: &Setpoint, pose: &Isometry3<f64>) -> Sample {
-        let list = |values: &[f64]| {
-            let mut all = [0.0; MAX_JOINTS];
-            for (to, from) in all.iter_mut().zip(values.iter().take(self.joints)) {
-                *to = *from;
-            }
-            all
-        };
         let measured = (self.point)(&self.state.position);
-        Sample {
+        let period = Period {
             tick: setpoint.tick,
             command: setpoint.command,
             path_time: setpoint.path_time,
             time_scaling: setpoint.time_scaling,
-            position: list(&setpoint.position),
-            velocity: list(&setpoint.velocity),
-            acceleration: list(&setpoint.acceleration),
-            measured: list(&self.state.position),
+            published: [
+                &setpoint.position,
+                &setpoint.velocity,
+                &setpoint.acceleration,
+            ],
+            measured: &self.state.position,
             tool: scene::list(pose),
             measured_tool: measured.translation.vector.into(),
-        }
+        };
+        Sample::of(&period, self.joints)
     }
 }
 

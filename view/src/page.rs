@@ -24,7 +24,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const IMAGE: &str = "image/svg+xml";
 
 /// Every file that is served.
-pub(crate) const FILES: [PageFile; 24] = [
+pub(crate) const FILES: [PageFile; 25] = [
     PageFile {
         path: "/",
         kind: HTML,
@@ -34,6 +34,7 @@ pub(crate) const FILES: [PageFile; 24] = [
     file!("icon.svg", IMAGE),
     file!("main.js", SCRIPT),
     file!("link.js", SCRIPT),
+    file!("lists.js", SCRIPT),
     file!("samples.js", SCRIPT),
     file!("robot.js", SCRIPT),
     file!("scene.js", SCRIPT),
@@ -76,6 +77,17 @@ mod tests {
             }
         }
         assert!(at("/../Cargo.toml").is_none() && at("/index").is_none());
+    }
+
+    /// Modules that are asked for one after the other would open the page late.
+    #[test]
+    fn every_module_is_asked_for_at_once() {
+        let html = std::str::from_utf8(at("/").unwrap().body).unwrap();
+        for file in FILES.iter().filter(|file| file.kind == SCRIPT) {
+            let link = format!("<link rel=\"modulepreload\" href=\"{}\">", file.path);
+            let own = format!("src=\"{}\"", file.path);
+            assert!(html.contains(&link) || html.contains(&own), "{}", file.path);
+        }
     }
 
     /// What the policy of the page forbids is not in it.

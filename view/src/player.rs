@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::ViewError;
 use crate::blocks::{Packer, Row};
-use crate::preview::{Draft, preview};
+use crate::preview::{Detail, Draft, preview};
 use crate::scene;
 use crate::source::Board;
 
@@ -101,6 +101,7 @@ pub(crate) fn start(
             start: start.map(|list| list.iter().filter_map(Value::as_f64).collect()),
             default_length: word("default_length"),
             rate_hz: (1.0 / period_s).round(),
+            detail: Detail::Picture,
         };
         board.set_program(&program);
         board.set_preview(&preview(&robot, &draft));
@@ -155,7 +156,8 @@ impl Film {
             let until = self.index_at(place.at_s);
             let rows = self.recorded.samples.get(next..=until).unwrap_or_default();
             for (index, sample) in rows.iter().enumerate() {
-                let full = packer.push(&row(sample, joints));
+                let number = (next + index) as u64;
+                let full = packer.push(&row(sample, number, joints));
                 let cut = (index % ROWS == ROWS - 1).then(|| packer.take()).flatten();
                 for block in full.into_iter().chain(cut) {
                     self.board.blocks.push(block);
@@ -223,11 +225,12 @@ impl Film {
     }
 }
 
-fn row(sample: &Sample, joints: usize) -> Row {
+fn row(sample: &Sample, number: u64, joints: usize) -> Row {
     let list = |values: &[f64]| values.iter().take(joints).copied().collect();
     let [x, y, z, ..] = sample.tool;
     Row {
         tick: sample.tick,
+        sequence: number,
         command: sample.command,
         path_time: sample.path_time,
         time_scaling: sample.time_scaling,

@@ -11,6 +11,19 @@ const POINTS: f64 = 20_000.0;
 /// Least time between two points of the path (s).
 const STEP_S: f64 = 0.01;
 
+/// The same where the plots are drawn from them (s).
+const FINE_STEP_S: f64 = 0.002;
+
+/// What of the path a page gets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Detail {
+    /// What is drawn: points and joint positions.
+    #[default]
+    Picture,
+    /// Velocities and accelerations as well: nothing moves, and the plots are those of the plan.
+    Plots,
+}
+
 /// A program to plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Draft {
@@ -23,6 +36,7 @@ pub(crate) struct Draft {
     /// `mm`, `m` or `inch`.
     pub(crate) default_length: String,
     pub(crate) rate_hz: f64,
+    pub(crate) detail: Detail,
 }
 
 /// Reads, checks and plans a program: findings, times, certificates, the path.
@@ -68,7 +82,7 @@ pub(crate) fn preview(robot: &Robot, draft: &Draft) -> Value {
             "refusals": plan.refusals,
             "duration_s": plan.duration_s,
             "commands": commands(&plan),
-            "path": path(&plan),
+            "path": path(&plan, draft.detail),
         }),
         Err(error) => json!({
             "is": "preview", "name": draft.name, "ok": false, "findings": findings,
@@ -99,21 +113,30 @@ fn commands(plan: &Plan) -> Vec<Value> {
 }
 
 /// Points of the path with joints, at equal times.
-fn path(plan: &Plan) -> Value {
-    let step = STEP_S.max(plan.duration_s / POINTS);
-    let (mut points, mut joints, mut commands) = (Vec::new(), Vec::new(), Vec::new());
+fn path(plan: &Plan, detail: Detail) -> Value {
+    let whole = detail == Detail::Plots;
+    let step = if whole { FINE_STEP_S } else { STEP_S }.max(plan.duration_s / POINTS);
+    let (mut points, mut commands) = (Vec::new(), Vec::new());
+    let mut joints: [Vec<Vec<f64>>; 3] = Default::default();
     for sample in plan.samples(step) {
         let place = sample.workstation_from_tool.translation;
         points.push([place.x, place.y, place.z].map(rounded));
-        joints.push(sample.q.iter().copied().map(rounded).collect::<Vec<_>>());
         commands.push(sample.command);
+        let lists = [&sample.q, &sample.dq, &sample.ddq];
+        for (to, from) in joints.iter_mut().zip(lists).take(if whole { 3 } else { 1 }) {
+            to.push(from.iter().copied().map(rounded).collect());
+        }
     }
-    json!({"step_s": step, "points": points, "joints": joints, "commands": commands})
+    let [positions, velocities, accelerations] = joints;
+    json!({
+        "step_s": step, "points": points, "commands": commands, "joints": positions,
+        "velocities": velocities, "accelerations": accelerations,
+    })
 }
 
-/// To a millionth: it is for drawing.
+/// To a tenth of a micrometre: it is for drawing.
 fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() * 1e-6
+    (value * 1e7).round() * 1e-7
 }
 
 #[cfg(test)]
@@ -139,6 +162,15 @@ mod tests {
         let points = seen["path"]["points"].as_array().unwrap();
         let seconds = seen["duration_s"].as_f64().unwrap();
         assert!((points.len() as f64 * 0.01 - seconds).abs() < 0.05);
+        assert!(seen["path"]["velocities"].as_array().unwrap().is_empty());
+        let whole = Draft {
+            detail: Detail::Plots,
+            ..draft(text)
+        };
+        let path = preview(&robot, &whole)["path"].clone();
+        let count = |name: &str| path[name].as_array().unwrap().len();
+        assert_eq!(count("accelerations"), count("points"));
+        assert!((count("points") as f64 * FINE_STEP_S - seconds).abs() < 0.05);
         let commands = seen["commands"].as_array().unwrap();
         assert!(
             commands

@@ -14,8 +14,8 @@ use crate::freshness::Freshness;
 use crate::hand::HandPost;
 use crate::live::EngineHandle;
 use crate::player::Player;
-use crate::preview::{Draft, preview};
-use crate::{Access, mesh};
+use crate::preview::{Detail, Draft, preview};
+use crate::{Access, PoseList, lists, mesh};
 
 /// How long a jog goes on when the page falls silent.
 const JOG: Duration = Duration::from_millis(200);
@@ -86,6 +86,10 @@ pub(crate) enum Wish {
         program: String,
         start: Option<Vec<f64>>,
     },
+    /// Shows a list of poses.
+    List {
+        index: usize,
+    },
     /// Goes to a time of a recording.
     Seek {
         at: f64,
@@ -114,6 +118,8 @@ pub(crate) struct Service {
     /// The robot, for plans; none while no engine is there.
     pub(crate) robot: Arc<Mutex<Option<Robot>>>,
     pub(crate) planning: Arc<AtomicBool>,
+    /// The lists of poses that are looked at.
+    pub(crate) lists: Vec<PoseList>,
 }
 
 /// Who wishes.
@@ -205,8 +211,15 @@ impl Service {
                     start,
                     default_length: "mm".to_owned(),
                     rate_hz: 1000.0,
+                    detail: self.detail(),
                 };
                 self.plan(wisher, number, draft)
+            }
+            Wish::List { index } => {
+                let drawn = lists::drawn(&self.lists, index)?;
+                // A page that has gone needs no list.
+                let _ = wisher.later.send(drawn.to_string());
+                Ok(())
             }
             Wish::Seek { at } => self.player()?.seek_checked(at),
             Wish::Play { plays, speed } => {
@@ -260,6 +273,15 @@ impl Service {
                 })
             }
             other => self.pass_on(other),
+        }
+    }
+
+    /// What pages get of a plan: where nothing runs, what the plots need as well.
+    fn detail(&self) -> Detail {
+        if self.engine.is_none() && self.player.is_none() {
+            Detail::Plots
+        } else {
+            Detail::Picture
         }
     }
 

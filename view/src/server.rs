@@ -6,15 +6,16 @@ use std::sync::{Arc, Mutex};
 use std::thread::Builder;
 use std::time::Duration;
 
-use serde_json::json;
+use planner::robot::Robot;
+use serde_json::{Value, json};
 
 use crate::hand::HandPost;
-use crate::preview::{Draft, preview};
+use crate::preview::{Detail, Draft, preview};
 use crate::request::Service;
 use crate::source::Board;
 use crate::{
-    Guard, ReadWorld, Source, Token, ViewError, foxglove, http, live, mesh, page, player, scene,
-    socket,
+    Guard, ReadWorld, Source, Token, ViewError, foxglove, http, lists, live, mesh, page, player,
+    scene, socket,
 };
 
 /// How many connections there may be at once.
@@ -168,6 +169,7 @@ fn service(
         hand: HandPost::default(),
         robot: Arc::new(Mutex::new(None)),
         planning: Arc::new(AtomicBool::new(false)),
+        lists: Vec::new(),
     };
     match source {
         Source::Arm(arm) => {
@@ -190,20 +192,33 @@ fn service(
                 text,
                 default_length: "mm".to_owned(),
                 rate_hz: 1000.0,
+                detail: Detail::Plots,
                 ..Draft::default()
             };
-            let start = &robot.home;
-            board.set_status(
-                &json!({"is": "status", "engine": true, "dry": true, "status": {
-                    "robot": robot.name, "arm": "", "state": "preview", "joints": start,
-                    "setpoint": start, "idle": true,
-                }}),
-            );
+            board.set_status(&at_rest(Some(&robot)));
             board.set_preview(&preview(&robot, &draft));
             service.robot = Arc::new(Mutex::new(Some(*robot)));
         }
+        Source::Lists { robot, lists } => {
+            if let Some(robot) = &robot {
+                board.set_robot(&scene::robot(robot, "", 1_000_000));
+            }
+            board.set_status(&at_rest(robot.as_deref()));
+            board.set_lists(&lists::table(&lists));
+            service.lists = lists;
+            service.robot = Arc::new(Mutex::new(robot.map(|robot| *robot)));
+        }
     }
     Ok(service)
+}
+
+/// The status where nothing moves: what is shown was planned only.
+fn at_rest(robot: Option<&Robot>) -> Value {
+    let home = robot.map(|robot| &robot.home);
+    json!({"is": "status", "engine": true, "dry": true, "status": {
+        "robot": robot.map(|robot| &robot.name), "arm": "", "state": "preview", "joints": home,
+        "setpoint": home, "idle": true,
+    }})
 }
 
 fn accept(listener: &TcpListener, shared: &Arc<Shared>) {

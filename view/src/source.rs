@@ -8,9 +8,9 @@ use planner::robot::Robot;
 use recorder::Recorded;
 use serde_json::{Value, json};
 
-use crate::World;
 use crate::blocks::Blocks;
 use crate::live_periods::LivePeriods;
+use crate::{PoseList, World};
 
 /// What is shown.
 #[derive(Debug)]
@@ -30,6 +30,13 @@ pub enum Source {
         robot: Box<Robot>,
         /// Name, form and text.
         program: [String; 3],
+    },
+    /// Lists of poses with the motions through them.
+    Lists {
+        /// The robot that they were planned for; none for a tool without an arm.
+        robot: Option<Box<Robot>>,
+        /// The lists.
+        lists: Vec<PoseList>,
     },
 }
 
@@ -54,6 +61,8 @@ pub(crate) struct Board {
     program: Mutex<Posted>,
     /// What stands in the workstation.
     world: Mutex<Posted>,
+    /// The table of lists of poses.
+    lists: Mutex<Posted>,
     /// The same program, planned.
     preview: Mutex<Posted>,
     /// What happened, the last few hundred.
@@ -93,6 +102,10 @@ impl Board {
         post(&self.program, &json!({"is": "program", "program": program}));
     }
 
+    pub(crate) fn set_lists(&self, table: &Value) {
+        post(&self.lists, table);
+    }
+
     pub(crate) fn set_preview(&self, preview: &Value) {
         post(&self.preview, preview);
     }
@@ -116,6 +129,7 @@ impl Board {
             (&self.status, &mut seen.status),
             (&self.world, &mut seen.world),
             (&self.program, &mut seen.program),
+            (&self.lists, &mut seen.lists),
             (&self.preview, &mut seen.preview),
         ];
         for (place, seen) in places {
@@ -154,6 +168,7 @@ pub(crate) struct Seen {
     status: u64,
     world: u64,
     program: u64,
+    lists: u64,
     preview: u64,
     notes: u64,
 }

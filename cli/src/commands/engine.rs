@@ -7,7 +7,7 @@ use engine::session::{Note, RunSample, Session};
 use crate::console::tell_json;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::{HostOptions, RefusalOption};
+use crate::host_options::{HostOptions, RefusalOption, ShownWorld};
 use crate::printer::Printer;
 use crate::recorder_options;
 use crate::robot::RobotOption;
@@ -24,6 +24,8 @@ pub(crate) struct Engine {
     #[command(flatten)]
     host: HostOptions,
     #[command(flatten)]
+    shown: ShownWorld,
+    #[command(flatten)]
     refusal: RefusalOption,
     /// Print one JSON object per event, one per line
     #[arg(long)]
@@ -39,9 +41,10 @@ impl Engine {
         }
         let signals = SignalThread::start(printer, "once more to brake hard")?;
         let length = crcl::LengthUnit::default();
-        let host = self
-            .host
-            .start(&robot, self.robot.place(), length, self.refusal.policy())?;
+        let mut host =
+            self.host
+                .start(&robot, self.robot.place(), length, self.refusal.policy())?;
+        self.host.show(&mut host, self.shown.world.as_deref())?;
         signals.steer(&host.session);
         printer.note(&format!(
             "canter: engine of {} at {}, driver {}",

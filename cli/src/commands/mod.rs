@@ -12,6 +12,7 @@ mod doctor;
 mod driver;
 mod engine;
 mod fk;
+mod follow;
 mod ik;
 mod jog;
 mod man;
@@ -29,6 +30,7 @@ mod run;
 mod schema;
 mod send;
 mod serve;
+mod serve_ros2;
 mod shutdown;
 mod status;
 mod stop;
@@ -55,6 +57,7 @@ pub(crate) enum Command {
     Driver(driver::Driver),
     Engine(engine::Engine),
     Fk(fk::Fk),
+    Follow(follow::Follow),
     Ik(ik::Ik),
     Jog(jog::Jog),
     Man(man::Man),
@@ -85,7 +88,7 @@ impl Command {
     pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         match self {
             Self::Abort(command) => command.run(),
-            Self::Bench(command) => command.run(),
+            Self::Bench(command) => command.run(printer),
             Self::Check(command) => command.run(),
             Self::Completions(command) => command.run(),
             Self::Convert(command) => command.run(),
@@ -94,6 +97,7 @@ impl Command {
             Self::Driver(command) => command.run(),
             Self::Engine(command) => command.run(printer),
             Self::Fk(command) => command.run(),
+            Self::Follow(command) => command.run(),
             Self::Ik(command) => command.run(),
             Self::Jog(command) => command.run(printer),
             Self::Man(command) => command.run(),

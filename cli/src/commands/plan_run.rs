@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use crcl::LengthUnit;
@@ -109,7 +109,7 @@ impl PlanRun {
         let arm = if self.dry_run {
             None
         } else {
-            Some(self.moving_arm(&robot, printer)?)
+            Some(self.moving_arm(&robot, &database.path, printer)?)
         };
         let task = Task {
             command: self,
@@ -152,11 +152,18 @@ impl PlanRun {
         }
     }
 
-    fn moving_arm(&self, robot: &Robot, printer: &Printer) -> Result<MovingArm, Failure> {
+    /// An engine for the plan; a live view shows the database that the plan changes.
+    fn moving_arm(
+        &self,
+        robot: &Robot,
+        world: &Path,
+        printer: &Printer,
+    ) -> Result<MovingArm, Failure> {
         let place = self.robot.place();
         let (metres, policy) = (LengthUnit::Meter, FailurePolicy::Abort);
         let mut host = self.host.start(robot, place, metres, policy)?;
         host.own("canter plan-run");
+        self.host.show(&mut host, Some(world))?;
         let samples = SampleOptions {
             joints: robot.dof(),
             rate_hz: self.host.rate,

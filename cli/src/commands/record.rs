@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use engine::host::GivenProgram;
-use engine::recorded_arm::{RecordedArm, joint_numbers, level, pose_numbers};
+use engine::recorded_arm::{RecordedArm, level, pose_numbers};
 use ipc::{Observer, Setpoint, State, Verb};
 use planner::robot::Robot;
-use recorder::{Head, Periods, Recording, Sample, topic};
+use recorder::{Head, Period, Periods, Recording, Sample, topic};
 use serde_json::Value;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -232,21 +232,23 @@ impl Watch {
             self.missed += setpoint.sequence.saturating_sub(last + 1);
         }
         self.last = Some(setpoint.sequence);
-        let list = |values: &[f64]| joint_numbers(values, self.joints);
         let pose = (self.forward)(&setpoint.position);
         let measured = (self.forward)(&self.state.position);
-        Sample {
+        let period = Period {
             tick: setpoint.tick,
             command: setpoint.command,
             path_time: setpoint.path_time,
             time_scaling: setpoint.time_scaling,
-            position: list(&setpoint.position),
-            velocity: list(&setpoint.velocity),
-            acceleration: list(&setpoint.acceleration),
-            measured: list(&self.state.position),
+            published: [
+                &setpoint.position,
+                &setpoint.velocity,
+                &setpoint.acceleration,
+            ],
+            measured: &self.state.position,
             tool: pose_numbers(&pose),
             measured_tool: measured.translation.vector.into(),
-        }
+        };
+        Sample::of(&period, self.joints)
     }
 }
 

@@ -157,7 +157,11 @@ fn execute(
     let place = robot_at(folder.path(), robot, &start)?;
     let arm = Domain::open(&folder.path().join("domain"))?.arm("replay/arm")?;
     let channels = ClientChannels::open(&arm)?;
-    let simulation = Simulation::start(Kind::Servos, &place.display().to_string(), &arm)?;
+    let simulation = Simulation::start(
+        Kind::Servos { wall: None },
+        &place.display().to_string(),
+        &arm,
+    )?;
     let mut config = SessionConfig::new(arm);
     config.rate_hz = rate_hz;
     config.clock = Clock::LockStep;

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::console::{Console, SampleOptions, Voice, exit_of};
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::host_options::{Company, DriverChoice, HostOptions, RefusalOption};
+use crate::host_options::{Company, DriverChoice, HostOptions, RefusalOption, ShownWorld};
 use crate::printer::Printer;
 use crate::program::{ProgramArgument, ProgramFile};
 use crate::recorder_options;
@@ -31,6 +31,8 @@ pub(crate) struct Run {
     robot: RobotOption,
     #[command(flatten)]
     host: HostOptions,
+    #[command(flatten)]
+    shown: ShownWorld,
     #[command(flatten)]
     refusal: RefusalOption,
     /// Write what was published and measured as CSV
@@ -71,6 +73,7 @@ impl Run {
             .host
             .start(&robot, place, length, self.refusal.policy())?;
         host.own("canter run");
+        self.host.show(&mut host, self.shown.world.as_deref())?;
         options.start = Some(host.session.start.clone());
         let plan = program.plan_from(&robot, &options, earlier)?;
         report_refusals(&program, &plan);

@@ -48,25 +48,25 @@ impl Send {
         output::note(&format!("canter: {commands} commands accepted"));
         let last = answer.body["last"].as_u64();
         match last {
-            Some(last) if !self.no_wait => self.follow(seen, last),
+            Some(last) if !self.no_wait => wait(&self.arm, seen, last),
             _ => Ok(Exit::Done),
         }
     }
+}
 
-    /// Prints what happens until the last command is over.
-    fn follow(&self, mut seen: u64, last: u64) -> Result<Exit, Failure> {
-        loop {
-            let body = self.arm.ask(Verb::Notes { since: seen })?.body;
-            for entry in body["notes"].as_array().into_iter().flatten() {
-                seen = entry["number"].as_u64().unwrap_or(seen);
-                let note = &entry["note"];
-                writeln!(io::stdout().lock(), "{note}")?;
-                if let Some(exit) = over(note, last) {
-                    return Ok(exit);
-                }
+/// Prints what happens after note `seen` until the command `last` is over.
+pub(super) fn wait(arm: &ArmOption, mut seen: u64, last: u64) -> Result<Exit, Failure> {
+    loop {
+        let body = arm.ask(Verb::Notes { since: seen })?.body;
+        for entry in body["notes"].as_array().into_iter().flatten() {
+            seen = entry["number"].as_u64().unwrap_or(seen);
+            let note = &entry["note"];
+            writeln!(io::stdout().lock(), "{note}")?;
+            if let Some(exit) = over(note, last) {
+                return Ok(exit);
             }
-            sleep(POLL);
         }
+        sleep(POLL);
     }
 }
 

@@ -15,6 +15,8 @@ use crate::failure::Failure;
 use crate::output;
 use crate::tls_option::TlsOption;
 
+use super::serve_ros2::ServeRos2;
+
 /// How often a running server looks for a signal.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -28,6 +30,7 @@ pub(crate) struct Serve {
 #[derive(Debug, Subcommand)]
 enum What {
     Crcl(ServeCrcl),
+    Ros2(ServeRos2),
 }
 
 /// Let CRCL clients drive the arm of a running engine
@@ -85,6 +88,7 @@ impl Serve {
     pub(crate) fn run(&self) -> Result<Exit, Failure> {
         match &self.what {
             What::Crcl(serve) => serve.run(),
+            What::Ros2(serve) => serve.run(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The JSON form of programs: `{"schema": 1, "commands": [{"command": "Dwell", "seconds": 0.5}]}`.
 
 mod document;
+mod guard;
 mod reader;
 mod values;
 

@@ -32,6 +32,7 @@ impl<'a> Reader<'a, '_> {
             ArgumentKind::Joints => self.joints(raw).map(Value::Joints),
             ArgumentKind::Screw => self.screw(raw).map(Value::Screw),
             ArgumentKind::Waypoints => self.waypoints(raw).map(Value::Waypoints),
+            ArgumentKind::Guard => self.guard(raw).map(Value::Guard),
             _ => self.quantity(kind, raw),
         }
     }

@@ -17,6 +17,15 @@ pub struct Instruction {
 }
 
 impl Instruction {
+    /// The command with its guards in SI units; everything else stays as it is.
+    pub fn in_si(&self, force: ForceUnit, torque: TorqueUnit) -> Self {
+        let guards = self.guards.iter().map(|guard| guard.in_si(force, torque));
+        Self {
+            guards: guards.collect(),
+            ..self.clone()
+        }
+    }
+
     /// A command without name and guards.
     pub fn new(id: i64, command: XmlCommand) -> Self {
         Self {

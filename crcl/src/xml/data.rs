@@ -1,5 +1,6 @@
 //! The data that commands and status documents share.
 
+use crate::guard::GuardLimit;
 use crate::pose::Pose;
 
 /// A pose with the settings that hold on the way to it, if it has any.
@@ -95,28 +96,6 @@ pub struct Parameter {
     pub value: String,
 }
 
-/// What trips a guard.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GuardLimit {
-    /// The value is above the limit.
-    OverMax,
-    /// The value is below the limit.
-    UnderMin,
-    /// The value has grown by more than the limit since the start.
-    IncreaseOverLimit,
-    /// The value has fallen by more than the limit since the start.
-    DecreaseBeyondLimit,
-}
-
-impl GuardLimit {
-    pub(super) const NAMES: &[(&'static str, Self)] = &[
-        ("OVER_MAX", Self::OverMax),
-        ("UNDER_MIN", Self::UnderMin),
-        ("INCREASE_OVER_LIMIT", Self::IncreaseOverLimit),
-        ("DECREASE_BEYOND_LIMIT", Self::DecreaseBeyondLimit),
-    ];
-}
-
 /// A condition on a sensor that ends a command before its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guard {
@@ -142,4 +121,23 @@ pub struct Guard {
     pub require_trigger: Option<bool>,
     /// Whether the command fails when the guard trips.
     pub error_on_trigger: Option<bool>,
+}
+
+impl Guard {
+    /// A guard without name, times and flags.
+    pub fn new(sensor: &str, field: Option<&str>, kind: GuardLimit, limit: f64) -> Self {
+        Self {
+            name: None,
+            sensor: sensor.to_owned(),
+            field: field.map(str::to_owned),
+            kind,
+            limit,
+            recheck_us: None,
+            check_count: None,
+            last_check_ms: None,
+            last_check_value: None,
+            require_trigger: None,
+            error_on_trigger: None,
+        }
+    }
 }

@@ -7,8 +7,12 @@ use super::data::Quantity;
 use super::own_settings::{end_tolerance, own_settings, percent, through};
 use super::refusal::{Refusal, refusal};
 use crate::command::Command;
+use crate::finding::{Finding, Severity};
 use crate::joint::JointTarget;
+use crate::json;
+use crate::program::ReadOptions;
 use crate::screw::Screw;
+use crate::text;
 
 /// What a command of XML is in the language.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,13 +45,29 @@ impl Instruction {
     /// # Errors
     /// A [`Refusal`] that names the element that cannot be executed.
     pub fn meaning(&self) -> Result<Meaning, Refusal> {
-        if let Some(guard) = self.guards.first() {
-            let message = format!(
-                "a guard on the sensor `{}`: no sensor is connected",
-                guard.sensor
-            );
-            return Err(refusal("Guard", message));
+        let meaning = self.unguarded()?;
+        if self.guards.is_empty() {
+            return Ok(meaning);
         }
+        match meaning {
+            Meaning::Commands(commands) if commands.iter().any(Command::takes_guards) => {
+                let guards = self.guards.iter().enumerate();
+                let mut all = guards
+                    .map(|(at, guard)| guard.meaning(at))
+                    .collect::<Result<Vec<_>, _>>()?;
+                all.extend(commands);
+                Ok(Meaning::Commands(all))
+            }
+            _ => {
+                let name = self.command.name();
+                let message = format!("a guard on {name}, which neither moves the arm nor waits");
+                Err(refusal("Guard", message))
+            }
+        }
+    }
+
+    /// What the command is without its guards.
+    fn unguarded(&self) -> Result<Meaning, Refusal> {
         let reason = self.reason();
         match &self.command {
             XmlCommand::InitCanon => one(Command::InitCanon),
@@ -64,6 +84,7 @@ impl Instruction {
             XmlCommand::StopMotion(condition) => one(Command::StopMotion {
                 emergency: i64::from(*condition != StopCondition::Normal),
             }),
+            XmlCommand::RunProgram(text) => run_program(text),
             XmlCommand::SetLengthUnits(unit) => one(Command::SetLengthUnits { unit: *unit }),
             XmlCommand::SetAngleUnits(unit) => one(Command::SetAngleUnits { unit: *unit }),
             XmlCommand::LoopBlockStart(name) => Ok(Meaning::LoopStart(name.clone())),
@@ -134,6 +155,41 @@ fn move_screw(xml: &MoveScrew) -> Meaning {
     Meaning::Commands(commands)
 }
 
+/// The commands of a program in text or JSON, in the units in force; InitCanon at its beginning and
+/// EndCanon at its end are those of the program around it.
+fn run_program(source: &str) -> Result<Meaning, Refusal> {
+    let options = ReadOptions::default();
+    let reading = if source.trim_start().starts_with('{') {
+        json::read(source, &options)
+    } else {
+        text::read(source, &options)
+    };
+    let error = |finding: &&Finding| finding.severity == Severity::Error;
+    if let Some(finding) = reading.findings.iter().find(error) {
+        let before = source.get(..finding.span.start).unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
+        let message = format!(
+            "RunProgram, line {line} of its program: {}",
+            finding.message
+        );
+        return Err(refusal("ProgramText", message));
+    }
+    let mut commands: Vec<_> = reading.program.iter().cloned().collect();
+    if commands.first() == Some(&Command::InitCanon) {
+        commands.remove(0);
+    }
+    if matches!(commands.last(), Some(Command::EndCanon { .. })) {
+        commands.pop();
+    }
+    let place =
+        |command: &Command| matches!(command, Command::InitCanon | Command::EndCanon { .. });
+    if commands.iter().any(place) {
+        let message = "RunProgram: InitCanon or EndCanon inside its program";
+        return Err(refusal("ProgramText", message));
+    }
+    Ok(Meaning::Commands(commands))
+}
+
 fn target(joint: &ActuateJoint, occurrence: usize) -> Result<JointTarget, Refusal> {
     match joint.details {
         JointDetails::SpeedAccel { speed, accel } => Ok(JointTarget {
@@ -168,9 +224,8 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         X::SetMotionCoordination(_) => Ok(Meaning::NoEffect(
             "translation and rotation always end together here",
         )),
-        X::SetForceUnits(_) | X::SetTorqueUnits(_) => Ok(Meaning::NoEffect(
-            "no command of the language has a force or a torque",
-        )),
+        // Whoever reads the limits of guards follows them.
+        X::SetForceUnits(_) | X::SetTorqueUnits(_) => Ok(Meaning::Commands(Vec::new())),
         X::SetDefaultJointPositonsTolerances(_) => Ok(Meaning::NoEffect(
             "joints stop exactly where they are told to",
         )),
@@ -180,17 +235,11 @@ fn setting(command: &XmlCommand) -> Result<Meaning, Refusal> {
         | X::EnableGripper { .. }
         | X::DisableGripper(_)
         | X::EnableRobotParameterStatus(_)
-        | X::DisableRobotParameterStatus(_) => Ok(Meaning::NoEffect(report)),
+        | X::DisableRobotParameterStatus(_)
+        | X::EnableSensor { .. }
+        | X::DisableSensor(_) => Ok(Meaning::NoEffect(report)),
         X::SetEndEffectorParameters(_) | X::SetRobotParameters(_) => Ok(Meaning::NoEffect(
             "what parameters mean is not part of the language, and none means anything here",
-        )),
-        X::EnableSensor { sensor, .. } | X::DisableSensor(sensor) => {
-            let message = format!("the sensor `{sensor}`: no sensor is connected");
-            Err(refusal("SensorID", message))
-        }
-        X::RunProgram(_) => Err(refusal(
-            "ProgramText",
-            "RunProgram: a program in the robot's own language",
         )),
         other => Err(refusal("CommandID", other.name())),
     }

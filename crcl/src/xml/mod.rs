@@ -12,6 +12,7 @@ mod data;
 mod document;
 mod elements;
 mod form;
+mod guard;
 mod meaning;
 mod out;
 mod own_settings;
@@ -23,13 +24,12 @@ mod status;
 mod write;
 mod write_status;
 
+pub use crate::guard::GuardLimit;
 pub use command::{
     ActuateJoint, COMMAND_NAMES, Instruction, JointDetails, JointReport, MoveScrew, StatusParts,
     StopCondition, XmlCommand,
 };
-pub use data::{
-    Guard, GuardLimit, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint,
-};
+pub use data::{Guard, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint};
 pub use document::{Instance, read_instance, read_instructions, read_status};
 pub use meaning::Meaning;
 pub use refusal::Refusal;
@@ -52,6 +52,7 @@ use crate::lexer::clip;
 use crate::program::{Located, Program, ReadOptions, Reading};
 use crate::source::Walker;
 use crate::text;
+use crate::units::{ForceUnit, TorqueUnit};
 use elements::{Reader, opening};
 
 /// How many commands the blocks of a program may come to.
@@ -137,6 +138,9 @@ struct Blocks {
     open: Vec<(String, usize, Range<usize>)>,
     /// Whether the limit was passed; said once.
     full: bool,
+    /// The units that limits of guards are in.
+    force: ForceUnit,
+    torque: TorqueUnit,
 }
 
 impl Blocks {
@@ -148,7 +152,12 @@ impl Blocks {
         instruction: &Instruction,
         place: &Place,
     ) {
-        match instruction.meaning() {
+        match instruction.command {
+            XmlCommand::SetForceUnits(unit) => self.force = unit,
+            XmlCommand::SetTorqueUnits(unit) => self.torque = unit,
+            _ => {}
+        }
+        match instruction.in_si(self.force, self.torque).meaning() {
             Ok(Meaning::Commands(commands)) => {
                 for command in commands {
                     if let Some(info) = command.info().filter(|_| self.strict)

@@ -3,7 +3,8 @@
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
 
-use super::data::{Guard, GuardLimit, JointTolerance, Parameter, PoseTolerance, Quantity};
+use super::data::{Guard, JointTolerance, Parameter, PoseTolerance, Quantity};
+use crate::guard::GuardLimit;
 use crate::pose::Pose;
 
 /// The namespace of `xsi:type`.

@@ -3,12 +3,13 @@
 use roxmltree::Node;
 
 use super::data::{
-    Guard, GuardLimit, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint,
+    Guard, JointTolerance, Parameter, PoseSettings, PoseTolerance, Quantity, Waypoint,
 };
 use super::elements::{Reader, opening, value_span};
 use crate::code;
 use crate::command_finding::value_finding;
 use crate::finding::Finding;
+use crate::guard::GuardLimit;
 use crate::pose::{Pose, PosePart};
 
 /// How far the axes of a pose in XML may be from perpendicular: the product of the unit axes.

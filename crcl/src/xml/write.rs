@@ -3,7 +3,7 @@
 use super::command::{
     ActuateJoint, Instruction, JointDetails, MoveScrew, StatusParts, StopCondition, XmlCommand,
 };
-use super::data::Waypoint;
+use super::data::{Guard, Waypoint};
 use super::document::Instance;
 use super::form::form;
 use super::out::Out;
@@ -32,6 +32,7 @@ pub fn write(program: &Program) -> Result<String, Vec<Finding>> {
     let count = program.commands.len();
     let mut instructions = Vec::with_capacity(count);
     let mut angle = AngleUnit::default();
+    let mut guards = Vec::new();
     for (index, located) in program.commands.iter().enumerate() {
         match &located.command {
             Command::InitCanon => angle = AngleUnit::default(),
@@ -39,10 +40,23 @@ pub fn write(program: &Program) -> Result<String, Vec<Finding>> {
             _ => {}
         }
         findings.extend(misplaced(located, index, count));
+        if let Command::Guard { guard } = &located.command {
+            guards.push(Guard::from(guard));
+            continue;
+        }
+        let guarded = located.command.takes_guards();
+        if !guards.is_empty() && matches!(located.command, Command::EndCanon { .. }) {
+            findings.push(formless(located, "a guard comes before it".to_owned()));
+        }
         match form(&located.command, angle) {
             Ok((name, command)) => instructions.push(Instruction {
                 name,
-                ..Instruction::new(index as i64 + 1, command)
+                guards: if guarded {
+                    std::mem::take(&mut guards)
+                } else {
+                    Vec::new()
+                },
+                ..Instruction::new(instructions.len() as i64 + 1, command)
             }),
             Err(why) => findings.push(formless(located, why)),
         }

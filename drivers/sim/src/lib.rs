@@ -4,13 +4,15 @@
 //! without a channel; [`run`] runs it with shared memory and a clock. `driver-kit` implements the
 //! protocol, as in any other driver.
 //!
-//! This crate never plans, and knows no kinematics.
+//! This crate never plans, and knows no kinematics: who puts a [`Wall`] into the simulation says
+//! where the tool is.
 
 mod noise;
 mod options;
 mod robot;
 mod servo;
 mod tool;
+mod wall;
 
 use std::sync::atomic::AtomicBool;
 
@@ -18,6 +20,7 @@ use driver_kit::RunOptions;
 pub use driver_kit::{DriverError, DriverReport, asked_to_end};
 pub use options::{Options, ToolOptions};
 pub use robot::Simulated;
+pub use wall::{Places, Wall};
 
 /// A simulated robot with the driver's side of the protocol.
 pub type Driver = driver_kit::Driver<Simulated>;

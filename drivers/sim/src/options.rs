@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use driver_kit::DriverError;
 use ipc::Arm;
 
+use crate::Wall;
+
 /// A gripper or tool changer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolOptions {
@@ -67,6 +69,8 @@ pub struct Options {
     pub gripper: Option<ToolOptions>,
     /// The tool changer.
     pub tool_changer: Option<ToolOptions>,
+    /// A wall that the tool can press against; it brings sensors.
+    pub wall: Option<Wall>,
     /// File for the received setpoints, as CSV.
     pub log: Option<PathBuf>,
     /// What the process asks of the operating system; nothing of it in lock-step.
@@ -97,6 +101,7 @@ impl Options {
                 open: false,
                 ..ToolOptions::default()
             }),
+            wall: None,
             log: None,
             real_time: scheduling::RealTimeRequest {
                 priority: 50,
@@ -123,6 +128,9 @@ impl Options {
         }
         DriverError::check_value("frequency", self.frequency, true)?;
         DriverError::check_value("damping", self.damping, true)?;
+        if let Some(wall) = &self.wall {
+            wall.check()?;
+        }
         DriverError::check_value("noise", self.noise, false)
     }
 }

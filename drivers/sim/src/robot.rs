@@ -2,13 +2,26 @@
 
 use std::collections::VecDeque;
 
-use driver_kit::{About, Command, DriverError, Measured, Measurement, Reference, Robot};
+use driver_kit::{
+    About, Command, DriverError, Inputs, Measured, Measurement, Reference, Robot, Sensors,
+};
 use ipc::{ToolCommand, ToolFeedback};
 
 use crate::Options;
 use crate::noise::Noise;
 use crate::servo::Servo;
 use crate::tool::Tool;
+use crate::wall::Touch;
+
+/// The sensors of force and torque at the end of the arm.
+const WRENCH: [&str; 6] = [
+    "wrench.Fx",
+    "wrench.Fy",
+    "wrench.Fz",
+    "wrench.Tx",
+    "wrench.Ty",
+    "wrench.Tz",
+];
 
 /// A deterministic simulated robot: one servo per joint, a gripper and a tool changer.
 #[derive(Clone, Debug)]
@@ -21,6 +34,10 @@ pub struct Simulated {
     waiting: VecDeque<Vec<Reference>>,
     /// A period (s) that the servos have not moved yet.
     pending: Option<f64>,
+    /// True positions of the joints (rad, m).
+    joints: Vec<f64>,
+    /// What the wall does to the tool where the joints are.
+    touch: Touch,
 }
 
 impl Simulated {
@@ -36,6 +53,8 @@ impl Simulated {
             noise: Noise::new(options.seed),
             waiting: VecDeque::new(),
             pending: None,
+            joints: options.position.clone(),
+            touch: Touch::default(),
             options,
         })
     }
@@ -70,6 +89,12 @@ impl Robot for Simulated {
             joint.position = servo.position + noise;
             joint.velocity = servo.velocity;
         }
+        if let Some(wall) = &self.options.wall {
+            for (at, servo) in self.joints.iter_mut().zip(&self.servos) {
+                *at = servo.position;
+            }
+            self.touch = wall.touch(&self.joints);
+        }
         Measurement::Now
     }
 
@@ -102,6 +127,25 @@ impl Robot for Simulated {
         if let Some(tool) = self.tools.get_mut(tool) {
             tool.act(order);
         }
+    }
+
+    fn inputs(&self) -> Inputs {
+        Inputs {
+            digital: u64::from(self.touch.depth() > 0.0),
+            ..Inputs::default()
+        }
+    }
+
+    fn sensors(&self, sensors: &mut Sensors) {
+        if self.options.wall.is_none() {
+            return;
+        }
+        let wrench = self.touch.force.iter().chain(&self.touch.torque);
+        for (name, value) in WRENCH.iter().zip(wrench) {
+            sensors.push(name, *value);
+        }
+        sensors.push("force", self.touch.size());
+        sensors.push("distance", self.touch.distance);
     }
 
     fn tool(&self, tool: usize) -> ToolFeedback {

@@ -60,7 +60,8 @@ impl Inbox {
         let epoch = steering.aborts();
         let mut ids = Vec::with_capacity(commands.len());
         for given in commands {
-            if let Command::StopMotion { emergency } = given.located.command
+            if let Given::Command { located, .. } = &given
+                && let Command::StopMotion { emergency } = located.command
                 && self.flying > 0
             {
                 steering.control(Control::Stop {
@@ -70,6 +71,11 @@ impl Inbox {
             ids.push(self.queue.push(given, epoch)?);
         }
         Ok(ids)
+    }
+
+    /// Numbers for commands that take the place of the one that moves.
+    pub(super) fn number(&mut self, count: usize) -> Vec<u32> {
+        self.queue.number(count)
     }
 
     /// Takes the oldest command off the queue, if it was given at `epoch`.

@@ -15,6 +15,8 @@ pub enum JogSpace {
     Tool,
     /// Along x, y, z and about x, y, z of the workstation, in the controlled point.
     Workstation,
+    /// Along x, y, z and about x, y, z of the robot's base, in the controlled point.
+    Base,
     /// All joints together towards [`Jog::goal`]: the one fraction is of their largest speeds.
     Goal,
 }
@@ -75,17 +77,24 @@ pub enum JogError {
     Closed,
 }
 
-/// The direction of a request; `None` if it asks for rest.
-///
-/// `workstation_from_tool` is the orientation of the tool now: a jog along axes of the workstation is
-/// one along the tool's axes, rotated back.
+/// Orientations in the workstation, for jogs along axes that are not those of the tool.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turns {
+    /// Of the tool, now.
+    pub(super) tool: UnitQuaternion<f64>,
+    /// Of the robot's base.
+    pub(super) base: UnitQuaternion<f64>,
+}
+
+/// The direction of a request; `None` if it asks for rest. A jog along axes of the workstation or of
+/// the base is one along the tool's axes, rotated back.
 pub(super) fn direction<const N: usize>(
     jog: &Jog,
-    workstation_from_tool: &UnitQuaternion<f64>,
+    turns: &Turns,
 ) -> Result<Option<Direction<N>>, JogError> {
     let wanted = match jog.space {
         JogSpace::Joint => N,
-        JogSpace::Tool | JogSpace::Workstation => 6,
+        JogSpace::Tool | JogSpace::Workstation | JogSpace::Base => 6,
         JogSpace::Goal => 1,
     };
     let speeds = &jog.speeds;
@@ -101,7 +110,8 @@ pub(super) fn direction<const N: usize>(
         return Err(JogError::Distance(distance));
     }
     let back = match jog.space {
-        JogSpace::Workstation => workstation_from_tool.inverse(),
+        JogSpace::Workstation => turns.tool.inverse(),
+        JogSpace::Base => turns.tool.inverse() * turns.base,
         _ => UnitQuaternion::identity(),
     };
     Ok(Some(match jog.space {
@@ -109,7 +119,7 @@ pub(super) fn direction<const N: usize>(
             shares: SVector::from_fn(|joint, _| speeds[joint]),
             distance,
         },
-        JogSpace::Tool | JogSpace::Workstation => Direction::Tool {
+        JogSpace::Tool | JogSpace::Workstation | JogSpace::Base => Direction::Tool {
             linear: back * Vector3::from_column_slice(&speeds[..3]),
             angular: back * Vector3::from_column_slice(&speeds[3..]),
             distance,
@@ -131,25 +141,37 @@ fn towards<const N: usize>(goal: &[f64], share: f64) -> Result<Direction<N>, Jog
 mod tests {
     use super::*;
 
-    /// A jog along an axis of the workstation goes there, however the tool is turned.
+    fn turns() -> Turns {
+        Turns {
+            tool: UnitQuaternion::from_euler_angles(0.3, -1.2, 2.0),
+            base: UnitQuaternion::from_euler_angles(0.0, 0.0, 0.7),
+        }
+    }
+
+    /// A jog along an axis of the workstation, or of a base that is mounted turned, goes there,
+    /// however the tool is turned.
     #[test]
-    fn axes_of_the_workstation_are_turned_into_the_tool() {
-        let turned = UnitQuaternion::from_euler_angles(0.3, -1.2, 2.0);
-        let jog = Jog {
-            space: JogSpace::Workstation,
-            speeds: vec![0.0, 0.0, -0.5, 0.1, 0.0, 0.0],
-            timeout: Duration::from_millis(100),
-            distance: None,
-            goal: Vec::new(),
-        };
-        let Some(Direction::<6>::Tool {
-            linear, angular, ..
-        }) = direction(&jog, &turned).unwrap()
-        else {
-            panic!("no direction");
-        };
-        assert!((turned * linear - Vector3::new(0.0, 0.0, -0.5)).norm() < 1e-12);
-        assert!((turned * angular - Vector3::new(0.1, 0.0, 0.0)).norm() < 1e-12);
+    fn axes_of_workstation_and_base_are_turned_into_the_tool() {
+        let turns = turns();
+        let still = UnitQuaternion::identity();
+        for (space, turn) in [(JogSpace::Workstation, still), (JogSpace::Base, turns.base)] {
+            let jog = Jog {
+                space,
+                speeds: vec![0.0, 0.4, -0.5, 0.1, 0.0, 0.0],
+                timeout: Duration::from_millis(100),
+                distance: None,
+                goal: Vec::new(),
+            };
+            let Some(Direction::<6>::Tool {
+                linear, angular, ..
+            }) = direction(&jog, &turns).unwrap()
+            else {
+                panic!("no direction");
+            };
+            let (along, about) = (Vector3::new(0.0, 0.4, -0.5), Vector3::new(0.1, 0.0, 0.0));
+            assert!((turns.tool * linear - turn * along).norm() < 1e-12);
+            assert!((turns.tool * angular - turn * about).norm() < 1e-12);
+        }
     }
 
     #[test]
@@ -161,7 +183,7 @@ mod tests {
             distance: None,
             goal,
         };
-        let turn = UnitQuaternion::identity();
+        let turn = turns();
         assert!(direction::<2>(&jog(vec![0.1, 0.2]), &turn).is_ok());
         for wrong in [vec![], vec![0.1], vec![0.1, f64::NAN]] {
             let refused = direction::<2>(&jog(wrong), &turn);

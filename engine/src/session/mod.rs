@@ -24,7 +24,7 @@ use thiserror::Error;
 
 pub use jog::{Jog, JogError, JogSpace};
 pub use note::{Blame, Note};
-pub use status::{Cycles, Largest, Status};
+pub use status::{Cycles, Largest, Spread, Status, Timing};
 
 use crate::queue::{Full, Given};
 use inbox::Inbox;
@@ -136,6 +136,11 @@ pub enum SubmitError {
     Closed,
 }
 
+/// Why a move cannot take the place of the one that moves.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("the move cannot take the place of the one before without a stop: {0}")]
+pub struct ReplaceError(pub(crate) String);
+
 /// Why no command is let go in single step.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
@@ -163,6 +168,7 @@ enum Order {
     /// There is something new in the inbox.
     Look,
     Jog(Jog, Sender<Result<(), JogError>>),
+    Replace(Vec<Located>, Sender<Result<Vec<u32>, ReplaceError>>),
     Close,
 }
 
@@ -181,8 +187,13 @@ impl Shared {
     }
 }
 
-/// Fills in the present state of the motion without asking the worker.
-struct Live(Box<dyn Fn(&mut Status) + Send + Sync>);
+/// What is known of the motion without asking the worker, which may be planning.
+struct Live {
+    /// Fills in the present state.
+    fill: Box<dyn Fn(&mut Status) + Send + Sync>,
+    /// Reads the samples of the servo thread.
+    read: Box<dyn Fn() + Send + Sync>,
+}
 
 impl fmt::Debug for Live {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -287,7 +298,7 @@ impl Session {
             .commands
             .iter()
             .enumerate()
-            .map(|(index, located)| Given {
+            .map(|(index, located)| Given::Command {
                 located: located.clone(),
                 planned: planned
                     .next_if(|planned| planned.index == index)
@@ -306,6 +317,20 @@ impl Session {
             return Err(SubmitError::Closed);
         }
         Ok(ids)
+    }
+
+    /// Has a move take the place of the one that moves now, in the same state of motion and without
+    /// a stop. The move may have settings before and behind it. The old move never becomes done.
+    ///
+    /// # Errors
+    /// [`ReplaceError`], and the old move goes on: stop it and give the new one as any other.
+    pub fn replace(&self, commands: Vec<Located>) -> Result<Vec<u32>, ReplaceError> {
+        let (answer, answered) = mpsc::channel();
+        if self.orders.send(Order::Replace(commands, answer)).is_err() {
+            return Err(ReplaceError("the session has ended".to_owned()));
+        }
+        let closed = || ReplaceError("the session has ended".to_owned());
+        answered.recv().unwrap_or_else(|_| Err(closed()))
     }
 
     /// Executes commands one by one from now on, or all again. In single step each command waits for
@@ -383,7 +408,7 @@ impl Session {
     pub fn status(&self) -> Status {
         let status = self.shared.status.lock();
         let mut status = status.unwrap_or_else(PoisonError::into_inner).clone();
-        (self.live.0)(&mut status);
+        (self.live.fill)(&mut status);
         let inbox = self.shared.inbox();
         status.queued = inbox.waiting();
         status.single_step = inbox.is_single_step();
@@ -391,9 +416,10 @@ impl Session {
         status
     }
 
-    /// What was recorded since the last call.
+    /// What was recorded since the last call, up to the last servo period, whatever the planner does.
     #[must_use]
     pub fn samples(&self) -> Vec<RunSample> {
+        (self.live.read)();
         std::mem::take(
             &mut *self
                 .shared

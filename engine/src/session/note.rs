@@ -45,6 +45,45 @@ pub enum Note {
         /// Servo periods it took; 0 for a command that takes no time.
         ticks: u64,
     },
+    /// Another move has taken the place of a command, which never becomes done.
+    Replaced {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// Line of the program, from 1; 0 when there is none.
+        line: usize,
+        /// Name of the command.
+        name: &'static str,
+        /// Number of the other move.
+        by: u32,
+    },
+    /// A guard has ended a command, and the arm rests.
+    Guarded {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// Line of the program, from 1; 0 when there is none.
+        line: usize,
+        /// Name of the command.
+        name: &'static str,
+        /// Name of the sensor.
+        sensor: String,
+        /// The value that tripped the guard, SI.
+        value: f64,
+        /// The value furthest in the direction of the limit until the arm rested, SI.
+        peak: f64,
+        /// How far the measured controlled point may go on from where the guard tripped, by the
+        /// limits of the joints on the path (m).
+        allowed_m: f64,
+        /// How far it went (m).
+        stopped_m: f64,
+        /// How long the stop took until the measured arm rested (s).
+        stop_s: f64,
+        /// Where the measured controlled point was when the guard tripped (m, workstation).
+        position_m: [f64; 3],
+        /// Its orientation: w, x, y, z.
+        orientation_wxyz: [f64; 4],
+        /// All this in a sentence.
+        message: String,
+    },
     /// A command could not be executed and had no effect.
     Refused {
         /// Number of the command in this session, from 1.
@@ -114,6 +153,15 @@ impl fmt::Display for Note {
             Self::Refused {
                 line, name, error, ..
             } => write!(f, "line {line}: {name} refused: {}", error.message),
+            Self::Replaced { line, name, by, .. } => {
+                write!(f, "line {line}: {name}: command {by} has taken its place")
+            }
+            Self::Guarded {
+                line,
+                name,
+                message,
+                ..
+            } => write!(f, "line {line}: {name}: {message}"),
             Self::Message { text } => write!(f, "message: {text}"),
             Self::Ended { reason } => write!(f, "the program ended with reason {reason}"),
             Self::NotArrived { id, joint, error } => write!(

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use serde::Serialize;
 
 use planner::modal::{CanonState, Settings};
-use servo::Counters;
+use servo::{Counters, Histogram};
 use trajectory::ToolLimits;
 
 /// A picture of a running session.
@@ -38,6 +38,8 @@ pub struct Status {
     pub joints: Vec<f64>,
     /// Joint positions of the last setpoint, rad or m.
     pub setpoint: Vec<f64>,
+    /// Name of each joint.
+    pub joint_names: Vec<String>,
     /// Whether each joint slides.
     pub sliding: Vec<bool>,
     /// Measured position of the controlled point in the workstation, m.
@@ -52,6 +54,8 @@ pub struct Status {
     pub plans: u64,
     /// Servo periods.
     pub cycles: Cycles,
+    /// How long they took.
+    pub timing: Timing,
 }
 
 /// What the robot can do at most, SI; infinite where there is no limit.
@@ -89,6 +93,8 @@ pub struct Cycles {
     pub skipped: u64,
     /// Setpoints that the driver missed, by its own count.
     pub driver_missed: u64,
+    /// Events and samples of periods that were not read in time.
+    pub lost_reports: u64,
 }
 
 impl From<Counters> for Cycles {
@@ -98,6 +104,37 @@ impl From<Counters> for Cycles {
             published: counters.published,
             skipped: counters.skipped,
             driver_missed: counters.driver_missed,
+            lost_reports: counters.lost_reports,
+        }
+    }
+}
+
+/// Durations of servo periods since the engine started, ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Timing {
+    /// How late the servo thread woke up.
+    pub wake_up: Spread,
+    /// How long the work of a period took.
+    pub work: Spread,
+}
+
+/// A distribution of durations, ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Spread {
+    /// Half of them were shorter, to a sixteenth.
+    pub p50: u64,
+    /// One of a hundred was longer, to a sixteenth.
+    pub p99: u64,
+    /// The longest.
+    pub longest: u64,
+}
+
+impl From<&Histogram> for Spread {
+    fn from(durations: &Histogram) -> Self {
+        Self {
+            p50: durations.quantile(0.5),
+            p99: durations.quantile(0.99),
+            longest: durations.largest(),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! The worker: takes commands, plans ahead, feeds the executor, reports in order.
 
+mod guarding;
 mod jogging;
+mod replacing;
 mod reports;
+mod sampling;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -11,21 +14,24 @@ use std::time::Duration;
 use ipc::Clock;
 use kinematics::Chain;
 use realtime::{Piece, Segment};
-use trajectory::ToolLimits;
+use trajectory::{ToolLimits, Trajectory};
 
+use guarding::Guarding;
 use jogging::Jogging;
+use sampling::Sampling;
 
 use super::note::Note;
 use super::status::state_name;
-use super::{Begun, Live, Order, SessionConfig, SessionError, Shared, Status};
+use super::{Begun, Live, Order, SessionConfig, SessionError, Shared, Status, Timing};
 use crate::queue::Given;
+use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
-    Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender, Steering, ToolOrder,
-    Work,
+    Arrival, Events, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender,
+    Steering, ToolOrder, Work,
 };
 
 /// Largest number of commands in work, the one that moves among them.
@@ -46,6 +52,7 @@ pub(super) struct InFlight<const N: usize> {
     line: usize,
     name: &'static str,
     planned_s: f64,
+    /// The chain with the tool that it begins with.
     chain: Chain<N>,
     started: Option<u64>,
     finished: Option<u64>,
@@ -53,6 +60,12 @@ pub(super) struct InFlight<const N: usize> {
     says: Option<Note>,
     /// A refused command is reported as such and not as done.
     refused: bool,
+    /// Number of the newest order when it was taken.
+    newest: u32,
+    /// The guards of a guarded command: where it ends is not known before.
+    guarding: Option<Guarding<N>>,
+    /// The motion of a move.
+    motion: Option<Trajectory<N>>,
 }
 
 pub(super) struct Worker<'a, const N: usize> {
@@ -61,7 +74,8 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) most: ToolLimits,
     pub(super) controller: Controller<N>,
     pub(super) sender: SegmentSender<N>,
-    monitor: Monitor<N>,
+    events: Events<N>,
+    sampling: Arc<Mutex<Sampling<N>>>,
     pub(super) remote: Remote<N>,
     steering: Steering,
     /// How many aborts were carried out: commands of another epoch wait or are dropped.
@@ -74,11 +88,12 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     jogging: Option<Jogging>,
-    /// Chains of the last reported commands, for recorded samples.
-    chains: VecDeque<(u32, Chain<N>)>,
     /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
+    /// Whether the last command that was to take the place of another has done so; nothing as long
+    /// as there is no answer.
+    spliced: Option<(u32, bool)>,
     closing: bool,
     ends: Ends,
 }
@@ -130,21 +145,26 @@ fn start<'a, const N: usize>(
     wanted.record = config.record;
     wanted.connect = config.connect;
     wanted.on_wait = config.on_wait;
+    wanted.arrival = Arrival {
+        tolerance: robot.arrival.tolerance,
+        patience: Duration::from_secs_f64(robot.arrival.patience),
+    };
     wanted.model = ipc::model_hash(robot.urdf.as_bytes());
     wanted.feed_forward = robot
         .efforts::<N>()
         .map(|efforts| FeedForward::new(move |[q, dq, ddq]| efforts.dynamics.effort(q, dq, ddq)));
     let (executor, sender, monitor) = Executor::start(wanted)?;
+    let Monitor { events, samples } = monitor;
     let remote = executor.remote();
     controller.set_joints(remote.measured().setpoint);
     let worker = Worker {
         config,
         most: robot.motion_limits(),
-        chains: VecDeque::from([(0, *controller.chain())]),
+        sampling: Arc::new(Mutex::new(Sampling::new(samples, *controller.chain()))),
         seen: Arc::new(Mutex::new(*controller.chain())),
         controller,
         sender,
-        monitor,
+        events,
         steering: remote.steering(),
         epoch: remote.steering().aborts(),
         jog_aborts: 0,
@@ -154,6 +174,7 @@ fn start<'a, const N: usize>(
         jogging: None,
         held: None,
         fault: None,
+        spliced: None,
         closing: false,
         ends,
     };
@@ -173,7 +194,7 @@ impl<const N: usize> Worker<'_, N> {
         }
         let all_fits = self.feed();
         if !all_fits || !self.may_take() {
-            self.sender.settle(Some(self.monitor.seen()));
+            self.sender.settle(Some(self.events.seen()));
         }
     }
 
@@ -184,6 +205,8 @@ impl<const N: usize> Worker<'_, N> {
             && !self.is_held()
             && self.fault.is_none()
             && self.jogging.is_none()
+            // Where a guarded command ends is not known before.
+            && self.flight.iter().all(|flight| flight.guarding.is_none())
             // During an abort it is not known where the next command begins.
             && self.steering.aborts() == self.epoch
             && self.ends.shared.inbox().has(self.epoch)
@@ -221,6 +244,11 @@ impl<const N: usize> Worker<'_, N> {
                 // The caller may have ended; the dead man's switch ends the jog.
                 let _ = answer.send(result);
             }
+            Order::Replace(commands, answer) => {
+                let result = self.replace(commands);
+                // The caller may have ended; then the move goes on to its end.
+                let _ = answer.send(result);
+            }
             Order::Close => self.closing = true,
         }
     }
@@ -237,61 +265,85 @@ impl<const N: usize> Worker<'_, N> {
         };
         // Read before the command is planned: a later resume comes after the refusal was visible.
         let newest = self.steering.newest();
-        let Given { located, planned } = queued.given;
-        let command = &located.command;
+        let given = queued.given;
+        let language = matches!(given, Given::Command { .. });
+        self.sampling
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(queued.id, *self.controller.chain());
         let mut flight = InFlight {
             id: queued.id,
-            line: located.line,
-            name: command.name(),
+            line: given.line(),
+            name: given.name(),
             planned_s: 0.0,
             chain: *self.controller.chain(),
             started: None,
             finished: None,
             says: None,
             refused: false,
+            newest,
+            guarding: None,
+            motion: None,
         };
-        let planned = planned
-            .and_then(AnyStep::into_step::<N>)
-            .filter(|planned| self.controller.follow(planned));
-        let step = match planned {
-            Some(planned) => Ok(planned.step),
-            None => self.controller.step(command),
-        };
-        match step {
+        match self.step(given) {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
                 self.enlist(&mut flight, step);
             }
             Err(error) => {
-                let dropped = match self.config.on_refusal {
-                    FailurePolicy::Abort => {
-                        self.controller.abort();
-                        self.ends.shared.inbox().drop_all(None)
-                    }
-                    FailurePolicy::Hold => {
-                        self.held = Some(newest);
-                        0
-                    }
-                    FailurePolicy::Skip => 0,
-                };
-                let (id, line, name) = (flight.id, flight.line, flight.name);
-                flight.says = Some(Note::Refused {
-                    id,
-                    line,
-                    name,
-                    error,
-                    dropped,
-                });
-                flight.refused = true;
+                self.refuse(&mut flight, error, language);
                 flight.finished = Some(0);
             }
         }
         self.flight.push_back(flight);
     }
 
+    /// A command of the language or a trajectory has failed: says so when its turn comes, and does
+    /// what is to be done then.
+    fn refuse(&mut self, flight: &mut InFlight<N>, error: CommandError, language: bool) {
+        let dropped = match self.config.on_refusal {
+            FailurePolicy::Abort => {
+                if language {
+                    self.controller.abort();
+                }
+                self.ends.shared.inbox().drop_all(None)
+            }
+            FailurePolicy::Hold => {
+                self.held = Some(flight.newest);
+                0
+            }
+            FailurePolicy::Skip => 0,
+        };
+        let (id, line, name) = (flight.id, flight.line, flight.name);
+        flight.says = Some(Note::Refused {
+            id,
+            line,
+            name,
+            error,
+            dropped,
+        });
+        flight.refused = true;
+    }
+
+    /// The step of what left the queue: planned before, or planned now.
+    fn step(&mut self, given: Given) -> Result<Step<N>, CommandError> {
+        let (located, planned) = match given {
+            Given::Command { located, planned } => (located, planned),
+            Given::Timed(timed) => return self.controller.step_timed(&timed, &self.most),
+        };
+        let planned = planned
+            .and_then(AnyStep::into_step::<N>)
+            .filter(|planned| self.controller.follow(planned));
+        match planned {
+            Some(planned) => Ok(planned.step),
+            None => self.controller.step(&located.command),
+        }
+    }
+
     /// The work of one step; a command without work is finished at once.
     fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>) {
         let command = flight.id;
+        self.enlist_guards(flight, &step);
         match step.task {
             Task::Message { text } => flight.says = Some(Note::Message { text }),
             Task::End { reason } => flight.says = Some(Note::Ended { reason }),
@@ -323,7 +375,19 @@ impl<const N: usize> Worker<'_, N> {
                 last,
             }));
         }
-        if pieces.is_empty() {
+        if !pieces.is_empty() {
+            flight.motion = step.planned.map(|planned| planned.trajectory);
+            return;
+        }
+        if flight.guarding.is_some() {
+            // The guards are looked at for a period, although nothing moves.
+            let piece = Piece::hold(*self.controller.joints(), 1.0 / self.config.rate_hz);
+            self.work.push_back(Work::Motion(Segment {
+                piece,
+                command,
+                last: true,
+            }));
+        } else {
             flight.finished = Some(0);
         }
     }
@@ -352,6 +416,7 @@ impl<const N: usize> Worker<'_, N> {
         robot.name.clone_into(&mut status.robot);
         if status.sliding.is_empty() {
             status.sliding = robot.sliding();
+            status.joint_names = robot.joint_names();
         }
         driver.clone_into(&mut status.driver);
         status.state = state_name(self.controller.modal().state());
@@ -365,10 +430,16 @@ impl<const N: usize> Worker<'_, N> {
         status.settings = Some(self.controller.modal().settings().clone());
     }
 
-    /// Fills in a status without this thread.
+    /// Fills in a status and reads samples without this thread.
     fn live(&self) -> Live {
         let (remote, chain) = (self.remote.clone(), Arc::clone(&self.seen));
-        Live(Box::new(move |status: &mut Status| {
+        let (sampling, seen) = (Arc::clone(&self.sampling), Arc::clone(&self.seen));
+        let shared = Arc::clone(&self.ends.shared);
+        let read = move || {
+            let mut sampling = sampling.lock().unwrap_or_else(PoisonError::into_inner);
+            sampling.read(&seen, &shared.samples);
+        };
+        let fill = move |status: &mut Status| {
             let now = remote.measured();
             status.idle &= now.idle;
             status.held |= now.held;
@@ -379,7 +450,15 @@ impl<const N: usize> Worker<'_, N> {
             let chain = chain.lock().unwrap_or_else(PoisonError::into_inner);
             status.set_pose(&chain.forward(&now.position));
             status.cycles = remote.counters().into();
-        }))
+            status.timing = Timing {
+                wake_up: remote.latency().into(),
+                work: remote.work().into(),
+            };
+        };
+        Live {
+            fill: Box::new(fill),
+            read: Box::new(read),
+        }
     }
 
     pub(super) fn say(&self, note: Note) {

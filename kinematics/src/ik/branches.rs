@@ -41,11 +41,27 @@ impl<const N: usize> Solver<N> {
         best.map(|(_, solution)| solution)
     }
 
+    /// What the closed form gives at one value (rad) of its free parameter, before any polishing.
     #[inline(always)]
-    pub(super) fn branch(&self, branching: Branching<'_, N>) {
+    pub(super) fn raw_branches(
+        &self,
+        closed: &Closed,
+        pose: &Isometry3<f64>,
+        seed: &SVector<f64, N>,
+        parameter: f64,
+    ) -> Raw<N> {
+        let mut raw = Raw::none();
         if let Some(compute) = const { closed::branching::<N>() } {
+            let branching = Branching {
+                closed,
+                pose,
+                parameter,
+                seed,
+                raw: &mut raw,
+            };
             compute(self.chain.build(), branching);
         }
+        raw
     }
 
     pub(super) fn branches_at(
@@ -58,14 +74,7 @@ impl<const N: usize> Solver<N> {
         if !closed.exact() {
             return self.near_branches(closed, pose, seed, parameter);
         }
-        let mut raw = Raw::none();
-        self.branch(Branching {
-            closed,
-            pose,
-            parameter,
-            seed,
-            raw: &mut raw,
-        });
+        let raw = self.raw_branches(closed, pose, seed, parameter);
         let mut found = Branches::new();
         for id in 0..8_u8 {
             if let Some(q) = raw.inside(id) {
@@ -84,14 +93,7 @@ impl<const N: usize> Solver<N> {
         parameter: f64,
     ) -> Option<Solution<N>> {
         if closed.exact() {
-            let mut raw = Raw::none();
-            self.branch(Branching {
-                closed,
-                pose,
-                parameter,
-                seed,
-                raw: &mut raw,
-            });
+            let raw = self.raw_branches(closed, pose, seed, parameter);
             let (id, q) = raw.nearest()?;
             let branch = Some(id);
             return Some(Solution { q, branch });

@@ -4,7 +4,7 @@
 //! together (a fold: elbow straight, wrist straight), both descents may end in the same branch or
 //! in none; then the other branch is searched for across the fold.
 
-use super::closed::{Branching, Closed, Raw};
+use super::closed::Closed;
 use super::goal::{Goal, Target};
 use super::numeric::Stop;
 use super::report::{Branches, Solution};
@@ -29,14 +29,7 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         parameter: f64,
     ) -> Branches<N> {
-        let mut raw = Raw::none();
-        self.branch(Branching {
-            closed,
-            pose,
-            parameter,
-            seed,
-            raw: &mut raw,
-        });
+        let raw = self.raw_branches(closed, pose, seed, parameter);
         let target = Goal::Pose(*pose).target();
         // All branches, also those beyond the limits: a branch outside is not missing.
         let (mut all, mut lost) = (Branches::new(), Branches::new());

@@ -13,7 +13,7 @@ pub use settings::Settings;
 use crate::command_error::CommandError;
 use crate::task::{Shape, Task, ToolAction};
 use crate::tooling::Tooling;
-use crcl::{AngleUnit, Command, CoordinateFrame, LengthUnit, Pose};
+use crcl::{AngleUnit, Command, CoordinateFrame, Guard, LengthUnit, Pose};
 use trajectory::ToolLimits;
 
 /// What the controller accepts.
@@ -43,6 +43,8 @@ pub struct Modal {
     sliding: Vec<bool>,
     /// What SaveSettings has kept, the newest last.
     saved: Vec<Settings>,
+    /// Guards of the next command that moves the arm or waits.
+    guards: Vec<Guard>,
 }
 
 impl Modal {
@@ -60,6 +62,7 @@ impl Modal {
         Self {
             sliding,
             saved: Vec::new(),
+            guards: Vec::new(),
             state: CanonState::Unready,
             length: default_length,
             angle: AngleUnit::default(),
@@ -99,6 +102,7 @@ impl Modal {
     /// Refuses everything except InitCanon from now on, as after an aborted program.
     pub fn abort(&mut self) {
         self.state = CanonState::Ended;
+        self.guards.clear();
         // What was kept was for the time after a move that has not ended.
         if let Some(settings) = self.saved.drain(..).next() {
             self.settings = settings;
@@ -123,6 +127,7 @@ impl Modal {
                 self.length = self.default_length;
                 self.angle = AngleUnit::default();
                 self.frame = CoordinateFrame::Workstation;
+                self.guards.clear();
                 Ok(Task::Begin)
             }
             Command::EndCanon { reason } => {
@@ -164,10 +169,28 @@ impl Modal {
             Command::MoveThroughWaypoints { waypoints } => {
                 self.legs(waypoints, workstation_from_flange)
             }
+            Command::Guard { guard } => self.guard(guard),
             Command::SaveSettings => self.save_settings(),
             Command::RestoreSettings => self.restore_settings(),
             setting => self.set(setting),
         }
+    }
+
+    /// The guards of the command that comes now; none is left for a later one.
+    pub(crate) fn take_guards(&mut self) -> Vec<Guard> {
+        std::mem::take(&mut self.guards)
+    }
+
+    fn guard(&mut self, guard: &Guard) -> Result<Task, CommandError> {
+        /// How many guards a command can have.
+        const MOST: usize = 4;
+        if self.guards.len() >= MOST {
+            let message = format!("a command with more than {MOST} guards");
+            return Err(CommandError::sequence(message)
+                .with_help("each guard is for the next command that moves the arm or waits"));
+        }
+        self.guards.push(guard.clone());
+        Ok(Task::Setting)
     }
 
     fn restore_settings(&mut self) -> Result<Task, CommandError> {

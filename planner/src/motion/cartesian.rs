@@ -334,7 +334,7 @@ fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {
 }
 
 /// Quintics between followed points, in the parameter of the curve.
-fn pieces<const N: usize>(points: &[FollowPoint<N>]) -> Vec<Piece<N>> {
+pub(super) fn pieces<const N: usize>(points: &[FollowPoint<N>]) -> Vec<Piece<N>> {
     points
         .windows(2)
         .map(|pair| piece(&pair[0], &pair[1]))

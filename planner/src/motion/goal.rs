@@ -55,7 +55,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The goals that need the least time at constant velocity.
-    fn promising(
+    pub(super) fn promising(
         &self,
         mut goals: Vec<SVector<f64, N>>,
         start: &SVector<f64, N>,
@@ -98,7 +98,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// All known configurations that reach a pose within the joint limits.
-    fn configurations(
+    pub(super) fn configurations(
         &self,
         pose: &Isometry3<f64>,
         start: &SVector<f64, N>,

@@ -9,11 +9,13 @@ use std::any::Any;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
+use realtime::Sample;
 use trajectory::ToolLimits;
 
 use super::jog::Direction;
 use super::{MotionError, PlannedMove, Planner};
 use crate::task::{JointMove, LegsMove, Move, ScrewMove};
+use crate::timed::TimedTrajectory;
 use crate::with_dof;
 
 type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
@@ -21,6 +23,10 @@ type Planned<const N: usize> = Result<PlannedMove<N>, MotionError>;
 /// Finds postures at a pose, the easiest near the given one first.
 type Postures<const N: usize> =
     fn(&Planner<N>, &Isometry3<f64>, &SVector<f64, N>) -> Vec<SVector<f64, N>>;
+
+/// Plans a trajectory whose times are given.
+type Timed<const N: usize> =
+    fn(&Planner<N>, &TimedTrajectory, &SVector<f64, N>, &ToolLimits) -> Planned<N>;
 
 /// What a planner of `N` joints calls.
 #[derive(Clone, Copy)]
@@ -31,6 +37,8 @@ pub(super) struct Kernel<const N: usize> {
     pub actuate: fn(&Planner<N>, &JointMove, &SVector<f64, N>) -> Planned<N>,
     pub legs: fn(&Planner<N>, &LegsMove, &SVector<f64, N>) -> Planned<N>,
     pub screw: fn(&Planner<N>, &ScrewMove, &SVector<f64, N>) -> Planned<N>,
+    pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
+    pub timed: Timed<N>,
     pub postures: Postures<N>,
 }
 
@@ -61,6 +69,8 @@ fn table(dof: usize) -> &'static dyn Any {
             actuate: Planner::plan_joints,
             legs: Planner::plan_legs,
             screw: Planner::plan_screw,
+            moving: Planner::plan_moving,
+            timed: Planner::plan_timed,
             postures: Planner::find_postures,
         };
         &KERNEL

@@ -20,14 +20,18 @@ mod least;
 mod least_turn;
 mod legs;
 mod motion_error;
+mod moving;
 mod reach;
 mod screw;
 mod singular;
 mod smooth;
 mod soonest;
+mod timed;
+mod timed_refusal;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
+use realtime::Sample;
 use trajectory::bounds::Held;
 use trajectory::{JointLimits, MotionBounds, ToolLimits, Trajectory};
 
@@ -38,12 +42,14 @@ pub use efforts::Efforts;
 pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
+pub use timed_refusal::TimedRefusal;
 
 use certificate::Arm;
 use draft::Draft;
 use kernel::Kernel;
 
 use crate::task::{JointMove, LegsMove, Move, ScrewMove, Shape};
+use crate::timed::TimedTrajectory;
 
 /// Joint ratios may exceed 1 by rounding only.
 const ROUNDING: f64 = 1e-9;
@@ -187,6 +193,31 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         (self.kernel.screw)(self, motion, start)
+    }
+
+    /// Plans a move that begins in a state of motion, to rest: any way in joint space, or straight on
+    /// along the line that the controlled point moves on.
+    ///
+    /// # Errors
+    /// [`MotionError`] when the move cannot begin in that state, or cannot be made; it may still be
+    /// possible from rest.
+    pub fn moving(&self, motion: &Move, start: &Sample<N>) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.moving)(self, motion, start)
+    }
+
+    /// Plans a joint trajectory whose times are given, from `start`, at rest, within the limits
+    /// `most` of the controlled point: quintic pieces through its points, or, where it asks for
+    /// that, the fastest motion along its way.
+    ///
+    /// # Errors
+    /// [`MotionError::Timed`] with point, joint and limit when it is not one or breaks a limit.
+    pub fn timed(
+        &self,
+        timed: &TimedTrajectory,
+        start: &SVector<f64, N>,
+        most: &ToolLimits,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        (self.kernel.timed)(self, timed, start, most)
     }
 
     /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the

@@ -6,7 +6,7 @@ use trajectory::otg::OtgError;
 use trajectory::smooth::SmoothError;
 
 use super::figures::figures;
-use super::{BlockedCause, Fault, JogRefusal, JointAmount};
+use super::{BlockedCause, Fault, JogRefusal, JointAmount, TimedRefusal};
 
 /// A move that the arm cannot make. Poses are counted from 1, joints by name.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -76,6 +76,9 @@ pub enum MotionError {
     /// The arm cannot move in the direction of a jog.
     #[error("{0}")]
     Jog(#[from] JogRefusal),
+    /// A trajectory whose times are given cannot be executed as it is.
+    #[error("{0}")]
+    Timed(#[from] TimedRefusal),
     /// The smooth path could not be made.
     #[error("no smooth path: {0}")]
     Smooth(#[from] SmoothError),
@@ -88,6 +91,9 @@ pub enum MotionError {
     /// The joint path has fewer than two points.
     #[error("the motion cannot be timed: its path has fewer than two points")]
     NoWay,
+    /// The move cannot begin in the state of motion that the arm is in.
+    #[error("the move cannot begin while the arm moves: {0}")]
+    FromMotion(&'static str),
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]
     Uncertified(#[from] Fault),
@@ -110,6 +116,8 @@ impl MotionError {
                 "stay within the range that `canter robots show` tells"
             }
             Self::Jog(_) => "go the other way",
+            Self::FromMotion(_) => "stop first",
+            Self::Timed(refusal) => refusal.help(),
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
             Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
                 "please report this with the program: it is a fault of the planner"

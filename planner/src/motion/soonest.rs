@@ -22,7 +22,7 @@ const CHORDS: usize = 8;
 const GAIN: f64 = 0.015;
 
 /// A line in joint space is timed from rest to rest.
-const RESTING: TimingOptions = TimingOptions {
+pub(super) const RESTING: TimingOptions = TimingOptions {
     start: Boundary::Rest,
     end: Boundary::Rest,
     rate_cap: None,
@@ -147,7 +147,7 @@ impl<const N: usize> Planner<N> {
 
     /// A factor by which time has to be stretched at least so that the tool keeps its limits, from
     /// samples.
-    fn least_stretch(&self, motion: &Trajectory<N>, limits: &ToolLimits) -> f64 {
+    pub(super) fn least_stretch(&self, motion: &Trajectory<N>, limits: &ToolLimits) -> f64 {
         let mut most = [0.0_f64; 6];
         for piece in motion.pieces() {
             for share in [0.0, 0.5, 1.0] {

@@ -29,6 +29,7 @@ struct Document {
     mounted: Option<Spanned<String>>,
     limits: Option<Limits>,
     payload: Option<Payload>,
+    arrival: Option<super::arrival::Given>,
 }
 
 /// Limits that the URDF does not give, one per joint.
@@ -153,6 +154,7 @@ impl Files<'_> {
                 .unwrap_or_else(Isometry3::identity),
             home,
             efforts,
+            arrival: self.arrival(document.arrival.as_ref())?,
             mounted: self.mounted(document.mounted.as_ref(), &end_effectors)?,
             end_effectors,
             tool_changer: self.changer(document.tool_changer.as_ref())?,
@@ -179,7 +181,7 @@ impl Files<'_> {
         }
     }
 
-    fn positive(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
+    pub(super) fn positive(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
         let number = *value.get_ref();
         if number > 0.0 && number.is_finite() {
             return Ok(number);
@@ -187,7 +189,7 @@ impl Files<'_> {
         Err(self.value(value.span(), key, "a positive finite number"))
     }
 
-    fn time(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
+    pub(super) fn time(&self, key: &str, value: &Spanned<f64>) -> Result<f64, RobotError> {
         let number = *value.get_ref();
         if (0.0..=600.0).contains(&number) {
             return Ok(number);

@@ -64,10 +64,11 @@ impl<const N: usize> Runner<N> {
             } = first
             {
                 let (joint, error) = self.distance(&end);
-                if error > self.config.arrival.tolerance {
-                    if self.tick < until {
-                        return;
-                    }
+                let arrived = self.config.arrival.tolerance;
+                if error > self.settles(command).unwrap_or(arrived) && self.tick < until {
+                    return;
+                }
+                if error > arrived {
                     self.report(Event::NotArrived {
                         command,
                         joint,
@@ -90,6 +91,9 @@ impl<const N: usize> Runner<N> {
 
     fn tell_awaited(&mut self, awaited: Awaited<N>) {
         let tick = self.tick;
+        if let Awaited::End { command, .. } = awaited {
+            self.report_guards(command);
+        }
         self.report(match awaited {
             Awaited::End { command, .. } => Event::Finished { command, tick },
             Awaited::Event(event) => event,

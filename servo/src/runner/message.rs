@@ -19,7 +19,8 @@ impl<const N: usize> Runner<N> {
         let idle = self.cycle.is_idle()
             && self.items.is_empty()
             && self.tool.is_none()
-            && self.awaited.is_empty();
+            && self.awaited.is_empty()
+            && self.watch.is_none();
         self.shared.write(&Measured {
             position: self.measured(),
             velocity: first(&self.state.velocity),
@@ -31,6 +32,8 @@ impl<const N: usize> Runner<N> {
             held: false,
             tools: self.state.tools.map(|tool| tool.status),
             speed_asked: self.state.speed_scaling,
+            command: self.cycle.command(),
+            path_time: self.cycle.path_time(),
         });
         self.shared.orders.tell(&Progress {
             order: self.asked.order(),

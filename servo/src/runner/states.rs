@@ -12,6 +12,9 @@ use crate::event::{Event, Fault, ShortText};
 const LESS_SPEED: f64 = 0.98;
 const FULL_SPEED: f64 = 0.995;
 
+/// A share of the speed below which an arm gets no more time to follow.
+const LEAST_SHARE: f64 = 0.2;
+
 impl<const N: usize> Runner<N> {
     /// Looks at what the driver says.
     pub(super) fn take_state(&mut self, state: Option<State>, tick: Tick) {
@@ -97,12 +100,14 @@ impl<const N: usize> Runner<N> {
     }
 
     /// How far the arm may be from the setpoint: more for a while after a stall, during which the
-    /// driver continued the motion.
+    /// driver continued the motion; later by the driver's own delay; and later still while the arm
+    /// slows its own time down and the engine has not slowed down yet.
     fn following(&self) -> Following {
         let allowed = self.config.following;
+        let share = self.state.speed_scaling.clamp(LEAST_SHARE, 1.0);
         Following {
             base: allowed.base + self.ahead,
-            ..allowed
+            delay: (allowed.delay + self.delay) / share,
         }
     }
 }

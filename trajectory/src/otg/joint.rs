@@ -120,6 +120,18 @@ pub(crate) struct Frame {
     launch: Point,
 }
 
+impl Default for Frame {
+    fn default() -> Self {
+        Self {
+            units: Units::new(1.0, 1.0, 1.0),
+            brake: Brake::default(),
+            pause: 0.0,
+            start: Point::default(),
+            launch: Point::default(),
+        }
+    }
+}
+
 impl Frame {
     /// The frame of a joint that begins in `from` (normalised) and brakes first.
     fn new(units: Units, from: End, brake: Brake) -> Self {
@@ -155,13 +167,7 @@ pub(crate) struct Joint {
 impl Default for Joint {
     fn default() -> Self {
         Self {
-            frame: Frame {
-                units: Units::new(1.0, 1.0, 1.0),
-                brake: Brake::default(),
-                pause: 0.0,
-                start: Point::default(),
-                launch: Point::default(),
-            },
+            frame: Frame::default(),
             smooth: true,
             task: Task::Idle,
         }

@@ -9,7 +9,6 @@ use super::joint::{Given, Joint};
 use super::limits::Limits;
 use super::motion::{Motion, Track};
 use super::options::{Interface, Options};
-use super::profile::BlendedProfile;
 use super::state::State;
 
 /// Relative deviation from a straight line that is rounding.
@@ -206,31 +205,22 @@ fn standing<const N: usize>(
     options: &Options<N>,
 ) -> Motion<N> {
     let duration = options.minimum_duration;
-    let tracks = std::array::from_fn(|joint| {
-        let begin = [
+    let mut tracks = [Track::default(); N];
+    for (joint, track) in tracks.iter_mut().enumerate() {
+        track.placed = options.interface[joint] == Interface::Position;
+        track.duration = duration;
+        track.start = [
             start.position[joint],
             start.velocity[joint],
             start.acceleration[joint],
         ];
-        let mut end = [
+        track.end = [
             target.position[joint],
             target.velocity[joint],
             target.acceleration[joint],
         ];
-        if !options.enabled[joint] {
-            end = [begin[0], 0.0, 0.0];
-        } else if options.interface[joint] == Interface::Velocity {
-            end[0] = begin[0];
-        }
-        Track {
-            frame: Joint::default().frame,
-            placed: options.interface[joint] == Interface::Position,
-            blended_profile: BlendedProfile::default(),
-            duration,
-            start: begin,
-            end,
-        }
-    });
+        track.finish(options.enabled[joint], options.interface[joint]);
+    }
     Motion {
         tracks,
         duration,

@@ -6,11 +6,12 @@ use realtime::{Piece, Sample};
 use crate::Trajectory;
 
 use super::joint::Frame;
+use super::options::Interface;
 use super::profile::BlendedProfile;
 use super::state::State;
 
 /// One joint's part of a move.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Track {
     pub(crate) frame: Frame,
     /// Whether a position had to be reached.
@@ -24,6 +25,15 @@ pub(crate) struct Track {
 }
 
 impl Track {
+    /// Sets the end of a joint whose position is not asked for.
+    pub(crate) fn finish(&mut self, enabled: bool, interface: Interface) {
+        if !enabled {
+            self.end = [self.start[0], 0.0, 0.0];
+        } else if interface == Interface::Velocity {
+            self.end[0] = self.last_position();
+        }
+    }
+
     /// Position, velocity, acceleration and jerk at `time` (s).
     pub(crate) fn at(&self, time: f64) -> [f64; 4] {
         if time >= self.duration {

@@ -25,16 +25,12 @@ pub(crate) fn plan<const N: usize>(
         },
         Synchronisation::Time | Synchronisation::None => {}
     }
-    let joints: [Joint; N] = std::array::from_fn(|joint| {
-        if options.enabled[joint] {
-            Joint::new(
-                &Given::of(joint, start, target, limits),
-                options.interface[joint],
-            )
-        } else {
-            Joint::default()
-        }
-    });
+    // Written in place: `from_fn` copies each joint several times.
+    let mut joints = [Joint::default(); N];
+    for joint in (0..N).filter(|&joint| options.enabled[joint]) {
+        let given = Given::of(joint, start, target, limits);
+        joints[joint] = Joint::new(&given, options.interface[joint]);
+    }
     let mut motion = if options.synchronisation == Synchronisation::None {
         apart(&joints, start, target, options)?
     } else {
@@ -70,42 +66,31 @@ fn assemble<const N: usize>(
     options: &Options<N>,
     durations: &[f64; N],
 ) -> Motion<N> {
-    let tracks = std::array::from_fn(|joint| {
-        let mut track = Track {
-            frame: joints[joint].frame,
-            placed: options.interface[joint] == Interface::Position,
-            blended_profile: joints[joint].blended_profile(durations[joint]),
-            duration: durations[joint],
-            start: [
-                start.position[joint],
-                start.velocity[joint],
-                start.acceleration[joint],
-            ],
-            end: [
-                target.position[joint],
-                target.velocity[joint],
-                target.acceleration[joint],
-            ],
-        };
-        finish(&mut track, options.enabled[joint], options.interface[joint]);
+    let mut tracks = [Track::default(); N];
+    for (joint, track) in tracks.iter_mut().enumerate() {
+        track.frame = joints[joint].frame;
+        track.placed = options.interface[joint] == Interface::Position;
+        track.blended_profile = joints[joint].blended_profile(durations[joint]);
+        track.duration = durations[joint];
+        track.start = [
+            start.position[joint],
+            start.velocity[joint],
+            start.acceleration[joint],
+        ];
+        track.end = [
+            target.position[joint],
+            target.velocity[joint],
+            target.acceleration[joint],
+        ];
+        track.finish(options.enabled[joint], options.interface[joint]);
         if !joints[joint].smooth {
             track.end[2] = 0.0;
         }
-        track
-    });
+    }
     let duration = durations.iter().copied().fold(0.0, f64::max);
     Motion {
         tracks,
         duration,
         straight: false,
-    }
-}
-
-/// Sets the end of a joint whose position is not asked for.
-fn finish(track: &mut Track, enabled: bool, interface: Interface) {
-    if !enabled {
-        track.end = [track.start[0], 0.0, 0.0];
-    } else if interface == Interface::Velocity {
-        track.end[0] = track.last_position();
     }
 }

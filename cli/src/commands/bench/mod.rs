@@ -2,6 +2,7 @@
 
 mod motion;
 mod otg;
+mod pose_lists;
 mod suite;
 mod timing;
 
@@ -9,6 +10,7 @@ use clap::{Args, Subcommand};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::printer::Printer;
 
 /// Measure trajectory generation on this machine
 #[derive(Args, Debug)]
@@ -26,9 +28,9 @@ enum What {
 
 impl Bench {
     /// Measures and prints.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         match &self.what {
-            What::Motion(bench) => bench.run(),
+            What::Motion(bench) => bench.run(printer),
             What::Otg(bench) => bench.run(),
             What::Timing(bench) => bench.run(),
         }

@@ -9,11 +9,13 @@ use planner::robot::Robot;
 use serde::Serialize;
 use trajectory::smooth::SmoothOptions;
 
+use super::pose_lists;
 use super::suite::{self, Suite};
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::plot::{self, Bar};
-use crate::{input, output, robot};
+use crate::printer::Printer;
+use crate::{input, output, robot, viewing};
 
 /// Smooth motions through pose lists: motion time compared with exact stop, planning time,
 /// certificate
@@ -37,6 +39,9 @@ pub(crate) struct Motion {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Show the lists and their motions in the browser until Ctrl-C: prints the address of a page
+    #[arg(long)]
+    view: bool,
 }
 
 #[derive(Serialize)]
@@ -72,7 +77,7 @@ struct Case {
 
 impl Motion {
     /// Measures every case and prints them; the exit code says whether all could be planned.
-    pub(crate) fn run(&self) -> Result<Exit, Failure> {
+    pub(crate) fn run(&self, printer: &Printer) -> Result<Exit, Failure> {
         let suite = self.read()?;
         let robot = self.robot.as_deref().map(robot::load).transpose()?;
         let mut cases = Vec::with_capacity(suite.cases.0.len());
@@ -82,7 +87,7 @@ impl Motion {
         }
         let report = MotionReport {
             schema: 1,
-            robot: robot.map(|robot| robot.name),
+            robot: robot.as_ref().map(|robot| robot.name.clone()),
             cases,
         };
         if self.json {
@@ -95,6 +100,10 @@ impl Motion {
             fs::write(path, picture)
                 .with_context(|| format!("cannot write {}", path.display()))
                 .map_err(|cause| Failure::new(Exit::Unreadable, cause))?;
+        }
+        if self.view {
+            let source = pose_lists::source(&suite, robot.as_ref())?;
+            viewing::serve(printer, (source, None), None, || false)?;
         }
         let sound = report.cases.iter().all(|case| case.certified);
         Ok(if sound { Exit::Done } else { Exit::Refused })

@@ -1,9 +1,11 @@
 //! Drivers: one file per kind of driver, and the test of any driver.
 
 mod franka;
+mod kuka;
 mod mujoco;
 mod sim;
 mod test;
+mod ur;
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -38,6 +40,8 @@ enum What {
     Sim(sim::Sim),
     Mujoco(mujoco::Mujoco),
     Franka(franka::Franka),
+    Ur(ur::Ur),
+    Kuka(kuka::Kuka),
     Test(test::Test),
 }
 
@@ -48,6 +52,8 @@ impl Driver {
             What::Sim(sim) => sim.run(),
             What::Mujoco(mujoco) => mujoco.run(),
             What::Franka(franka) => franka.run(),
+            What::Ur(ur) => ur.run(),
+            What::Kuka(kuka) => kuka.run(),
             What::Test(test) => test.run(),
         }
     }

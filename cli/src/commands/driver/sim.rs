@@ -12,6 +12,7 @@ use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::robot::RobotOption;
+use crate::wall::WallOption;
 
 /// How long another driver may still hold the arm, and the time between two tries.
 const TAKEN: Duration = Duration::from_secs(3);
@@ -42,6 +43,8 @@ pub(super) struct Sim {
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    wall: WallOption,
     /// End soon after standard input ends
     #[arg(long, hide = true)]
     until_end_of_input: bool,
@@ -58,14 +61,14 @@ impl Sim {
             // The starter waits for this line.
             writeln!(io::stdout(), "ready")?;
         }
-        let report = driver_sim::run(self.options(&robot, arm), &stop).map_err(failure)?;
+        let report = driver_sim::run(self.options(&robot, arm)?, &stop).map_err(failure)?;
         super::tell(&report, !self.until_end_of_input);
         Ok(Exit::Done)
     }
 
-    fn options(&self, robot: &Robot, arm: Arm) -> Options {
+    fn options(&self, robot: &Robot, arm: Arm) -> Result<Options, Failure> {
         let joints = &robot.joints;
-        Options {
+        Ok(Options {
             model: ipc::model_hash(robot.urdf.as_bytes()),
             position: robot.home.clone(),
             lower: joints.lower.iter().map(|value| value.max(-1e3)).collect(),
@@ -78,8 +81,9 @@ impl Sim {
             delay: self.delay,
             noise: self.noise,
             seed: self.seed,
+            wall: self.wall.wall(robot)?,
             ..Options::new(arm, robot.dof())
-        }
+        })
     }
 }
 

@@ -2,12 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use nalgebra::UnitQuaternion;
 use planner::motion::Direction;
 use realtime::Segment;
 use servo::Control;
 
-use super::super::jog::{Jog, JogError, JogSpace, direction};
+use super::super::jog::{Jog, JogError, JogSpace, Turns, direction};
 use super::super::note::Note;
 use super::{Work, Worker};
 
@@ -42,7 +41,7 @@ enum Phase {
 impl<const N: usize> Worker<'_, N> {
     /// Begins, prolongs, changes or ends a jog.
     pub(super) fn jog(&mut self, request: Jog) -> Result<(), JogError> {
-        let direction = direction::<N>(&request, &self.tool_turn())?;
+        let direction = direction::<N>(&request, &self.turns())?;
         let until = Instant::now() + request.timeout.clamp(TIMEOUT.0, TIMEOUT.1);
         if let Some(fault) = &self.fault {
             return Err(JogError::Fault(fault.clone()));
@@ -91,10 +90,13 @@ impl<const N: usize> Worker<'_, N> {
         Ok(())
     }
 
-    /// Orientation of the tool in the workstation.
-    fn tool_turn(&self) -> UnitQuaternion<f64> {
-        let now = self.remote.measured().setpoint;
-        self.controller.chain().forward(&now).rotation
+    /// Orientations of tool and base in the workstation.
+    fn turns(&self) -> Turns {
+        let (now, chain) = (self.remote.measured().setpoint, self.controller.chain());
+        Turns {
+            tool: chain.forward(&now).rotation,
+            base: chain.reference_from_base().rotation,
+        }
     }
 
     /// Plans the path from where the arm rests and sends it.
@@ -145,12 +147,10 @@ impl<const N: usize> Worker<'_, N> {
             return;
         }
         let begun =
-            direction::<N>(&jogging.request, &self.tool_turn()).and_then(
-                |direction| match direction {
-                    Some(direction) => self.plan_jog(&direction),
-                    None => Ok(()),
-                },
-            );
+            direction::<N>(&jogging.request, &self.turns()).and_then(|direction| match direction {
+                Some(direction) => self.plan_jog(&direction),
+                None => Ok(()),
+            });
         if let Some(jogging) = &mut self.jogging {
             jogging.phase = if begun.is_ok() {
                 Phase::Moving

@@ -3,23 +3,18 @@
 
 use std::sync::PoisonError;
 
-use nalgebra::SVector;
-use servo::{Event, Fault, Recorded};
+use servo::{Event, Fault};
 
-use super::super::RunSample;
 use super::super::note::{Blame, Note};
 use super::Worker;
-
-/// Number of reported commands whose tool is kept, for late samples.
-const CHAINS: usize = 64;
 
 impl<const N: usize> Worker<'_, N> {
     /// Takes what the servo thread has reported.
     pub(super) fn read_reports(&mut self) {
-        while let Some(sample) = self.monitor.sample() {
-            self.record(&sample);
-        }
-        while let Some(event) = self.monitor.event() {
+        let mut sampling = self.sampling.lock().unwrap_or_else(PoisonError::into_inner);
+        sampling.read(&self.seen, &self.ends.shared.samples);
+        drop(sampling);
+        while let Some(event) = self.events.event() {
             self.on_event(event);
         }
     }
@@ -45,6 +40,7 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Finished { command, .. } if self.jog_finished(command) => {}
             Event::Finished { command, tick } => {
+                self.end_guards(command);
                 if let Some(flight) = self.flight.iter_mut().find(|f| f.id == command) {
                     flight.finished = Some(tick);
                 }
@@ -60,6 +56,7 @@ impl<const N: usize> Worker<'_, N> {
                 joint: joint + 1,
                 error,
             }),
+            Event::Spliced { by, accepted, .. } => self.spliced = Some((by, accepted)),
             Event::SpeedAsked { share, .. } => self.say(Note::SpeedAsked { share }),
             Event::Stopped { .. } => self.say(Note::Stopped),
             Event::Aborted { aborts, .. } => {
@@ -142,10 +139,6 @@ impl<const N: usize> Worker<'_, N> {
             if let Some(note) = flight.says {
                 self.say(note);
             }
-            self.chains.push_back((flight.id, flight.chain));
-            if self.chains.len() > CHAINS {
-                self.chains.pop_front();
-            }
             if flight.refused {
                 continue;
             }
@@ -161,36 +154,6 @@ impl<const N: usize> Worker<'_, N> {
                 ticks,
             });
         }
-    }
-
-    fn record(&self, sample: &Recorded<N>) {
-        let flying = self.flight.iter().map(|flight| (flight.id, &flight.chain));
-        let reported = self.chains.iter().rev().map(|(id, chain)| (*id, chain));
-        // Command 0 is the time before the first command; the chain of an old command is no longer
-        // known.
-        let chain = flying
-            .chain(reported)
-            .find_map(|(id, chain)| (id == sample.command).then_some(chain))
-            .unwrap_or_else(|| self.controller.chain());
-        let list = |vector: &SVector<f64, N>| vector.as_slice().to_vec();
-        let measured = SVector::from(sample.measured);
-        let recorded = RunSample {
-            tick: sample.tick,
-            command: sample.command,
-            path_time: sample.path_time,
-            time_scaling: sample.time_scaling,
-            q: list(&sample.setpoint.position),
-            dq: list(&sample.setpoint.velocity),
-            ddq: list(&sample.setpoint.acceleration),
-            measured: sample.measured.to_vec(),
-            workstation_from_tool: chain.forward(&sample.setpoint.position),
-            measured_pose: chain.forward(&measured),
-        };
-        let samples = &self.ends.shared.samples;
-        samples
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(recorded);
     }
 }
 
