@@ -22,6 +22,10 @@ const KNOTS: [f64; 2] = [1.5, 4.0];
 /// Growth of the knot spacing along the way.
 const GROWTH: f64 = 0.35;
 
+/// Legs on a chord, in the mean, from which on the tolerance hides the corners between them. Legs and
+/// not poses: a leg may have further poses on it.
+const LEGS_PER_CHORD: usize = 3;
+
 /// Chords over the points of a list, from corner to corner.
 #[derive(Clone, Debug)]
 pub(super) struct Chords {
@@ -75,6 +79,12 @@ impl Chords {
     /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.corners.len() - 1
+    }
+
+    /// Whether the tolerance shows the corners of a list that does not turn: its curve is not nearly
+    /// known. Orientations are better fitted all the same.
+    pub(super) fn shows_corners<const D: usize>(&self, points: &[SVector<f64, D>]) -> bool {
+        D == 3 && Self::legs(points).count() < LEGS_PER_CHORD * self.count()
     }
 
     /// The point at which the way turns back, if it does: the fit of one curve ends there.

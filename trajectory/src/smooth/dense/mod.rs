@@ -13,7 +13,9 @@ mod basis;
 mod chords;
 mod curve;
 mod fit;
+mod fitted;
 mod places;
+mod profile;
 mod section;
 mod spans;
 mod time_parameter;
@@ -26,6 +28,7 @@ use super::options::SmoothOptions;
 use super::rest::RestCause;
 use crate::line::{Line, body_turn};
 use chords::Chords;
+pub use fitted::FittedCurve;
 use places::Units;
 use section::Section;
 
@@ -49,25 +52,31 @@ const BOTH: usize = 64;
 /// A motion from rest in the first pose to rest in the last along fitted curves; `None` where a limit
 /// is missing or a list cannot be fitted. The options are finite.
 pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
-    let limits = &options.limits;
-    let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
-    if !limited || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
+    if !is_limited(options) {
         return None;
     }
     let poses = moved(given);
     if poses.len() < FEWEST {
         return None;
     }
-    let far = |pair: &[Isometry3<f64>]| {
-        body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION
-    };
-    if !poses.windows(2).any(far) {
+    if !poses.windows(2).any(TURNING) {
         sections::<3>(&poses, options)
     } else if options.angular_tolerance() > 1e3 * RESOLUTION {
         sections::<7>(&poses, options)
     } else {
         None
     }
+}
+
+/// Whether the orientation changes from one pose to the next.
+const TURNING: fn(&[Isometry3<f64>]) -> bool =
+    |pair| body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION;
+
+/// Whether a time law has limits, and a fit some room.
+fn is_limited(options: &SmoothOptions) -> bool {
+    let limits = &options.limits;
+    let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
+    limited && options.tolerance > RESOLUTION && options.corridor() > RESOLUTION
 }
 
 /// Whether most legs are short beside the way of braking.

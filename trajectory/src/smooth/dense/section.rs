@@ -26,7 +26,7 @@ const GAIN: f64 = 1e-3;
 /// Times that a section is fitted with smaller balls where they were missed.
 const ATTEMPTS: usize = 8;
 /// Knots of a fit in a ramp of the acceleration.
-const FIT_KNOTS: f64 = 6.0;
+pub(super) const FIT_KNOTS: f64 = 6.0;
 /// Share of the tolerance that the spans may cut off corners.
 const CUT: f64 = 0.1;
 /// Least number of knots of the spans in a ramp of the acceleration, most of a section.
@@ -44,12 +44,9 @@ const STRETCH: f64 = 1.15;
 const LOWER: f64 = 0.98;
 const LEAST: f64 = 0.2;
 /// Factors on the number of knots, one after the other until a fit succeeds.
-const DENSITIES: [f64; 3] = [1.0, 1.6, 2.6];
+pub(super) const DENSITIES: [f64; 3] = [1.0, 1.6, 2.6];
 /// Where the orientation counts, one after the other, each with all densities.
-const ORIENTATIONS: [Orientation; 2] = [Orientation::Along, Orientation::AtPoses];
-/// Legs on a chord, in the mean, from which on the tolerance hides the corners between them. Legs and
-/// not poses: a leg may have further poses on it.
-const LEGS_PER_CHORD: usize = 3;
+pub(super) const ORIENTATIONS: [Orientation; 2] = [Orientation::Along, Orientation::AtPoses];
 
 /// A part of a dense list that begins and ends at rest.
 #[derive(Clone, Copy, Debug)]
@@ -125,7 +122,7 @@ impl<'a, const D: usize> Section<'a, D> {
         let parameters = chords.parameters(&points);
         // Where the tolerance shows the corner at each pose, the curve is not nearly known; orientations
         // are better fitted all the same.
-        let coarse = D == 3 && Chords::legs(&points).count() < LEGS_PER_CHORD * chords.count();
+        let coarse = chords.shows_corners(&points);
         let mut failure = Failure::Missed(self.poses.len() / 2);
         let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
         for (density, orientation) in ways.into_iter().flatten() {
@@ -256,7 +253,9 @@ impl<'a, const D: usize> Section<'a, D> {
     /// Parameters for the poses that run like the time of a law.
     fn time_parameters(&self, best: &TimedCurve<D>, density: f64) -> Vec<f64> {
         let ramp = self.options.limits.acceleration / self.options.limits.jerk;
-        TimeParameter::new(&best.curve, &best.timed.law, ramp, density * FIT_KNOTS)
+        let law = &best.timed.law;
+        let timed = (|time| law.sample(time).position[0], law.duration());
+        TimeParameter::new(&best.curve, timed, ramp, density * FIT_KNOTS)
             .map(&best.curve.fit.parameters)
     }
 
@@ -325,7 +324,7 @@ fn lower(limits: &mut ToolLimits, certificate: &Certificate) {
 }
 
 /// Parameters that have so many times the knots.
-fn scaled(parameters: &[f64], density: f64) -> Vec<f64> {
+pub(super) fn scaled(parameters: &[f64], density: f64) -> Vec<f64> {
     let end = parameters.last().copied().unwrap_or(1.0);
     let factor = (density * end).round() / end;
     parameters.iter().map(|x| x * factor).collect()
