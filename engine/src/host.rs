@@ -3,21 +3,16 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crcl::{Located, ReadOptions};
-use ipc::{
-    Answer, Arm, ClientServer, FollowPoint, Identity, IpcError, Ownership, StatusWriter, Verb,
-};
+use ipc::{Answer, Arm, ClientServer, Identity, IpcError, Ownership, StatusWriter, Verb};
 use planner::robot::Robot;
-use planner::timed::{TimedPoint, TimedTrajectory};
 use serde_json::{Value, json};
 use servo::ExecutorError;
 
+use crate::asked;
 use crate::control::ControlThread;
 use crate::flight::{Flight, FlightOptions, Recorded};
-use crate::queue::Given;
-use crate::session::{
-    Jog, JogSpace, Note, RunSample, Session, SessionConfig, SessionError, Status,
-};
+use crate::once::TakenOnce;
+use crate::session::{Note, RunSample, Session, SessionConfig, SessionError, Status};
 use crate::texts::Texts;
 pub use crate::texts::{GivenProgram, length_word};
 
@@ -65,6 +60,7 @@ pub struct Host<D> {
     channels: ClientChannels,
     reported: Option<Instant>,
     ownership: Ownership,
+    once: TakenOnce,
     notes: VecDeque<Value>,
     count: u64,
     shutdown: bool,
@@ -100,6 +96,7 @@ impl<D> Host<D> {
             channels,
             reported: None,
             ownership: Ownership::default(),
+            once: TakenOnce::new(),
             notes: VecDeque::new(),
             count: 0,
             shutdown: false,
@@ -256,6 +253,7 @@ impl<D> Host<D> {
             session,
             channels,
             ownership,
+            once,
             notes,
             count,
             shutdown,
@@ -267,6 +265,9 @@ impl<D> Host<D> {
             ..
         } = self;
         channels.requests.serve(|request| {
+            if let Some(answer) = once.answer(&request.ask) {
+                return answer;
+            }
             let status = told(session.status(), recorded.as_deref());
             if let Err(refusal) = ownership.admit(&request, !status.idle) {
                 return refusal;
@@ -275,24 +276,21 @@ impl<D> Host<D> {
                 Verb::Status => Answer::accept(json!({
                     "status": status,
                     "last_note": *count,
+                    "session": once.session(),
                     "program": texts.program(),
                     "period_ns": (1e9 / *rate_hz).round(),
                 })),
                 Verb::Text { of, from } => texts.part(&of, from),
-                Verb::Notes { since } => later(notes, since),
+                Verb::Notes { since } => later(notes, since, once.session()),
                 Verb::Shutdown => {
                     *shutdown = true;
                     Answer::accept(Value::Null)
                 }
-                Verb::Submit {
-                    format,
-                    name,
-                    program,
-                } => {
+                verb @ (Verb::Submit { .. } | Verb::SubmitOnce { .. }) => {
                     let start = status.idle.then_some(status.setpoint);
-                    let answer = submit(session, &format, &name, &program);
-                    if answer.accepted {
-                        let given = GivenProgram::taken(&answer, format, name, program, start);
+                    let answer = asked::submit(session, &verb);
+                    once.keep(&verb, &answer);
+                    if let Some(given) = GivenProgram::taken(&answer, verb, start) {
                         let given = given.in_unit(default_length);
                         if let Some(flight) = flight {
                             flight.program(&given, None);
@@ -301,36 +299,9 @@ impl<D> Host<D> {
                     }
                     answer
                 }
-                other => asked(session, other),
+                other => asked::of_session(session, other),
             }
         })
-    }
-}
-
-/// Asks the session for what concerns it alone.
-fn asked(session: &Session, verb: Verb) -> Answer {
-    match verb {
-        Verb::Replace {
-            format,
-            name,
-            program,
-        } => replace(session, &format, &name, &program),
-        jog @ Verb::Jog { .. } => jog_for(session, jog),
-        follow @ Verb::Follow { .. } => self::follow(session, follow),
-        Verb::SingleStep { on } => {
-            session.set_single_step(on);
-            Answer::accept(Value::Null)
-        }
-        Verb::Next => done(session.step_on()),
-        _ => Answer::refuse("this engine cannot do that"),
-    }
-}
-
-/// The answer to a request that gives nothing back.
-fn done<E: std::fmt::Display>(result: Result<(), E>) -> Answer {
-    match result {
-        Ok(()) => Answer::accept(Value::Null),
-        Err(error) => Answer::refuse(error.to_string()),
     }
 }
 
@@ -344,7 +315,7 @@ fn told(mut status: Status, recorded: Option<&str>) -> Status {
 }
 
 /// The notes after number `since`, as many as one answer holds; the client asks again for more.
-fn later(notes: &VecDeque<Value>, since: u64) -> Answer {
+fn later(notes: &VecDeque<Value>, since: u64, session: &str) -> Answer {
     let mut room = NOTES;
     let later = notes
         .iter()
@@ -360,7 +331,7 @@ fn later(notes: &VecDeque<Value>, since: u64) -> Answer {
             None => None,
         }
     });
-    Answer::accept(json!({"notes": page.collect::<Vec<_>>()}))
+    Answer::accept(json!({"notes": page.collect::<Vec<_>>(), "session": session}))
 }
 
 /// A note whose long texts are cut.
@@ -380,120 +351,4 @@ fn cut(note: &Value) -> Value {
         }
     }
     note
-}
-
-/// Takes a program of a client: all its commands or none.
-fn submit(session: &Session, format: &str, name: &str, program: &str) -> Answer {
-    match read(format, name, program) {
-        Ok(commands) => taken(session.submit(commands)),
-        Err(refusal) => refusal,
-    }
-}
-
-/// Executes a move in the place of the one that moves.
-fn replace(session: &Session, format: &str, name: &str, program: &str) -> Answer {
-    match read(format, name, program) {
-        Ok(commands) => taken(session.replace(commands)),
-        Err(refusal) => refusal,
-    }
-}
-
-/// The commands of a program, or the answer that says what is wrong with it.
-fn read(format: &str, name: &str, program: &str) -> Result<Vec<Located>, Answer> {
-    let read = match format {
-        "text" => crcl::text::read,
-        "json" => crcl::json::read,
-        "xml" => crcl::xml::read,
-        other => {
-            let why = format!("a program is text, json or xml, not {other:?}");
-            return Err(Answer::refuse(why));
-        }
-    };
-    let reading = read(program, &ReadOptions::default());
-    if reading.has_errors() {
-        let source = crcl::Source::new(name, program);
-        let text = crcl::render(
-            &reading.findings,
-            reading.omitted,
-            &source,
-            (crcl::Look::Plain, 100),
-        );
-        return Err(Answer::refuse(text.trim_end()));
-    }
-    Ok(reading.program.commands)
-}
-
-/// The numbers of commands that were taken, as an answer.
-fn taken(ids: Result<Vec<u32>, impl std::fmt::Display>) -> Answer {
-    match ids {
-        Ok(ids) => Answer::accept(json!({
-            "first": ids.first(),
-            "last": ids.last(),
-            "commands": ids.len(),
-        })),
-        Err(refusal) => Answer::refuse(refusal.to_string()),
-    }
-}
-
-/// Takes a trajectory with times of its own into the queue.
-fn follow(session: &Session, verb: Verb) -> Answer {
-    let Verb::Follow {
-        joints,
-        points,
-        retime,
-    } = verb
-    else {
-        return Answer::refuse("this is no trajectory");
-    };
-    taken(session.give(vec![Given::Timed(TimedTrajectory {
-        joints,
-        points: points.into_iter().map(timed_point).collect(),
-        retime,
-    })]))
-}
-
-/// A point as the planner takes it.
-fn timed_point(point: FollowPoint) -> TimedPoint {
-    TimedPoint {
-        time: point.time_s,
-        positions: point.positions,
-        velocities: point.velocities,
-        accelerations: point.accelerations,
-    }
-}
-
-/// Jogs for as long as the client sends requests.
-fn jog_for(session: &Session, verb: Verb) -> Answer {
-    let Verb::Jog {
-        space,
-        speeds,
-        timeout_ms,
-        distance,
-        goal,
-    } = verb
-    else {
-        return Answer::refuse("this is no jog");
-    };
-    let space = match space.as_str() {
-        "joint" => JogSpace::Joint,
-        "tool" => JogSpace::Tool,
-        "workstation" => JogSpace::Workstation,
-        "base" => JogSpace::Base,
-        "goal" => JogSpace::Goal,
-        other => {
-            return Answer::refuse(format!(
-                "a jog is in joint, tool, workstation or base space or towards a goal, not {other:?}"
-            ));
-        }
-    };
-    match session.jog(Jog {
-        space,
-        speeds,
-        timeout: Duration::from_millis(timeout_ms),
-        distance,
-        goal,
-    }) {
-        Ok(()) => Answer::accept(Value::Null),
-        Err(error) => Answer::refuse(error.to_string()),
-    }
 }

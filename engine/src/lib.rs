@@ -13,12 +13,14 @@
 #![forbid(unsafe_code)]
 
 pub mod arm_motion;
+mod asked;
 pub mod control;
 pub mod doctor;
 pub mod equipment;
 pub mod flight;
 pub mod host;
 pub mod off_path;
+mod once;
 pub mod queue;
 mod recent;
 pub mod recorded_arm;

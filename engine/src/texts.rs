@@ -1,7 +1,7 @@
 //! Long texts that clients ask for, in parts that fit into an answer.
 
 use crcl::LengthUnit;
-use ipc::Answer;
+use ipc::{Answer, Verb};
 use planner::robot::Robot;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -29,24 +29,32 @@ pub struct GivenProgram {
 }
 
 impl GivenProgram {
-    /// The program (form, name, text) that the answer is about; the arm stood at `start` then.
-    pub(crate) fn taken(
-        answer: &Answer,
-        form: String,
-        name: String,
-        text: String,
-        start: Option<Vec<f64>>,
-    ) -> Self {
+    /// The program that the answer is about, if it was taken; the arm stood at `start` then.
+    pub(crate) fn taken(answer: &Answer, verb: Verb, start: Option<Vec<f64>>) -> Option<Self> {
+        let (Verb::Submit {
+            format,
+            name,
+            program,
+        }
+        | Verb::SubmitOnce {
+            format,
+            name,
+            program,
+            ..
+        }) = verb
+        else {
+            return None;
+        };
         let number = |of: &str| answer.body[of].as_u64().unwrap_or(0) as u32;
-        Self {
+        answer.accepted.then(|| Self {
             first: number("first"),
             last: number("last"),
-            form,
+            form: format,
             name,
-            text,
+            text: program,
             start,
             default_length: "mm".to_owned(),
-        }
+        })
     }
 
     /// The unit of length until the program sets one.

@@ -23,6 +23,20 @@ pub enum Verb {
         /// The program.
         program: String,
     },
+    /// Execute a program that has a number of its sender's. A sender that got no answer sends the same
+    /// again: the engine takes a number once, and answers as the first time.
+    SubmitOnce {
+        /// The number: 1 to 100 ASCII letters, digits and signs, different for each program.
+        id: String,
+        /// The session of the engine that it is for, as [`Verb::Status`] tells it.
+        session: String,
+        /// `text`, `json` or `xml`.
+        format: String,
+        /// The program's name, for messages.
+        name: String,
+        /// The program.
+        program: String,
+    },
     /// Execute a move in the place of the one that moves now, in the same state of motion and without
     /// a stop; refused where that is not possible, and the old move goes on.
     Replace {
@@ -93,6 +107,7 @@ impl Verb {
     pub fn commands(&self) -> bool {
         match self {
             Self::Submit { .. }
+            | Self::SubmitOnce { .. }
             | Self::Replace { .. }
             | Self::Jog { .. }
             | Self::Follow { .. }

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 24] = [
+const ARROWS: [(&str, &[&str]); 26] = [
     (
         "cli",
         &[
@@ -29,6 +29,7 @@ const ARROWS: [(&str, &[&str]); 24] = [
             "driver-franka",
             "driver-ur",
             "driver-kuka",
+            "driver-cia402",
             "driver-conformance",
         ],
     ),
@@ -52,6 +53,7 @@ const ARROWS: [(&str, &[&str]); 24] = [
     ("plan", &["crcl"]),
     ("crcl-tcp", &["crcl", "ipc"]),
     ("canter-ros2", &["ipc", "scheduling"]),
+    ("canter-fleet", &["ipc"]),
     (
         "engine",
         &[
@@ -75,6 +77,7 @@ const ARROWS: [(&str, &[&str]); 24] = [
     ("driver-franka", &["driver-kit", "ipc", "scheduling"]),
     ("driver-ur", &["driver-kit", "ipc", "scheduling"]),
     ("driver-kuka", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-cia402", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
     ("kinematics", &["simd"]),
@@ -87,14 +90,14 @@ const ARROWS: [(&str, &[&str]); 24] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 16] = [
+const FENCES: [(&str, &[&str]); 20] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
     ("iceoryx2", &["ipc"]),
     ("rusqlite", &["plan"]),
     ("anyhow", &["cli"]),
-    ("clap", &["cli", "canter-ros2"]),
+    ("clap", &["cli", "canter-ros2", "canter-fleet"]),
     ("mcap", &["recorder"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
@@ -102,11 +105,21 @@ const FENCES: [(&str, &[&str]); 16] = [
     ("numpy", &["canter-python"]),
     ("ros2-client", &["canter-ros2"]),
     ("socket2", &["canter-ros2"]),
+    ("zenoh", &["canter-fleet"]),
+    ("ratatui", &["canter-fleet"]),
+    ("rcgen", &["canter-fleet"]),
     (
         "rtrb",
-        &["servo", "driver-franka", "driver-ur", "driver-kuka"],
+        &[
+            "servo",
+            "driver-franka",
+            "driver-ur",
+            "driver-kuka",
+            "driver-cia402",
+        ],
     ),
-    ("libc", &["ipc", "scheduling"]),
+    ("libc", &["ipc", "scheduling", "driver-cia402"]),
+    ("ethercrab", &["driver-cia402"]),
 ];
 
 const OUTERMOST: [&str; 2] = ["system-tests", "benches"];

@@ -1,0 +1,7 @@
+//! The program `canter-fleet`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    canter_fleet::main()
+}
