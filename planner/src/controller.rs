@@ -10,7 +10,7 @@ use trajectory::{JointLimits, ToolLimits};
 
 use crate::command_error::{CommandError, ErrorClass};
 use crate::modal::Modal;
-use crate::motion::{MotionError, PlannedMove, Planner};
+use crate::motion::{MotionError, MoveWindow, PlannedMove, Planner, WindowedMove};
 use crate::robot::{Robot, RobotError, vector};
 use crate::task::{Move, Shape, Task};
 use crate::timed::TimedTrajectory;
@@ -208,6 +208,41 @@ impl<const N: usize> Controller<N> {
         self.moved(motion, planned)
     }
 
+    /// Begins a long smooth move whose whole way can be checked before its time law is planned: see
+    /// [`Planner::windows`]. The joints are then where it ends. `None` for every other command, and
+    /// for one with guards: [`Self::step`] plans it; the controller is then unchanged.
+    pub fn begin(&mut self, command: &crcl::Command) -> Option<WindowedMove<N>> {
+        use crcl::Command::{MoveSmoothlyTo, MoveThroughTo};
+        if !matches!(command, MoveSmoothlyTo { .. } | MoveThroughTo { .. }) {
+            return None;
+        }
+        let flange = self.workstation_from_flange.forward(&self.joints);
+        let mut modal = self.modal.clone();
+        let Ok(Task::Move(motion)) = modal.resolve(command, &flange) else {
+            return None;
+        };
+        if !modal.take_guards().is_empty() {
+            return None;
+        }
+        let windowed = self.planner.windows(&motion, &self.joints)?;
+        self.modal = modal;
+        self.plans += 1;
+        self.joints = *windowed.end();
+        Some(windowed)
+    }
+
+    /// The next window of a move that was begun.
+    ///
+    /// # Errors
+    /// A [`CommandError`] when the move cannot go on; the arm then rests on the way, where the last
+    /// window ended.
+    pub fn next_window(
+        &self,
+        windowed: &mut WindowedMove<N>,
+    ) -> Result<MoveWindow<N>, CommandError> {
+        self.planner.window_of(windowed).map_err(refused)
+    }
+
     /// The step of a task, from where the arm is.
     fn plan(&mut self, task: Task) -> Result<Step<N>, CommandError> {
         let (planner, start) = (&self.planner, &self.joints);
@@ -284,9 +319,7 @@ impl<const N: usize> Controller<N> {
         planned: Result<PlannedMove<N>, MotionError>,
     ) -> Result<Step<N>, CommandError> {
         self.plans += 1;
-        let planned = planned.map_err(|error| {
-            CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
-        })?;
+        let planned = planned.map_err(refused)?;
         self.joints = planned.end;
         Ok(Step {
             ticks: self.ticks(planned.trajectory.duration()),
@@ -369,4 +402,9 @@ impl<const N: usize> Controller<N> {
             .with_efforts(self.planner.efforts().cloned());
         }
     }
+}
+
+/// A motion that cannot be planned, as the error of its command.
+fn refused(error: MotionError) -> CommandError {
+    CommandError::new(ErrorClass::Motion, error.to_string()).with_help(error.help())
 }

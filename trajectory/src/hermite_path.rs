@@ -38,6 +38,11 @@ impl<const N: usize, C: ToolCurve> HermitePath<N, C> {
         &self.tool
     }
 
+    /// Last parameter value.
+    pub fn last(&self) -> f64 {
+        self.at[self.at.len() - 1]
+    }
+
     /// The joints and their three derivatives at `u`.
     fn joints(&self, u: f64) -> JointPoint<N> {
         let last = self.at.len() - 1;

@@ -29,7 +29,7 @@ pub enum Note {
         line: usize,
         /// Name of the command.
         name: &'static str,
-        /// Length that was planned, s.
+        /// Length that was planned, s; of a long smooth move, of what is planned so far.
         planned_s: f64,
         /// Servo period of the start.
         tick: u64,

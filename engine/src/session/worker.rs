@@ -5,6 +5,7 @@ mod jogging;
 mod replacing;
 mod reports;
 mod sampling;
+mod streaming;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -19,6 +20,7 @@ use trajectory::{ToolLimits, Trajectory};
 use guarding::Guarding;
 use jogging::Jogging;
 use sampling::Sampling;
+use streaming::Streaming;
 
 use super::note::Note;
 use super::status::state_name;
@@ -27,6 +29,7 @@ use crate::queue::Given;
 use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
+use planner::motion::WindowedMove;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
@@ -88,6 +91,8 @@ pub(super) struct Worker<'a, const N: usize> {
     pub(super) work: VecDeque<Work<N>>,
     pub(super) flight: VecDeque<InFlight<N>>,
     jogging: Option<Jogging>,
+    /// The move under way that is not planned to its end.
+    streaming: Option<Streaming<N>>,
     /// Number of the newest order when a refusal held the arm; a later `Resume` releases it.
     held: Option<u32>,
     pub(super) fault: Option<String>,
@@ -172,6 +177,7 @@ fn start<'a, const N: usize>(
         work: VecDeque::new(),
         flight: VecDeque::new(),
         jogging: None,
+        streaming: None,
         held: None,
         fault: None,
         spliced: None,
@@ -188,12 +194,15 @@ impl<const N: usize> Worker<'_, N> {
         self.read_reports();
         self.report_done();
         self.watch_jog();
-        if self.may_take() {
+        if self.wants_window() {
+            self.sender.settle(None);
+            self.plan_window();
+        } else if self.may_take() {
             self.sender.settle(None);
             self.take_next();
         }
         let all_fits = self.feed();
-        if !all_fits || !self.may_take() {
+        if !all_fits || !(self.may_take() || self.wants_window()) {
             self.sender.settle(Some(self.events.seen()));
         }
     }
@@ -205,6 +214,7 @@ impl<const N: usize> Worker<'_, N> {
             && !self.is_held()
             && self.fault.is_none()
             && self.jogging.is_none()
+            && self.streaming.is_none()
             // Where a guarded command ends is not known before.
             && self.flight.iter().all(|flight| flight.guarding.is_none())
             // During an abort it is not known where the next command begins.
@@ -220,7 +230,7 @@ impl<const N: usize> Worker<'_, N> {
 
     fn read_orders(&mut self) {
         let waiting = self.ends.shared.inbox().has(self.epoch) && self.flight.len() < AHEAD;
-        let busy = !self.work.is_empty() || waiting;
+        let busy = !self.work.is_empty() || waiting || self.streaming.is_some();
         // In lock-step the driver waits for this thread.
         let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();
         let wait = Duration::from_micros(if busy || stepping { 20 } else { 500 });
@@ -285,6 +295,11 @@ impl<const N: usize> Worker<'_, N> {
             guarding: None,
             motion: None,
         };
+        if let Some(windowed) = self.begin(&given) {
+            self.stream(&mut flight, windowed);
+            self.flight.push_back(flight);
+            return;
+        }
         match self.step(given) {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
@@ -323,6 +338,18 @@ impl<const N: usize> Worker<'_, N> {
             dropped,
         });
         flight.refused = true;
+    }
+
+    /// The way of a long smooth move that was not planned before, checked, if its windows can be
+    /// planned while it moves.
+    fn begin(&mut self, given: &Given) -> Option<WindowedMove<N>> {
+        match given {
+            Given::Command {
+                located,
+                planned: None,
+            } => self.controller.begin(&located.command),
+            _ => None,
+        }
     }
 
     /// The step of what left the queue: planned before, or planned now.

@@ -2,7 +2,7 @@
 
 use trajectory::Trajectory;
 
-use super::{ActiveLimit, LimitReport, MoveCertificate, Peaks, PlannedMove};
+use super::{ActiveLimit, CrossingReport, LimitReport, MoveCertificate, Peaks, PlannedMove};
 
 impl<const N: usize> PlannedMove<N> {
     /// The motions one after the other, each of which begins where the one before it rests; none of
@@ -17,6 +17,27 @@ impl<const N: usize> PlannedMove<N> {
                 blend: None,
             }
         })
+    }
+}
+
+impl MoveCertificate {
+    /// What holds of two parts of one smooth move, the second of which goes on where the first ends.
+    pub(super) fn followed_by(self, second: Self) -> Self {
+        let after = self.duration_s;
+        let corridors = [self.corridor_m, second.corridor_m].into_iter().flatten();
+        let corridor_m = corridors.reduce(f64::max);
+        let (mut first, mut second) = (self, second);
+        let mut poses = std::mem::take(&mut first.poses);
+        let later = std::mem::take(&mut second.poses).into_iter();
+        poses.extend(later.map(|pass| CrossingReport {
+            time_s: pass.time_s + after,
+            ..pass
+        }));
+        Self {
+            poses,
+            corridor_m,
+            ..both(first, second)
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use realtime::Sample;
 use trajectory::ToolLimits;
 
 use super::jog::Direction;
-use super::{MotionError, PlannedMove, Planner};
+use super::{MotionError, MoveWindow, PlannedMove, Planner, WindowedMove};
 use crate::task::{JointMove, LegsMove, Move, ScrewMove};
 use crate::timed::TimedTrajectory;
 use crate::with_dof;
@@ -40,6 +40,8 @@ pub(super) struct Kernel<const N: usize> {
     pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
     pub timed: Timed<N>,
     pub postures: Postures<N>,
+    pub windows: fn(&Planner<N>, &Move, &SVector<f64, N>) -> Option<WindowedMove<N>>,
+    pub window_of: fn(&Planner<N>, &mut WindowedMove<N>) -> Result<MoveWindow<N>, MotionError>,
 }
 
 impl<const N: usize> std::fmt::Debug for Kernel<N> {
@@ -72,6 +74,8 @@ fn table(dof: usize) -> &'static dyn Any {
             moving: Planner::plan_moving,
             timed: Planner::plan_timed,
             postures: Planner::find_postures,
+            windows: Planner::begin_windows,
+            window_of: Planner::next_window,
         };
         &KERNEL
     })

@@ -28,6 +28,7 @@ mod smooth;
 mod soonest;
 mod timed;
 mod timed_refusal;
+mod windowed;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
@@ -43,8 +44,9 @@ pub use fault::Fault;
 pub use jog::Direction;
 pub use motion_error::MotionError;
 pub use timed_refusal::TimedRefusal;
+pub use windowed::{MoveWindow, WindowedMove};
 
-use certificate::Arm;
+use certificate::{Arm, Way};
 use draft::Draft;
 use kernel::Kernel;
 
@@ -220,6 +222,28 @@ impl<const N: usize> Planner<N> {
         (self.kernel.timed)(self, timed, start, most)
     }
 
+    /// Checks the whole way of a long smooth move from `start`, at rest, without its time law. The
+    /// windows of [`Self::window_of`] together are the motion of [`Self::plan`]. `None` for a move
+    /// that is planned as a whole.
+    ///
+    /// What is known then: a curve passes every pose in order within its tolerances and stays in the
+    /// corridor, and the joints follow all of it on one branch, inside their ranges and away from
+    /// singular places. Such a motion can be timed from rest to rest, from any place to any other.
+    #[must_use]
+    pub fn windows(&self, motion: &Move, start: &SVector<f64, N>) -> Option<WindowedMove<N>> {
+        (self.kernel.windows)(self, motion, start)
+    }
+
+    /// The next window of a move, certified, from the state in which the one before it ends. A stop on
+    /// the way is known at the end of each, and is the next window where no motion goes on.
+    ///
+    /// # Errors
+    /// [`MotionError::OnTheWay`] when no motion begins where the window before it rests; the arm is
+    /// then at rest on the way, within the tolerance.
+    pub fn window_of(&self, windowed: &mut WindowedMove<N>) -> Result<MoveWindow<N>, MotionError> {
+        (self.kernel.window_of)(self, windowed)
+    }
+
     /// Joint positions (rad, m) that hold the controlled point at `pose`, inside the range of the
     /// joints: all branches, the nearest to `near` first.
     #[must_use]
@@ -304,6 +328,14 @@ impl<const N: usize> Planner<N> {
         let lower_bound_s = self.least_time(motion, start, &end.position, draft);
         let from = self.chain().forward(start);
         let way = certificate::way(motion, self.chain(), &from, draft, bounds);
+        MoveCertificate {
+            lower_bound_s,
+            ..self.proved(draft, bounds, way)
+        }
+    }
+
+    /// The same without the least time.
+    fn proved(&self, draft: &Draft<N>, bounds: &MotionBounds<N>, way: Way) -> MoveCertificate {
         let name = |limit| active::name(limit, &self.joint_names);
         let spans = bounds.active(active::ACTIVE).into_iter();
         let active = spans.map(|span| ActiveLimit {
@@ -321,7 +353,7 @@ impl<const N: usize> Planner<N> {
         peaks.joint_effort = efforts.iter().map(|report| report.ratio).collect();
         MoveCertificate {
             duration_s: draft.trajectory.duration(),
-            lower_bound_s,
+            lower_bound_s: 0.0,
             active: active.collect(),
             poses: way.poses,
             in_order: way.in_order,

@@ -94,6 +94,14 @@ pub enum MotionError {
     /// The move cannot begin in the state of motion that the arm is in.
     #[error("the move cannot begin while the arm moves: {0}")]
     FromMotion(&'static str),
+    /// No motion goes on where a long smooth move rests on its way: it ends there.
+    #[error("the motion rests on its way towards pose {pose} and cannot go on: {cause}")]
+    OnTheWay {
+        /// Which pose of the command would be next.
+        pose: usize,
+        /// Why.
+        cause: Box<MotionError>,
+    },
     /// The planned motion failed its own certificate; it is not executed.
     #[error("the planned motion failed its certificate: {0}")]
     Uncertified(#[from] Fault),
@@ -119,7 +127,11 @@ impl MotionError {
             Self::FromMotion(_) => "stop first",
             Self::Timed(refusal) => refusal.help(),
             Self::Smooth(_) => "check the poses and the intermediate point tolerance",
-            Self::Timing(_) | Self::PointToPoint(_) | Self::NoWay | Self::Uncertified(_) => {
+            Self::Timing(_)
+            | Self::PointToPoint(_)
+            | Self::NoWay
+            | Self::OnTheWay { .. }
+            | Self::Uncertified(_) => {
                 "please report this with the program: it is a fault of the planner"
             }
         }

@@ -21,6 +21,9 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
+        if let Some(windowed) = self.begin_windows(motion, start) {
+            return self.all_windows(windowed);
+        }
         let planned = match self.blended(motion, start, motion.tolerance) {
             Err(first)
                 if matches!(first, MotionError::Uncertified(_)) && motion.tolerance > 0.0 =>

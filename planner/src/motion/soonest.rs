@@ -29,6 +29,7 @@ pub(super) const RESTING: TimingOptions = TimingOptions {
     cells: None,
     fit: 1e-8,
     gap: 1e-3,
+    reserve: 0.0,
 };
 
 /// How far one way to one end has been looked at.

@@ -140,7 +140,11 @@ fn turned(
             .map_while(seen),
     );
     let here = seen(approach).map_or(0.0, |(_, angle)| angle);
-    let mut best = (approach, here - 1e-9);
+    // A point that rests from the pass before until the end has no approach of its own.
+    let end = spans.last().map_or(0.0, Span::end);
+    let first = rest.first().map(|(moment, _)| moment.time);
+    let still = approach.time >= end && first.is_some_and(|time| time <= since.time);
+    let mut best = (approach, if still { f64::INFINITY } else { here - 1e-9 });
     for (moment, angle) in rest {
         if angle > best.1 + 1e-9 && best.0 != approach && best.1 <= near[1] {
             break;
@@ -182,4 +186,47 @@ pub(crate) fn settled(
         since = moment(crossing.time);
     }
     approach(spans, since, goal, options.tolerance).is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ToolLimits;
+    use crate::line::body_turn;
+    use crate::smooth::span::Turn;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// One second of an even turn on the spot.
+    fn turn(from: &Isometry3<f64>, to: &Isometry3<f64>, start: f64) -> Span {
+        Span {
+            start,
+            duration: 1.0,
+            point: [Vector3::zeros(); 5],
+            base: from.rotation,
+            turns: vec![Turn {
+                axis: body_turn(&from.rotation, &to.rotation),
+                angle: [0.0, 1.0, 0.0, 0.0, 0.0],
+            }],
+        }
+    }
+
+    /// A tool that only turns passes each pose where it is first turned towards it within the
+    /// tolerance, also if the goal is turned like that pose even more.
+    #[test]
+    fn turns_on_the_spot_are_passed_in_order() {
+        let at = |x: f64, y: f64| {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::new(x, y, 0.0));
+            Isometry3::from_parts(Vector3::zeros().into(), turn)
+        };
+        let poses = [at(0.0, 0.0), at(0.3, 0.15), at(0.6, 0.0), at(0.3, 0.1)];
+        let spans = [
+            turn(&poses[0], &poses[2], 0.0),
+            turn(&poses[2], &poses[3], 1.0),
+        ];
+        let options = SmoothOptions::new(0.01, ToolLimits::UNLIMITED);
+        let passes = crossings(&spans, &poses, &options);
+        assert!(passes.iter().all(Crossing::holds), "{passes:?}");
+        assert!((passes[0].time - 0.5).abs() < 0.05, "{passes:?}");
+        assert!((passes[1].time - 1.0).abs() < 0.05, "{passes:?}");
+    }
 }

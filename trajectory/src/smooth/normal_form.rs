@@ -19,6 +19,8 @@ const LAST: f64 = 1.0 / 17_592_186_044_416.0;
 const SHARE: f64 = 1e-4;
 /// A goal that is nearer to the start than so many grid spacings is not moved to the grid.
 const NEAR: f64 = 1e6;
+/// Distance of both ends of a list that is rounding, in units of the list.
+const ROUNDED: f64 = 1e-14;
 /// Relative difference of two lengths below which they tell no direction.
 const EVEN: f64 = 1e-6;
 /// Limits from these on are none: speed, acceleration, jerk.
@@ -79,7 +81,9 @@ impl NormalForm {
         let goal = frame.inv_mul(&goal).translation.vector / unit;
         let mut missing = goal - poses[last].translation.vector;
         if goal.norm() < NEAR * grid {
-            poses[last].translation.vector = goal;
+            // A list that closes has the same place at both ends, but for rounding.
+            let apart = goal.norm() > ROUNDED;
+            poses[last].translation.vector = if apart { goal } else { Vector3::zeros() };
             missing = Vector3::zeros();
         }
         Self {

@@ -18,6 +18,8 @@ const NARROWINGS: usize = 60;
 const STEPS: usize = 6;
 /// Times that rows are tightened between the grid points.
 const ROUNDS: usize = 10;
+/// Share of the law's time in which the reserve grows.
+const GROWING: f64 = 0.2;
 /// What a given state may exceed the limits by.
 const ROUNDING: f64 = 1e-6;
 
@@ -27,6 +29,11 @@ pub(super) fn best<const N: usize>(
     gridpoints: &Gridpoints<'_, N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {
+    reserve(
+        &mut problem,
+        &gridpoints.grid.nodes,
+        bounded.options.reserve,
+    );
     problem.release_start();
     let mut interior = Interior::new(&problem);
     for round in 0..ROUNDS {
@@ -44,6 +51,17 @@ pub(super) fn best<const N: usize>(
         ratio: 1.0,
         limit: "between the grid points".to_owned(),
     })
+}
+
+/// Narrows the limits by a share that grows from nothing at the start.
+fn reserve(problem: &mut Problem, nodes: &[f64], share: f64) {
+    let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else {
+        return;
+    };
+    for (k, node) in nodes.iter().enumerate() {
+        let grown = ((node - first) / (GROWING * (last - first))).min(1.0);
+        problem.narrow(k, 1.0 / (1.0 - share * grown));
+    }
 }
 
 /// The draft, if its first piece, which the start state determines, keeps the limits.

@@ -36,6 +36,10 @@ pub struct TimingOptions {
     pub fit: f64,
     /// Relative gap of the duration at which the search stops.
     pub gap: f64,
+    /// Share of every limit, below 1, that a law with a moving start leaves unused once it has moved
+    /// for a fifth of its time. So another law can begin in a state of this one, although its grid is
+    /// another one.
+    pub reserve: f64,
 }
 
 impl Default for TimingOptions {
@@ -47,6 +51,7 @@ impl Default for TimingOptions {
             cells: None,
             fit: 1e-8,
             gap: 1e-3,
+            reserve: 0.0,
         }
     }
 }
@@ -62,6 +67,9 @@ impl TimingOptions {
         rows.extend(self.cells.map(|cells| ("cells", cells as f64)));
         if let Boundary::Moving { rate, .. } = self.start {
             rows.push(("start rate", rate));
+        }
+        if !(0.0..1.0).contains(&self.reserve) {
+            rows.push(("reserve", f64::NAN));
         }
         match rows
             .into_iter()

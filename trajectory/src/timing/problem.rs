@@ -202,6 +202,25 @@ impl Problem {
         wide
     }
 
+    /// Divides all limits in cell `k` by `factor`; the cell of no width behind the last is one of them.
+    pub(super) fn narrow(&mut self, k: usize, factor: f64) {
+        let (l, joints) = (k % LANE, self.joints);
+        let [accelerations, jerks] = [self.tool_accelerations, self.tool_jerks];
+        for slot in [false, true].map(|middle| Self::value_slot(k, middle)) {
+            let rows = self.acceleration[slot * joints..][..joints].iter_mut();
+            let tools = self.norm_acceleration[slot * accelerations..][..accelerations].iter_mut();
+            let lanes = rows.flatten().chain(tools.flatten().flatten());
+            lanes.for_each(|lane| lane[l] *= factor);
+            self.value[slot / 2][slot % 2][1][l] *= factor * factor;
+        }
+        for slot in self.jerk_slots(k) {
+            let rows = self.jerk[slot * joints..][..joints].iter_mut();
+            let tools = self.norm_jerk[slot * jerks..][..jerks].iter_mut();
+            let lanes = rows.flatten().chain(tools.flatten().flatten());
+            lanes.for_each(|lane| lane[l] *= factor);
+        }
+    }
+
     /// Removes the rows of the first node that a given start state determines.
     pub(super) fn release_start(&mut self) {
         for row in self.acceleration[..self.joints].iter_mut().flatten() {

@@ -119,6 +119,7 @@ impl<const N: usize> Worker<'_, N> {
             inbox.drop_all(epoch)
         };
         self.jogging = None;
+        self.streaming = None;
         self.sender.renew();
         self.held = None;
         self.controller.abort();

@@ -3,12 +3,16 @@
 //! They tell where the way bends and how finely the fit has to be divided, and do not see what is
 //! small beside the tolerance.
 
+use std::ops::Range;
+
 use nalgebra::SVector;
 
 use super::places::size;
 
 /// How far a pose may lie from the chord over it, and how far the way may go back along it.
 const NEAR: f64 = 0.4;
+/// The same of poses that count as lying on a straight leg.
+const STRAIGHT: f64 = 0.02;
 /// Chords that are shorter than this do not tell a direction.
 const SHORT: f64 = 4.0;
 /// Cosine of the turn from one chord to the next from which on the way turns back.
@@ -17,6 +21,10 @@ const BACK: f64 = -0.7;
 const KNOTS: [f64; 2] = [1.5, 4.0];
 /// Growth of the knot spacing along the way.
 const GROWTH: f64 = 0.35;
+
+/// Legs on a chord, in the mean, from which on the tolerance hides the corners between them. Legs and
+/// not poses: a leg may have further poses on it.
+const LEGS_PER_CHORD: usize = 3;
 
 /// Chords over the points of a list, from corner to corner.
 #[derive(Clone, Debug)]
@@ -28,6 +36,16 @@ pub(super) struct Chords {
 impl Chords {
     /// The longest chords from the first point on, one after the other.
     pub(super) fn new<const D: usize>(points: &[SVector<f64, D>]) -> Self {
+        Self::within(points, NEAR)
+    }
+
+    /// The legs between the corners of a list: chords that stay nearer than the tolerance shows.
+    pub(super) fn legs<const D: usize>(points: &[SVector<f64, D>]) -> Self {
+        Self::within(points, STRAIGHT)
+    }
+
+    /// The longest chords from which no pose is farther away than `near`.
+    fn within<const D: usize>(points: &[SVector<f64, D>], near: f64) -> Self {
         let last = points.len() - 1;
         let (mut corners, mut from) = (vec![0], 0);
         while from < last {
@@ -36,7 +54,7 @@ impl Chords {
             let mut bad = last + 1;
             while good < last {
                 let to = (from + step).min(last);
-                if spans(points, from, to) {
+                if spans(points, from..to, near) {
                     good = to;
                     step *= 2;
                 } else {
@@ -46,7 +64,7 @@ impl Chords {
             }
             while good + 1 < bad {
                 let middle = good.midpoint(bad);
-                if spans(points, from, middle) {
+                if spans(points, from..middle, near) {
                     good = middle;
                 } else {
                     bad = middle;
@@ -58,10 +76,21 @@ impl Chords {
         Self { corners }
     }
 
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.corners.len() - 1
+    }
+
+    /// Whether the tolerance shows the corners of a list that does not turn: its curve is not nearly
+    /// known. Orientations are better fitted all the same.
+    pub(super) fn shows_corners<const D: usize>(&self, points: &[SVector<f64, D>]) -> bool {
+        D == 3 && Self::legs(points).count() < LEGS_PER_CHORD * self.count()
+    }
+
     /// The point at which the way turns back, if it does: the fit of one curve ends there.
     pub(super) fn turning_points<const D: usize>(&self, points: &[SVector<f64, D>]) -> Vec<usize> {
         let chord = |k: usize| points[self.corners[k + 1]] - points[self.corners[k]];
-        let count = self.corners.len() - 1;
+        let count = self.count();
         let long: Vec<usize> = (0..count).filter(|k| chord(*k).norm() >= SHORT).collect();
         let mut turning = Vec::new();
         for pair in long.windows(2) {
@@ -111,7 +140,7 @@ impl Chords {
     /// Knot spacing at each corner.
     fn spacing<const D: usize>(&self, points: &[SVector<f64, D>]) -> Vec<f64> {
         let chord = |k: usize| points[self.corners[k + 1]] - points[self.corners[k]];
-        let count = self.corners.len() - 1;
+        let count = self.count();
         let lengths: Vec<f64> = (0..count).map(|k| chord(k).norm()).collect();
         let [along, bend] = KNOTS;
         let mut spacing = Vec::with_capacity(count + 1);
@@ -172,7 +201,11 @@ impl Ramp {
 }
 
 /// Whether all points between two are near the chord from one to the other, in order.
-fn spans<const D: usize>(points: &[SVector<f64, D>], from: usize, to: usize) -> bool {
+fn spans<const D: usize>(points: &[SVector<f64, D>], range: Range<usize>, near: f64) -> bool {
+    let Range {
+        start: from,
+        end: to,
+    } = range;
     let chord = points[to] - points[from];
     let length = chord.norm();
     let unit = if length > 0.0 { chord / length } else { chord };
@@ -181,8 +214,8 @@ fn spans<const D: usize>(points: &[SVector<f64, D>], from: usize, to: usize) -> 
         let off = point - points[from];
         let along = off.dot(&unit);
         let away = off - unit * along.clamp(0.0, length);
-        let ordered = along >= most - NEAR;
+        let ordered = along >= most - near;
         most = most.max(along);
-        ordered && size(&away) <= NEAR
+        ordered && size(&away) <= near
     })
 }

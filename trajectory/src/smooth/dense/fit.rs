@@ -15,7 +15,7 @@
 use nalgebra::SVector;
 
 use super::basis::{self, ORDER};
-use super::places::size;
+use super::places::parts;
 use crate::smooth::spline::Band;
 
 /// Share of the balls that the weights aim at.
@@ -26,7 +26,7 @@ const FIRST: f64 = -7.0;
 const ENDS: f64 = 1e8;
 /// Rounds in which weights rise and fall, and rounds in which they only rise until all balls hold.
 const ROUNDS: usize = 14;
-const MORE: usize = 16;
+const MORE: usize = 40;
 /// Largest change of the logarithm of a weight in one round, down and up, and the power of the
 /// error by which it changes.
 const CHANGE: [f64; 2] = [-2.0, 2.0];
@@ -37,11 +37,31 @@ const WEIGHTS: [f64; 2] = [-23.0, 16.0];
 const SPREAD: usize = 2;
 /// After so many rounds the parameters move.
 const MOVED: usize = 3;
+/// Below this share of the square of its speed, in radii of the balls, the place of a pose rests and
+/// only its orientation changes.
+const RESTS: f64 = 1e-4;
 /// Least number of targets in a knot interval.
 const DENSITY: f64 = 2.0;
 
 /// Diagonals of the system, with those that its solver needs free.
 const BAND: usize = 12;
+
+/// Where the orientation of a curve counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Orientation {
+    /// All along the list, where the curve is nearest in place and orientation together.
+    Along,
+    /// At the poses only, where the curve is nearest in place, which is where they are passed.
+    AtPoses,
+}
+
+/// The balls that a curve has to pass.
+#[derive(Clone, Debug)]
+pub(super) struct Balls {
+    /// Radius for each point, as a share of the tolerance.
+    pub(super) radii: Vec<f64>,
+    pub(super) orientation: Orientation,
+}
 
 /// A place that the curve has to pass.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +73,8 @@ struct Target<const D: usize> {
     at: f64,
     /// The way it stands for, in knot intervals.
     share: f64,
+    /// Whether it is a pose of the list.
+    given: bool,
 }
 
 /// A uniform quintic B-spline over `0 ..= spans()`.
@@ -66,17 +88,17 @@ pub(super) struct Fit<const D: usize> {
 impl<const D: usize> Fit<D> {
     /// The curve through balls around `points`, passed about at `parameters`, from the first point
     /// to the last exactly, or the point that is missed most when some ball cannot be kept.
-    /// `radii` are shares of the tolerance.
     pub(super) fn new(
         points: &[SVector<f64, D>],
         parameters: &[f64],
-        radii: &[f64],
+        balls: &Balls,
     ) -> Result<Self, usize> {
         let spans = parameters
             .last()
             .map_or(1, |end| end.round().max(1.0) as usize);
-        let (targets, given) = targets(points, parameters, radii);
+        let (targets, given) = targets(points, parameters, &balls.radii);
         let mut fitting = Fitting {
+            orientation: balls.orientation,
             fit: Self {
                 control: vec![SVector::zeros(); spans + ORDER - 1],
                 parameters: Vec::new(),
@@ -156,6 +178,7 @@ fn targets<const D: usize>(
                     radius: radius.min(radii[i - 1]),
                     at: before + (at - before) * share,
                     share: 0.0,
+                    given: false,
                 });
             }
         }
@@ -165,6 +188,7 @@ fn targets<const D: usize>(
             radius,
             at,
             share: 0.0,
+            given: true,
         });
     }
     // Each target weighs as much as the way it stands for.
@@ -178,6 +202,7 @@ fn targets<const D: usize>(
 
 /// A fit under way.
 struct Fitting<const D: usize> {
+    orientation: Orientation,
     fit: Fit<D>,
     targets: Vec<Target<D>>,
     /// Logarithm of the weight at each knot.
@@ -194,7 +219,8 @@ impl<const D: usize> Fitting<D> {
             if !self.solve() {
                 return Err(missed);
             }
-            if round % MOVED == MOVED - 1 && round < ROUNDS {
+            let again = round >= ROUNDS && self.orientation == Orientation::AtPoses;
+            if (round % MOVED == MOVED - 1 && round < ROUNDS) || again {
                 self.reproject();
             }
             let (worst, target) = self.reweigh(round < ROUNDS);
@@ -262,6 +288,7 @@ impl<const D: usize> Fitting<D> {
 
     /// Moves each parameter to where the curve comes closest, in order.
     fn reproject(&mut self) {
+        let at_poses = self.orientation == Orientation::AtPoses;
         let (last, mut before) = (self.targets.len() - 1, 0.0);
         let end = self.fit.spans() as f64;
         for target in &mut self.targets[1..last] {
@@ -269,10 +296,17 @@ impl<const D: usize> Fitting<D> {
             let off = self.fit.sum(span, basis::value(x)) - target.point;
             let slope = self.fit.sum(span, basis::first(x));
             let bend = self.fit.sum(span, basis::second(x));
-            let fall = slope.norm_squared();
-            let curvature = (fall + off.dot(&bend)).max(0.5 * fall);
+            let product = |a: &SVector<f64, D>, b: &SVector<f64, D>| {
+                let place: f64 = (0..3).map(|d| a[d] * b[d]).sum();
+                (place, a.dot(b))
+            };
+            let (place, both) = product(&slope, &slope);
+            let only = at_poses && place > RESTS * both;
+            let part = |(place, both): (f64, f64)| if only { place } else { both };
+            let fall = part((place, both));
+            let curvature = (fall + part(product(&off, &bend))).max(0.5 * fall);
             if curvature > 0.0 {
-                target.at -= (off.dot(&slope) / curvature).clamp(-0.5, 0.5);
+                target.at -= (part(product(&off, &slope)) / curvature).clamp(-0.5, 0.5);
             }
             target.at = target.at.clamp(before, end);
             before = target.at;
@@ -289,7 +323,9 @@ impl<const D: usize> Fitting<D> {
         let mut errors = vec![0.0_f64; count];
         for (i, target) in self.targets[..last].iter().enumerate().skip(1) {
             let (span, x) = self.fit.locate(target.at);
-            let error = size(&(self.fit.sum(span, basis::value(x)) - target.point)) / target.radius;
+            let [place, turn] = parts(&(self.fit.sum(span, basis::value(x)) - target.point));
+            let free = !target.given && self.orientation == Orientation::AtPoses;
+            let error = place.max(if free { 0.0 } else { turn }) / target.radius;
             if error.is_nan() || error > worst.0 {
                 worst = (error, i);
             }

@@ -13,7 +13,9 @@ mod basis;
 mod chords;
 mod curve;
 mod fit;
+mod fitted;
 mod places;
+mod profile;
 mod section;
 mod spans;
 mod time_parameter;
@@ -26,6 +28,7 @@ use super::options::SmoothOptions;
 use super::rest::RestCause;
 use crate::line::{Line, body_turn};
 use chords::Chords;
+pub use fitted::FittedCurve;
 use places::Units;
 use section::Section;
 
@@ -37,25 +40,26 @@ const FEWEST: usize = 16;
 const LEG: f64 = 1.0 / 16.0;
 /// A leg longer than so many short ones makes a list one of mixed density.
 const LONGEST: f64 = 4.0;
+/// Least share of the time that the turns take which the change of place takes, both at full speed.
+const PLACE: f64 = 0.1;
+/// Most ramps of the acceleration for each pose, in the time at full speed.
+const MOST_RAMPS: f64 = 4.0;
+/// Straight legs with so many poses on each, in the mean, are dense and not split.
+const SPLIT: usize = 4;
 /// Dense lists up to this length are planned in both ways.
 const BOTH: usize = 64;
 
-/// A motion from rest in the first pose to rest in the last, through a dense list; `None` for other
-/// lists, and where a limit is missing. The options are finite.
+/// A motion from rest in the first pose to rest in the last along fitted curves; `None` where a limit
+/// is missing or a list cannot be fitted. The options are finite.
 pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
-    let limits = &options.limits;
-    let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
-    if !limited || options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
+    if !is_limited(options) {
         return None;
     }
     let poses = moved(given);
-    if !is_dense(&poses, options) {
+    if poses.len() < FEWEST {
         return None;
     }
-    let far = |pair: &[Isometry3<f64>]| {
-        body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION
-    };
-    if !poses.windows(2).any(far) {
+    if !poses.windows(2).any(TURNING) {
         sections::<3>(&poses, options)
     } else if options.angular_tolerance() > 1e3 * RESOLUTION {
         sections::<7>(&poses, options)
@@ -64,16 +68,50 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
     }
 }
 
+/// Whether the orientation changes from one pose to the next.
+const TURNING: fn(&[Isometry3<f64>]) -> bool =
+    |pair| body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION;
+
+/// Whether a time law has limits, and a fit some room.
+fn is_limited(options: &SmoothOptions) -> bool {
+    let limits = &options.limits;
+    let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
+    limited && options.tolerance > RESOLUTION && options.corridor() > RESOLUTION
+}
+
 /// Whether most legs are short beside the way of braking.
-pub(super) fn is_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+pub(super) fn is_dense(given: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let poses = moved(given);
     let short = |pair: &&[Isometry3<f64>]| leg(pair, options) <= LEG;
     poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
 }
 
-/// Whether a list needs no other way of planning: it is long, and dense all along.
-pub(super) fn suffices(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+/// Whether a list needs no other way of planning: it is long, and dense all along. Straight legs with few
+/// poses on them count as one leg each.
+pub(super) fn suffices(given: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let poses = moved(given);
+    let points = Units::new(options).points::<3>(&poses);
+    let corners = Chords::legs(&points).corners;
     let even = |pair: &[Isometry3<f64>]| leg(pair, options) <= LONGEST * LEG;
-    poses.len() > BOTH && poses.windows(2).all(even)
+    if poses.len() > SPLIT * corners.len() {
+        return poses.len() > BOTH && poses.windows(2).all(even);
+    }
+    let ends: Vec<_> = corners.iter().map(|i| poses[*i]).collect();
+    ends.len() > BOTH && ends.windows(2).all(even)
+}
+
+/// Whether a list that is not dense may be fitted: the place changes along most of the way, as a curve
+/// through turns on the spot has no direction, and the ramps of the acceleration are not so short that
+/// the motion would have many more spans than the list has poses.
+pub(super) fn may_be_fitted(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let limits = &options.limits;
+    let (mut way, mut turn) = (0.0, 0.0);
+    for pair in poses.windows(2) {
+        way += (pair[1].translation.vector - pair[0].translation.vector).norm();
+        turn += body_turn(&pair[0].rotation, &pair[1].rotation).norm();
+    }
+    let (ramp, time) = (limits.acceleration / limits.jerk, way / limits.speed);
+    time > PLACE * turn / limits.angular_speed && time < MOST_RAMPS * ramp * poses.len() as f64
 }
 
 /// Time of a leg at full speed over the braking time.

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::chords::Chords;
 use super::curve::Curve;
-use super::fit::Fit;
+use super::fit::{Balls, Fit, Orientation};
 use super::places::Units;
 use super::spans;
 use super::time_parameter::TimeParameter;
@@ -24,9 +24,9 @@ const REFITS: usize = 2;
 /// Share of the time that a refit has to gain for another one to be worth while.
 const GAIN: f64 = 1e-3;
 /// Times that a section is fitted with smaller balls where they were missed.
-const ATTEMPTS: usize = 4;
+const ATTEMPTS: usize = 8;
 /// Knots of a fit in a ramp of the acceleration.
-const FIT_KNOTS: f64 = 6.0;
+pub(super) const FIT_KNOTS: f64 = 6.0;
 /// Share of the tolerance that the spans may cut off corners.
 const CUT: f64 = 0.1;
 /// Least number of knots of the spans in a ramp of the acceleration, most of a section.
@@ -44,7 +44,9 @@ const STRETCH: f64 = 1.15;
 const LOWER: f64 = 0.98;
 const LEAST: f64 = 0.2;
 /// Factors on the number of knots, one after the other until a fit succeeds.
-const DENSITIES: [f64; 3] = [1.0, 1.6, 2.6];
+pub(super) const DENSITIES: [f64; 3] = [1.0, 1.6, 2.6];
+/// Where the orientation counts, one after the other, each with all densities.
+pub(super) const ORIENTATIONS: [Orientation; 2] = [Orientation::Along, Orientation::AtPoses];
 
 /// A part of a dense list that begins and ends at rest.
 #[derive(Clone, Copy, Debug)]
@@ -113,34 +115,45 @@ impl<'a, const D: usize> Section<'a, D> {
         }
     }
 
-    /// A certified motion along one curve.
+    /// A certified motion along one curve; the knots are closer together where that fails.
     fn fitted(&self) -> Result<Motion, Failure> {
-        let (mut radii, mut eased) = (vec![1.0; self.poses.len()], false);
-        let mut limits = self.limits();
-        let mut best = self.first(&radii, &limits)?;
-        for _ in 0..REFITS {
-            let before = best.timed.certificate.duration;
-            let next = self.timed(&self.time_parameters(&best), &radii, &limits);
-            let Some(next) = next
-                .ok()
-                .filter(|next| next.timed.certificate.duration < before)
-            else {
-                break;
-            };
-            best = next;
-            if best.timed.certificate.duration > before * (1.0 - GAIN) {
-                break;
+        let points = self.units.points::<D>(self.poses);
+        let chords = Chords::new(&points);
+        let parameters = chords.parameters(&points);
+        // Where the tolerance shows the corner at each pose, the curve is not nearly known; orientations
+        // are better fitted all the same.
+        let coarse = chords.shows_corners(&points);
+        let mut failure = Failure::Missed(self.poses.len() / 2);
+        let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
+        for (density, orientation) in ways.into_iter().flatten() {
+            if D == 3 && orientation == Orientation::AtPoses {
+                continue;
+            }
+            match self.fitted_with(&parameters, density, orientation) {
+                Ok(mut motion) => {
+                    motion.eased |= coarse;
+                    return Ok(motion);
+                }
+                Err(error) => failure = error,
             }
         }
+        Err(failure)
+    }
+
+    /// The same with `density` times as many knots as the chords need.
+    fn fitted_with(
+        &self,
+        parameters: &[f64],
+        density: f64,
+        orientation: Orientation,
+    ) -> Result<Motion, Failure> {
+        let radii = vec![1.0; self.poses.len()];
+        let mut balls = Balls { radii, orientation };
+        let (mut limits, mut eased) = (self.limits(), false);
+        let mut best = self.first(&scaled(parameters, density), density, &balls)?;
         let mut failure = Failure::Missed(self.poses.len() / 2);
         for _ in 0..ATTEMPTS {
-            let mut spans = self.spans(&best);
-            let (mut certificate, mut crossings) = certify(&spans, self.poses, self.options);
-            let over = certificate.worst_limit();
-            if over > 1.0 && over < STRETCH {
-                stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-                (certificate, crossings) = certify(&spans, self.poses, self.options);
-            }
+            let (spans, certificate, crossings) = self.certified(&best);
             if certificate.holds() {
                 return Ok(Motion {
                     eased,
@@ -153,27 +166,51 @@ impl<'a, const D: usize> Section<'a, D> {
                 best.timed = self.law(&best.curve, &limits)?;
                 continue;
             }
-            if let Some(worst) = self.narrow(&mut radii, &certificate, &crossings) {
+            if let Some(worst) = self.narrow(&mut balls.radii, &certificate, &crossings) {
                 failure = Failure::Missed(worst);
             }
-            best = self.timed(&best.curve.fit.parameters, &radii, &limits)?;
+            best = self.timed(&best.curve.fit.parameters, &balls, &limits)?;
         }
         Err(failure)
     }
 
-    /// A first curve with its law; the knots are closer together if that fails.
-    fn first(&self, radii: &[f64], limits: &ToolLimits) -> Result<TimedCurve<D>, Failure> {
-        let points = self.units.points::<D>(self.poses);
-        let parameters = Chords::new(&points).parameters(&points);
-        let mut failure = Failure::Missed(self.poses.len() / 2);
-        for density in DENSITIES {
-            let closer = scaled(&parameters, density);
-            match self.timed(&closer, radii, limits) {
-                Ok(curve) => return Ok(curve),
-                Err(error) => failure = error,
+    /// A curve over the time of its own law, as far as that helps.
+    fn first(
+        &self,
+        parameters: &[f64],
+        density: f64,
+        balls: &Balls,
+    ) -> Result<TimedCurve<D>, Failure> {
+        let limits = self.limits();
+        let mut best = self.timed(parameters, balls, &limits)?;
+        for _ in 0..REFITS {
+            let before = best.timed.certificate.duration;
+            let next = self.timed(&self.time_parameters(&best, density), balls, &limits);
+            let Some(next) = next
+                .ok()
+                .filter(|next| next.timed.certificate.duration < before)
+            else {
+                break;
+            };
+            best = next;
+            if best.timed.certificate.duration > before * (1.0 - GAIN) {
+                break;
             }
         }
-        Err(failure)
+        Ok(best)
+    }
+
+    /// The spans of the motion along a curve, slowed down by a little where their bounds are above a
+    /// limit, with their certificate and passes.
+    fn certified(&self, best: &TimedCurve<D>) -> (Vec<Span>, Certificate, Vec<Crossing>) {
+        let mut spans = self.spans(best);
+        let (mut certificate, mut crossings) = certify(&spans, self.poses, self.options);
+        let over = certificate.worst_limit();
+        if over > 1.0 && over < STRETCH {
+            stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
+            (certificate, crossings) = certify(&spans, self.poses, self.options);
+        }
+        (spans, certificate, crossings)
     }
 
     /// The limits of the tool that rule the time law.
@@ -192,11 +229,11 @@ impl<'a, const D: usize> Section<'a, D> {
     fn timed(
         &self,
         parameters: &[f64],
-        radii: &[f64],
+        balls: &Balls,
         limits: &ToolLimits,
     ) -> Result<TimedCurve<D>, Failure> {
         let points = self.units.points::<D>(self.poses);
-        let fit = Fit::new(&points, parameters, radii).map_err(Failure::Missed)?;
+        let fit = Fit::new(&points, parameters, balls).map_err(Failure::Missed)?;
         let curve = Curve::new(fit, self.units, &self.poses[0]);
         let timed = self.law(&curve, limits)?;
         Ok(TimedCurve { curve, timed })
@@ -214,9 +251,11 @@ impl<'a, const D: usize> Section<'a, D> {
     }
 
     /// Parameters for the poses that run like the time of a law.
-    fn time_parameters(&self, best: &TimedCurve<D>) -> Vec<f64> {
+    fn time_parameters(&self, best: &TimedCurve<D>, density: f64) -> Vec<f64> {
         let ramp = self.options.limits.acceleration / self.options.limits.jerk;
-        TimeParameter::new(&best.curve, &best.timed.law, ramp, FIT_KNOTS)
+        let law = &best.timed.law;
+        let timed = (|time| law.sample(time).position[0], law.duration());
+        TimeParameter::new(&best.curve, timed, ramp, density * FIT_KNOTS)
             .map(&best.curve.fit.parameters)
     }
 
@@ -285,7 +324,7 @@ fn lower(limits: &mut ToolLimits, certificate: &Certificate) {
 }
 
 /// Parameters that have so many times the knots.
-fn scaled(parameters: &[f64], density: f64) -> Vec<f64> {
+pub(super) fn scaled(parameters: &[f64], density: f64) -> Vec<f64> {
     let end = parameters.last().copied().unwrap_or(1.0);
     let factor = (density * end).round() / end;
     parameters.iter().map(|x| x * factor).collect()

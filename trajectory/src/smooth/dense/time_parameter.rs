@@ -4,7 +4,6 @@
 //! fast.
 
 use super::curve::Curve;
-use crate::Trajectory;
 
 /// Samples of a law in one ramp of the acceleration.
 const SAMPLES: usize = 8;
@@ -21,24 +20,21 @@ pub(super) struct TimeParameter {
 }
 
 impl TimeParameter {
-    /// From a curve and its law, averaged over a ramp of the acceleration, `ramp` (s), with so many
+    /// From a curve and its law, which takes `total` (s) and gives the parameter at a time, averaged over a ramp of the acceleration, `ramp` (s), with so many
     /// knots in one. From either end, where the law rests, to the first place where it is fastest, the
     /// speed of that place counts: a curve whose parameter rests would have no direction.
     pub(super) fn new<const D: usize>(
         curve: &Curve<D>,
-        law: &Trajectory<1>,
+        (law, total): (impl Fn(f64) -> f64, f64),
         ramp: f64,
         knots: f64,
     ) -> Self {
-        let total = law.duration();
         let half = SAMPLES / 2;
         let steps = (SAMPLES as f64 * total / ramp)
             .ceil()
             .max(4.0 * half as f64) as usize;
         let step = total / steps as f64;
-        let from: Vec<f64> = (0..=steps)
-            .map(|k| law.sample(k as f64 * step).position[0])
-            .collect();
+        let from: Vec<f64> = (0..=steps).map(|k| law(k as f64 * step)).collect();
         let mut way = vec![0.0];
         let mut before = curve.fit.point(0.0);
         for (k, u) in from.iter().enumerate().skip(1) {

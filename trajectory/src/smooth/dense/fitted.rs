@@ -1,0 +1,239 @@
+//! A curve fitted through a long dense list, for callers that make its time law themselves, part by
+//! part.
+
+use nalgebra::{Isometry3, SVector, Vector3};
+
+use super::chords::Chords;
+use super::curve::Curve;
+use super::fit::{Balls, Fit, Orientation};
+use super::places::Units;
+use super::profile::Profile;
+use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
+use super::time_parameter::TimeParameter;
+use super::{TURNING, is_limited, moved, suffices};
+use crate::line::Line;
+use crate::smooth::exact_stop;
+use crate::smooth::options::SmoothOptions;
+use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
+
+/// Radius of the balls of the fit, as a share of the tolerance, and the largest share that the check
+/// of the curve accepts: the rest is for what follows the curve.
+const AIM: f64 = 0.96;
+const KEPT: f64 = 0.98;
+/// Parts of a knot interval in which the distance from the legs is bounded.
+const PARTS: f64 = 8.0;
+
+/// A smooth curve from the first pose of a long dense list to the last, without times: it passes all
+/// poses between them in order within 0.98 of the tolerances, and stays within 0.98 of the corridor.
+/// That is known of the whole curve before anything moves along it.
+///
+/// As a [`ToolCurve`] its parameter is of no meaning; its derivatives are continuous up to the
+/// fourth.
+#[derive(Clone, Debug)]
+pub struct FittedCurve {
+    kind: Kind,
+    /// Parameter at which each pose between the ends is passed.
+    passes: Vec<f64>,
+    corridor_ratio: f64,
+    exact_stop: f64,
+}
+
+/// A curve of places, or of places and orientations.
+#[derive(Clone, Debug)]
+enum Kind {
+    Places(Curve<3>),
+    Turns(Curve<7>),
+}
+
+impl FittedCurve {
+    /// The curve through a list, the first pose of which is the start. `None` where another way of
+    /// planning may be better or is needed: a list that is short or not dense all along, a way that
+    /// turns back, a tolerance that shows each corner, a fit that fails.
+    ///
+    /// ```
+    /// use nalgebra::Isometry3;
+    /// use trajectory::{ToolCurve, ToolLimits, smooth::{FittedCurve, SmoothOptions}};
+    /// let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
+    /// let at = |i: i32| 0.002 * f64::from(i);
+    /// let poses: Vec<_> = (0..500)
+    ///     .map(|i| Isometry3::translation(0.1 * at(i).cos(), 0.1 * at(i).sin(), 0.0))
+    ///     .collect();
+    /// let curve = FittedCurve::new(&poses, &SmoothOptions::new(1e-4, limits)).unwrap();
+    /// let passed = curve.at(curve.passes()[99]).pose;
+    /// let missed = passed.translation.vector - poses[100].translation.vector;
+    /// assert!(missed.norm() < 1e-4);
+    /// ```
+    #[must_use]
+    pub fn new(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Self> {
+        options.check(poses).ok()?;
+        let options = &options.finite();
+        if !is_limited(options) || !suffices(poses, options) {
+            return None;
+        }
+        let mut list = moved(poses);
+        // The last pose is met exactly, also if it repeats one before it by rounding.
+        *list.last_mut()? = poses[poses.len() - 1];
+        let units = Units::new(options);
+        let (kind, parameters, corridor_ratio) = if list.windows(2).any(TURNING) {
+            let (curve, ratio) = laid::<7>(&list, units, &options.limits)?;
+            let parameters = curve.fit.parameters.clone();
+            (Kind::Turns(curve), parameters, ratio)
+        } else {
+            let (curve, ratio) = laid::<3>(&list, units, &options.limits)?;
+            let parameters = curve.fit.parameters.clone();
+            (Kind::Places(curve), parameters, ratio)
+        };
+        Some(Self {
+            kind,
+            passes: passes(poses, &list, &parameters),
+            corridor_ratio: corridor_ratio * units.length / options.corridor(),
+            exact_stop: exact_stop::duration(poses, &options.limits),
+        })
+    }
+
+    /// Parameter at which each pose between the first and the last is passed, in order.
+    #[must_use]
+    pub fn passes(&self) -> &[f64] {
+        &self.passes
+    }
+
+    /// Bound of the distance from the legs between the poses over the corridor's half width.
+    #[must_use]
+    pub fn corridor_ratio(&self) -> f64 {
+        self.corridor_ratio
+    }
+
+    /// Time the motion would take with a stop at each pose, s.
+    #[must_use]
+    pub fn exact_stop(&self) -> f64 {
+        self.exact_stop
+    }
+}
+
+impl ToolCurve for FittedCurve {
+    fn end(&self) -> f64 {
+        match &self.kind {
+            Kind::Places(curve) => curve.end(),
+            Kind::Turns(curve) => curve.end(),
+        }
+    }
+
+    fn knots(&self) -> Vec<f64> {
+        match &self.kind {
+            Kind::Places(curve) => curve.knots().to_vec(),
+            Kind::Turns(curve) => curve.knots().to_vec(),
+        }
+    }
+
+    fn at(&self, u: f64) -> ToolPoint {
+        match &self.kind {
+            Kind::Places(curve) => curve.tool_at(u),
+            Kind::Turns(curve) => curve.tool_at(u),
+        }
+    }
+}
+
+/// The curve through a list that is checked at every place, and its greatest distance from the legs
+/// in balls; `None` if the list needs another way of planning.
+fn laid<const D: usize>(
+    poses: &[Isometry3<f64>],
+    units: Units,
+    limits: &ToolLimits,
+) -> Option<(Curve<D>, f64)> {
+    let points = units.points::<D>(poses);
+    let chords = Chords::new(&points);
+    if !chords.turning_points(&points).is_empty() || chords.shows_corners(&points) {
+        return None;
+    }
+    let parameters = chords.parameters(&points);
+    let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
+    let checked = |parameters: &[f64], balls: &Balls| {
+        let fit = Fit::new(&points, parameters, balls).ok()?;
+        let far = off_legs(&fit, &points);
+        let good = passes_all(&fit, &points) && far <= KEPT;
+        good.then(|| (Curve::new(fit, units, &poses[0]), far))
+    };
+    for (density, orientation) in ways.into_iter().flatten() {
+        if D == 3 && orientation == Orientation::AtPoses {
+            continue;
+        }
+        let radii = vec![AIM; poses.len()];
+        let balls = Balls { radii, orientation };
+        let Some(first) = checked(&scaled(&parameters, density), &balls) else {
+            continue;
+        };
+        // A curve over the time that it takes bends less where it is fast.
+        let profile = Profile::new(&first.0, limits);
+        let timed = (|time| profile.parameter(time), profile.duration());
+        let ramp = limits.acceleration / limits.jerk;
+        let time = TimeParameter::new(&first.0, timed, ramp, density * FIT_KNOTS);
+        let again = checked(&time.map(&first.0.fit.parameters), &balls);
+        return again.or(Some(first));
+    }
+    None
+}
+
+/// Whether a fit passes all points in order within their balls.
+fn passes_all<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> bool {
+    let ordered = fit.parameters.windows(2).all(|pair| pair[0] <= pair[1]);
+    let near = |(at, point): (&f64, &SVector<f64, D>)| {
+        let off = fit.point(*at) - point;
+        super::places::size(&off) <= KEPT
+    };
+    ordered && fit.parameters.iter().zip(points).all(near)
+}
+
+/// A bound of the distance in place of a fit from the leg that it is on, everywhere.
+///
+/// Between two places the curve is no farther from the chord over them than an eighth of the square
+/// of their distance in the parameter times the largest second derivative, and a chord is no farther
+/// from a leg than its ends are. The second derivative is a cubic spline whose control points are the
+/// second differences of those of the curve, so none is larger than these.
+fn off_legs<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> f64 {
+    let place = |point: &SVector<f64, D>| Vector3::new(point[0], point[1], point[2]);
+    let bends: Vec<f64> = fit
+        .control
+        .windows(3)
+        .map(|c| place(&(c[0] - c[1] * 2.0 + c[2])).norm())
+        .collect();
+    let bend = |span: usize| bends[span..span + 4].iter().copied().fold(0.0, f64::max);
+    let mut most = 0.0_f64;
+    for (leg, at) in points.windows(2).zip(fit.parameters.windows(2)) {
+        let (from, way) = (place(&leg[0]), place(&(leg[1] - leg[0])));
+        let square = way.norm_squared().max(1e-300);
+        let off = |u: f64| {
+            let gap = place(&fit.point(u)) - from;
+            (gap - way * (gap.dot(&way) / square).clamp(0.0, 1.0)).norm()
+        };
+        let mut start = at[0];
+        let mut before = off(start);
+        while start < at[1] {
+            // No part reaches over a knot.
+            let end = (((start * PARTS).floor() + 1.0) / PARTS).min(at[1]);
+            let span = (start as usize).min(fit.spans() - 1);
+            let step = end - start;
+            let after = off(end);
+            most = most.max(before.max(after) + step * step / 8.0 * bend(span));
+            (start, before) = (end, after);
+        }
+    }
+    if most.is_nan() { f64::INFINITY } else { most }
+}
+
+/// The parameter of each pose between the ends of a list, of which `list` has those that differ from
+/// the one before and more between them.
+fn passes(poses: &[Isometry3<f64>], list: &[Isometry3<f64>], parameters: &[f64]) -> Vec<f64> {
+    let (mut kept, mut at) = (poses[0], 0);
+    let mut passes = Vec::with_capacity(poses.len());
+    for pose in &poses[1..poses.len().max(2) - 1] {
+        if !Line::new(kept, *pose).is_still() {
+            kept = *pose;
+            at += 1;
+            while at + 1 < list.len() && list[at] != kept {
+                at += 1;
+            }
+        }
+        passes.push(parameters[at]);
+    }
+    passes
+}

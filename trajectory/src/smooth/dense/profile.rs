@@ -1,0 +1,118 @@
+//! About how fast a curve can be travelled: its time at each place without limits of the jerk.
+//!
+//! # Source
+//! J. E. Bobrow, S. Dubowsky, J. S. Gibson, "Time-optimal control of robotic manipulators along
+//! specified paths", International Journal of Robotics Research 4(3), 1985: the square of the rate has
+//! a greatest value at each place, and rises and falls at most so fast.
+
+use nalgebra::Vector3;
+
+use super::curve::Curve;
+use crate::{Path, ToolLimits};
+
+/// Places in a knot interval.
+const PLACES: f64 = 2.0;
+
+/// Time against the parameter of a curve.
+#[derive(Clone, Debug)]
+pub(super) struct Profile {
+    at: Vec<f64>,
+    time: Vec<f64>,
+}
+
+/// Speed and curvature of place or orientation at one parameter, over their limits.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    /// Rate of change over the largest acceleration.
+    slope: f64,
+    /// Second derivative along the direction of motion and across it, over the largest acceleration.
+    along: f64,
+    across: f64,
+    /// Greatest square of the rate.
+    most: f64,
+}
+
+impl Motion {
+    fn new(first: &Vector3<f64>, second: &Vector3<f64>, speed: f64, acceleration: f64) -> Self {
+        let size = first.norm();
+        let along = if size > 0.0 {
+            second.dot(first) / size
+        } else {
+            0.0
+        };
+        let across = (second.norm_squared() - along * along).max(0.0).sqrt();
+        let fast = (speed / size).powi(2);
+        Self {
+            slope: size / acceleration,
+            along: along / acceleration,
+            across: across / acceleration,
+            most: fast.min(acceleration / across),
+        }
+    }
+
+    /// How fast the square of the rate may grow to both sides, at most, from a value.
+    fn growth(&self, square: f64, forwards: f64) -> f64 {
+        let bent = self.across * square;
+        let room = (1.0 - bent * bent).max(0.0).sqrt();
+        (2.0 * (room - forwards * self.along * square) / self.slope).max(0.0)
+    }
+}
+
+impl Profile {
+    /// The fastest profile of a curve under the limits of the tool, from rest to rest.
+    pub(super) fn new<const D: usize>(curve: &Curve<D>, limits: &ToolLimits) -> Self {
+        let end = Path::end(curve);
+        let count = (PLACES * end).ceil().max(2.0) as usize;
+        let step = end / count as f64;
+        let at: Vec<f64> = (0..=count).map(|k| k as f64 * step).collect();
+        let seen = |u: &f64| {
+            let tool = curve.tool_at(*u);
+            let [first, second, _] = tool.linear;
+            let [turn, bend, _] = tool.angular;
+            [
+                Motion::new(&first, &second, limits.speed, limits.acceleration),
+                Motion::new(
+                    &turn,
+                    &bend,
+                    limits.angular_speed,
+                    limits.angular_acceleration,
+                ),
+            ]
+        };
+        let places: Vec<[Motion; 2]> = at.iter().map(seen).collect();
+        let mut squares: Vec<f64> = places.iter().map(|[a, b]| a.most.min(b.most)).collect();
+        squares[0] = 0.0;
+        squares[count] = 0.0;
+        let grown = |k: usize, square: f64, forwards: f64| {
+            let [a, b] = &places[k];
+            let growth = a.growth(square, forwards).min(b.growth(square, forwards));
+            square + growth * step
+        };
+        for k in 0..count {
+            squares[k + 1] = squares[k + 1].min(grown(k, squares[k], 1.0));
+        }
+        for k in (0..count).rev() {
+            squares[k] = squares[k].min(grown(k + 1, squares[k + 1], -1.0));
+        }
+        let mut time = vec![0.0];
+        for pair in squares.windows(2) {
+            let rate = 0.5 * (pair[0].sqrt() + pair[1].sqrt());
+            time.push(time[time.len() - 1] + step / rate.max(1e-12));
+        }
+        Self { at, time }
+    }
+
+    /// The whole time, s.
+    pub(super) fn duration(&self) -> f64 {
+        self.time[self.time.len() - 1]
+    }
+
+    /// The parameter at a time (s).
+    pub(super) fn parameter(&self, time: f64) -> f64 {
+        let last = self.time.len() - 1;
+        let next = self.time.partition_point(|t| *t <= time).clamp(1, last);
+        let [from, to] = [self.time[next - 1], self.time[next]];
+        let share = ((time - from) / (to - from).max(1e-300)).clamp(0.0, 1.0);
+        self.at[next - 1] + share * (self.at[next] - self.at[next - 1])
+    }
+}

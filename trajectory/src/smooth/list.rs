@@ -1,0 +1,410 @@
+//! A list of poses, and the choice among the ways of planning it.
+
+use nalgebra::Isometry3;
+
+use super::certificate::certify;
+use super::lower_bound::lower_bound;
+use super::method::Method;
+use super::motion::Motion;
+use super::normal_form::NormalForm;
+use super::options::{SmoothError, SmoothOptions};
+use super::plan::SmoothPlan;
+use super::windows::Windows;
+use super::{dense, exact_stop};
+
+/// Plans a motion from the first pose to the last that passes those between in
+/// order, each within tolerance: the fastest motion that is certified.
+///
+/// Poses are in one frame of the caller's choice, lengths in m. It is at rest
+/// at both ends. A list of one pose, or of equal poses, gives a plan of no
+/// duration.
+///
+/// # Errors
+/// [`SmoothError`] when a number of the input is unusable; never because a
+/// motion is hard.
+///
+/// ```
+/// use nalgebra::Isometry3;
+/// use trajectory::{ToolLimits, smooth};
+/// let limits = ToolLimits {
+///     speed: 0.5, acceleration: 5.0, jerk: 100.0,
+///     angular_speed: 2.0, angular_acceleration: 20.0, angular_jerk: 400.0,
+/// };
+/// let corner = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]];
+/// let poses = corner.map(|[x, y]| Isometry3::translation(x, y, 0.0));
+/// let plan = smooth::plan(&poses, &smooth::SmoothOptions::new(0.001, limits))?;
+/// assert!(plan.certificate().holds());
+/// assert!(plan.crossings()[0].deviation <= 0.001);
+/// assert!(plan.duration() <= plan.exact_stop());
+/// # Ok::<(), smooth::SmoothError>(())
+/// ```
+pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
+    options.check(poses)?;
+    let finite = options.finite();
+    let planned = List::new(poses, &finite).fastest();
+    match planned {
+        Some(mut plan) => {
+            plan.certificate.lower_bound = lower_bound(poses, &finite);
+            Ok(plan)
+        }
+        // Without a tolerance, or if the form was too coarse.
+        None => Ok(Windows::new(poses, options)?.finish()),
+    }
+}
+
+/// A list as it was given, with finite options, and the time with a stop at each pose (s).
+struct List<'a> {
+    poses: &'a [Isometry3<f64>],
+    options: &'a SmoothOptions,
+    exact_stop: f64,
+}
+
+impl<'a> List<'a> {
+    /// A list under finite options.
+    fn new(poses: &'a [Isometry3<f64>], options: &'a SmoothOptions) -> Self {
+        Self {
+            poses,
+            options,
+            exact_stop: exact_stop::duration(poses, &options.limits),
+        }
+    }
+
+    /// The fastest certified motion of the ways of planning that suit the list; `None` without a
+    /// tolerance, and where no certificate holds.
+    fn fastest(&self) -> Option<SmoothPlan> {
+        let form = &NormalForm::new(self.poses, self.options)?;
+        let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
+        let fitted = if dense { self.fitted(form) } else { None };
+        match fitted {
+            Some(fit) if fit.suffices() && dense::suffices(&form.poses, &form.options) => {
+                Some(fit.plan)
+            }
+            fitted => {
+                let best = faster(fitted.map(|fit| fit.plan), self.by_spline(form));
+                match best {
+                    Some(plan) if plan.is_divided() => self.without_rests(form, plan, dense),
+                    other => other,
+                }
+            }
+        }
+    }
+
+    /// The motion along a fitted curve: the faster one from both ends if that from the first is
+    /// slower than it might be.
+    fn fitted(&self, form: &NormalForm) -> Option<Fit> {
+        let fit = |form: &NormalForm| {
+            let motion = dense::plan(&form.poses, &form.options)?;
+            let eased = motion.eased;
+            let plan = self.certified(form, motion)?;
+            Some(Fit { plan, eased })
+        };
+        let first = fit(form);
+        if first.as_ref().is_some_and(Fit::suffices) {
+            return first;
+        }
+        let other = fit(&form.turned(self.poses, self.options));
+        match (first, other) {
+            (Some(first), Some(other)) => {
+                let better = other.plan.duration() < first.plan.duration();
+                Some(if better { other } else { first })
+            }
+            (first, other) => first.or(other),
+        }
+    }
+
+    /// The fastest motion of a plan with rests that the way does not ask for, of a fitted curve if
+    /// none was tried, of the splines from the other end, and of those within less of the tolerance:
+    /// what holds there holds here, and a search in wide balls may fail where one in narrow ones does
+    /// not.
+    fn without_rests(
+        &self,
+        form: &NormalForm,
+        plan: SmoothPlan,
+        fitted: bool,
+    ) -> Option<SmoothPlan> {
+        let mut best = Some(plan);
+        if self.options.fit && !fitted && dense::may_be_fitted(&form.poses, &form.options) {
+            best = faster(best, self.fitted(form).map(|fit| fit.plan));
+        }
+        if best.as_ref().is_some_and(SmoothPlan::is_divided) {
+            let other = form.turned(self.poses, self.options);
+            best = faster(best, self.by_spline(&other));
+        }
+        for share in SHARES {
+            if best.as_ref().is_some_and(SmoothPlan::is_divided) {
+                best = faster(best, self.by_windows(form, &within(&form.options, share)));
+            }
+        }
+        best
+    }
+
+    /// The motion by time-optimal splines, window by window.
+    fn by_spline(&self, form: &NormalForm) -> Option<SmoothPlan> {
+        let plan = self.by_windows(form, &form.options)?;
+        // A motion within half of the tolerance is within all of it. A second motion is cheap if
+        // poses are close to each other and fit in one window.
+        let costly = plan.spans.len() > SPANS_PER_POSE * self.poses.len() || plan.parts.len() > 1;
+        if costly || self.poses.len() <= SHORT || plan.method() != Method::Spline {
+            return Some(plan);
+        }
+        let mut half = form.options.clone();
+        half.tolerance *= 0.5;
+        faster(Some(plan), self.by_windows(form, &half))
+    }
+
+    /// The same under options of the form, once.
+    fn by_windows(&self, form: &NormalForm, options: &SmoothOptions) -> Option<SmoothPlan> {
+        let windows = Windows::new(&form.poses, options).ok()?;
+        self.certified(form, windows.motion())
+    }
+
+    /// A motion through the normal form as a plan for the list, if its certificate holds.
+    fn certified(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
+        let motion = form.place(motion);
+        let whole = certify(&motion.spans, self.poses, self.options);
+        let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
+        let good = whole.0.holds() && soon;
+        good.then(|| SmoothPlan::new(self.poses, motion, whole, self.exact_stop))
+    }
+}
+
+/// A motion along a fitted curve.
+struct Fit {
+    plan: SmoothPlan,
+    /// Whether another way of planning may be faster.
+    eased: bool,
+}
+
+impl Fit {
+    /// Whether no other way of planning is faster by much: it is not slower than it might be, and
+    /// rests nowhere. A motion that turns back without a rest saves up to the time of a ramp.
+    fn suffices(&self) -> bool {
+        !self.eased && self.plan.rests().is_empty()
+    }
+}
+
+/// The options with a share of all tolerances.
+fn within(options: &SmoothOptions, share: f64) -> SmoothOptions {
+    SmoothOptions {
+        tolerance: share * options.tolerance,
+        corridor: Some(share * options.corridor()),
+        angular_tolerance: Some(share * options.angular_tolerance()),
+        ..options.clone()
+    }
+}
+
+/// The faster of two plans, the first if they are equal.
+fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<SmoothPlan> {
+    match (first, second) {
+        (Some(first), Some(second)) if second.duration() < first.duration() => Some(second),
+        (Some(first), _) => Some(first),
+        (None, second) => second,
+    }
+}
+
+/// Shares of the tolerance within which a list is planned that rests within all of it.
+const SHARES: [f64; 3] = [0.7, 0.5, 0.35];
+
+/// Lists up to this length are planned once.
+const SHORT: usize = 5;
+
+/// Longer lists are planned twice if they need no more than this many spans per pose.
+const SPANS_PER_POSE: usize = 24;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smooth::RestCause;
+    use crate::{ToolCurve, ToolLimits};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    fn limits() -> ToolLimits {
+        ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 2.0,
+            angular_acceleration: 20.0,
+            angular_jerk: 400.0,
+        }
+    }
+
+    fn check(poses: &[Isometry3<f64>], tolerance: f64) -> SmoothPlan {
+        let plan = plan(poses, &SmoothOptions::new(tolerance, limits())).unwrap();
+        assert!(
+            plan.certificate().holds(),
+            "{:?} {:?}",
+            plan.certificate(),
+            plan.crossings()
+        );
+        assert!(plan.duration() <= plan.exact_stop());
+        plan
+    }
+
+    #[test]
+    fn degenerate_lists() {
+        let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+        let turned =
+            |x: f64, angle: f64| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::z() * angle);
+        for tolerance in [0.0, 1e-5, 1e-3, 10.0] {
+            check(&[at(0.0, 0.0)], tolerance);
+            check(&[at(0.1, 0.0); 4], tolerance);
+            check(&[at(0.0, 0.0), at(0.1, 0.0)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.0), at(0.2, 0.0)],
+                tolerance,
+            );
+            check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 0.0)], tolerance);
+            check(&[at(0.0, 0.0), at(0.1, 0.0), at(0.0, 1e-4)], tolerance);
+            check(
+                &[at(0.0, 0.0), at(1e-6, 0.0), at(0.0, 1e-6), at(1e-6, 1e-6)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 1.0)],
+                tolerance,
+            );
+            check(
+                &[turned(0.0, 0.0), turned(0.0, 0.5), turned(0.0, 0.0)],
+                tolerance,
+            );
+            check(
+                &[
+                    turned(0.0, 0.0),
+                    turned(0.1, 0.5),
+                    turned(0.1, 1.0),
+                    turned(0.2, 0.0),
+                ],
+                tolerance,
+            );
+        }
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let options = SmoothOptions::new(0.001, limits());
+        assert_eq!(plan(&[], &options).unwrap_err(), SmoothError::NoPose);
+        let bad = [
+            Isometry3::identity(),
+            Isometry3::translation(f64::NAN, 0.0, 0.0),
+        ];
+        assert!(matches!(
+            plan(&bad, &options),
+            Err(SmoothError::BadPose { index: 1, .. })
+        ));
+        let negative = SmoothOptions::new(-1.0, limits());
+        assert!(matches!(
+            plan(&bad[..1], &negative),
+            Err(SmoothError::BadTolerance { .. })
+        ));
+    }
+
+    /// Points of a circle of a radius (m), in another place.
+    fn circle(radius: f64, count: u32) -> Vec<Isometry3<f64>> {
+        let frame = Isometry3::new(Vector3::new(0.49, 0.13, 0.37), Vector3::new(3.1, 0.2, 0.1));
+        let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(count);
+        let place = |i: u32| Vector3::new(angle(i).cos() - 1.0, angle(i).sin(), 0.0) * radius;
+        let pose = |i| frame * Isometry3::from_parts(place(i).into(), UnitQuaternion::identity());
+        (0..=count).map(pose).collect()
+    }
+
+    /// A list that can be passed without a rest has none inside, however many windows it takes.
+    #[test]
+    fn a_circle_is_passed_without_a_rest() {
+        let at = |i: u32| std::f64::consts::TAU * f64::from(i) / 200.0;
+        let place = |a: f64| Vector3::new(0.05 * a.cos() + 0.44, 0.05 * a.sin() + 0.13, 0.37);
+        let rotation = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.3);
+        let pose = |i| Isometry3::from_parts(place(at(i)).into(), rotation);
+        let poses: Vec<_> = (0..=200).map(pose).collect();
+        for (speed, acceleration) in [(0.1, 0.3), (0.1, 1.0), (0.1, 5.0), (0.35, 0.3), (0.35, 5.0)]
+        {
+            for tolerance in [1e-4, 2e-3] {
+                let limits = ToolLimits {
+                    speed,
+                    acceleration,
+                    ..limits()
+                };
+                let plan = plan(&poses, &SmoothOptions::new(tolerance, limits)).unwrap();
+                assert!(plan.certificate().holds());
+                let rests = plan.rests();
+                assert!(
+                    rests.is_empty(),
+                    "{speed} {acceleration} {tolerance} {rests:?}"
+                );
+            }
+        }
+    }
+
+    /// Two hundred poses of a circle at a tenth of the speed of an arm: the second window starts
+    /// as close to the speed limit as the first one may be.
+    #[test]
+    fn windows_of_a_slow_circle_join_without_a_rest() {
+        let limits = ToolLimits {
+            speed: 0.1,
+            acceleration: 0.5,
+            jerk: 100.0,
+            ..limits()
+        };
+        let plan = plan(&circle(0.05, 200), &SmoothOptions::new(2e-3, limits)).unwrap();
+        assert!(
+            plan.certificate().holds() && plan.rests().is_empty(),
+            "{:?}",
+            plan.rests()
+        );
+        // The exact circle is 0.314 m long: 3.34 s at 0.1 m/s, 0.2 s to start and to stop among them.
+        // Windows lose up to 1 % of that; with a rest it was 3.42 s.
+        assert!(plan.duration() < 3.38, "{}", plan.duration());
+    }
+
+    /// Rests are named, and the motion rests at no other time.
+    #[test]
+    fn rests_are_named() {
+        let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+        let corner = [at(0.0, 0.0), at(0.1, 0.0), at(0.1, 0.1)];
+        let stops = check(&corner, 0.0);
+        assert_eq!(stops.fallbacks(), 1);
+        let rest = stops.rests()[0];
+        assert_eq!(rest.cause, RestCause::Stop);
+        assert!((rest.time - stops.crossings()[0].time).abs() < 1e-6);
+        assert!(check(&corner, 1e-3).rests().is_empty());
+        // There and back on the same way, dense: it rests where it turns back at most.
+        let back: Vec<_> = (0..=400)
+            .map(|i| f64::from(200_i32 - (i - 200_i32).abs()) * 1e-3)
+            .map(|x| at(x, 4.0 * x * x))
+            .collect();
+        let back = check(&back, 1e-4);
+        assert!(back.rests().len() <= 1, "{:?}", back.rests());
+        for rest in back.rests() {
+            assert_eq!(rest.cause, RestCause::TurnsBack);
+            let speed = back.at(rest.time).linear[0].norm();
+            assert!(speed < 1e-9, "{speed}");
+        }
+    }
+
+    /// Three legs and more, then a turn on the spot at the last point: a part of a leg without
+    /// motion must not limit the speed at which the leg begins.
+    #[test]
+    fn a_turn_on_the_spot_at_the_end() {
+        let at = |y: f64, z: f64, angle: f64| {
+            Isometry3::new(Vector3::new(0.45, y, z), Vector3::x() * angle)
+        };
+        let way = [
+            at(-0.15, 0.3, 0.0),
+            at(-0.07, 0.3, 0.0),
+            at(0.01, 0.35, 0.0),
+            at(0.09, 0.3, 0.0),
+            at(0.09, 0.3, 0.1),
+        ];
+        for first in 0..4 {
+            for tolerance in [1e-5, 5e-4, 1e-3, 2e-2] {
+                check(&way[first..], tolerance);
+                let back: Vec<_> = way[first..].iter().rev().copied().collect();
+                check(&back, tolerance);
+            }
+        }
+        // The same turn between legs, and each pose twice.
+        check(&[way[1], way[2], way[3], way[4], at(0.2, 0.3, 0.1)], 1e-3);
+        let twice: Vec<_> = way.iter().flat_map(|pose| [*pose; 2]).collect();
+        check(&twice, 5e-4);
+    }
+}
