@@ -110,6 +110,7 @@ impl Axes {
             for (to, from) in now.commanded.iter_mut().zip(command) {
                 *to = from.position;
             }
+            now.delay = self.resampler.delay();
         }
         let drives = said.iter().enumerate().take(joints);
         for (joint, said) in drives {

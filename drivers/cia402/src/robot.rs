@@ -6,7 +6,7 @@ use std::thread::{Builder, JoinHandle};
 
 use driver_kit::{
     About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors,
+    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
 };
 use ipc::{MAX_JOINTS, text_of};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -28,6 +28,8 @@ const UNKNOWN: f64 = 5.0;
 pub struct Cia402 {
     about: About,
     cycle: f64,
+    /// How far the targets shall be behind the setpoints (s).
+    delay: f64,
     rows: Producer<Row>,
     snapshots: Consumer<Snapshot>,
     /// The newest cycle.
@@ -63,7 +65,7 @@ impl Cia402 {
             Arc::new(AtomicBool::new(false)),
             Arc::new(AtomicU32::new(0)),
         );
-        let cycle = options.cycle;
+        let (cycle, delay) = (options.cycle, options.delay);
         let thread = BusThread {
             axes: Axes::new(options.drives.clone(), resampler, cycle),
             options,
@@ -82,6 +84,7 @@ impl Cia402 {
         Ok(Self {
             about,
             cycle,
+            delay,
             rows,
             snapshots,
             now: Snapshot::default(),
@@ -194,6 +197,14 @@ impl Robot for Cia402 {
         }
         // A full ring has a bus that stands still: that is a fault of its own.
         let _ = self.rows.push(row);
+    }
+
+    fn speed_scaling(&self) -> f64 {
+        if self.now.phase != Phase::Following {
+            return 1.0;
+        }
+        let silent = now_ns().saturating_sub(self.now.received_ns) as f64 * 1e-9;
+        speed_share(self.now.delay + silent - self.delay - self.cycle)
     }
 
     fn sensors(&self, sensors: &mut Sensors) {

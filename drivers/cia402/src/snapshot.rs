@@ -41,6 +41,8 @@ pub(crate) struct Snapshot {
     pub(crate) cycles: u64,
     pub(crate) bad_counters: u64,
     pub(crate) lost_frames: u64,
+    /// How far the targets are behind the newest reference (s).
+    pub(crate) delay: f64,
     /// How far the frames are from their time by the drives' clock (s); NaN without one.
     pub(crate) clock_error: f64,
 }
@@ -58,6 +60,7 @@ impl Default for Snapshot {
             cycles: 0,
             bad_counters: 0,
             lost_frames: 0,
+            delay: 0.0,
             clock_error: f64::NAN,
         }
     }

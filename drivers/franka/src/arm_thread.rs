@@ -36,6 +36,12 @@ const STRANGE: u32 = 6;
 /// Period of the controller (s).
 const PERIOD: f64 = 1e-3;
 
+/// An answer is late that leaves so long after its state was read, or to a state that was read so much
+/// later than the arm's time says (s). A state after it that was read within this time was waiting, and
+/// is late too (s).
+const LATE: f64 = 0.7e-3;
+const WAITING: f64 = 0.1e-3;
+
 /// For so many states at its beginning a motion holds what the controller commands.
 const FIRST: usize = 5;
 
@@ -183,6 +189,7 @@ impl ArmThread {
         loop {
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
+            sent.read(advance);
             if sent.count < FIRST {
                 self.resampler.begin(&state.q_d);
             } else if sent.has_gone_on(&state, advance) {
@@ -197,7 +204,6 @@ impl ArmThread {
             let command = self.resampler.next(advance);
             let q: [f64; JOINTS] =
                 core::array::from_fn(|joint| command.get(joint).map_or(0.0, |c| c.position));
-            sent.push(q);
             self.snapshot.delay = self.resampler.delay();
             if matches!(self.wishes.pop(), Ok(Wish::End)) || self.ends() {
                 ending = ending.max(1);
@@ -207,7 +213,14 @@ impl ArmThread {
             if ending > 0 && (self.resampler.is_resting() || ending > PATIENCE) {
                 return control.write_once(&motion_finished(positions), None);
             }
+            if sent.is_late() {
+                // The controller has dropped this cycle and gone on by itself; an answer that comes later
+                // would be taken for one to a cycle of its own.
+                sent.skipped = true;
+                continue;
+            }
             control.write_once(&positions, None)?;
+            sent.push(q);
         }
     }
 
@@ -230,9 +243,29 @@ struct Sent {
     commands: [[f64; JOINTS]; ON_THE_WAY],
     count: usize,
     strange: u32,
+    /// When the last state was read (ns of `CLOCK_MONOTONIC`), and whether it was late.
+    read_ns: u64,
+    late: bool,
+    /// The last state was not answered.
+    skipped: bool,
 }
 
 impl Sent {
+    /// A state was read, `passed` after the last one by the arm's time (s).
+    fn read(&mut self, passed: f64) {
+        let now = now_ns();
+        let waited = now.saturating_sub(self.read_ns) as f64 * 1e-9;
+        let first = self.read_ns == 0;
+        self.late = !first && (waited - passed > LATE || (self.late && waited < WAITING));
+        self.read_ns = now;
+    }
+
+    /// Whether an answer that leaves now is late.
+    fn is_late(&self) -> bool {
+        let since = now_ns().saturating_sub(self.read_ns) as f64 * 1e-9;
+        self.late || since > LATE
+    }
+
     fn push(&mut self, command: [f64; JOINTS]) {
         self.commands[self.count % ON_THE_WAY] = command;
         self.count += 1;
@@ -250,6 +283,10 @@ impl Sent {
         let known = self.commands.iter().take(self.count);
         let known = known.into_iter().any(|told| far(told) <= ELSEWHERE);
         self.strange = if known { 0 } else { self.strange + 1 };
+        if core::mem::take(&mut self.skipped) {
+            self.strange = 0;
+            return true;
+        }
         if known || (passed < SLEPT && self.strange < STRANGE) {
             return false;
         }

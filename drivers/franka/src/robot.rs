@@ -6,7 +6,7 @@ use std::thread::{Builder, JoinHandle};
 
 use driver_kit::{
     About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors,
+    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
 };
 use franka::RobotMode;
 use ipc::{GRIPPER, Payload, ToolCommand, ToolFeedback, ToolStatus, text_of};
@@ -35,6 +35,8 @@ const OLD: u64 = 20_000_000;
 pub struct Franka {
     about: About,
     address: String,
+    /// How far the arm shall be behind the setpoints (s).
+    delay: f64,
     rows: Producer<Row>,
     wishes: Producer<Wish>,
     snapshots: Consumer<Snapshot>,
@@ -77,7 +79,7 @@ impl Franka {
         let hand = options
             .gripper
             .map(|gripper| Hand::start(host(&options.address), gripper));
-        let address = options.address.clone();
+        let (address, delay) = (options.address.clone(), options.delay);
         let thread = ArmThread {
             options,
             resampler,
@@ -97,6 +99,7 @@ impl Franka {
         Ok(Self {
             about,
             address,
+            delay,
             rows,
             wishes,
             snapshots,
@@ -294,6 +297,14 @@ impl Robot for Franka {
 
     fn carry(&mut self, payload: &Payload) {
         self.wish(Wish::Carry(*payload));
+    }
+
+    fn speed_scaling(&self) -> f64 {
+        if self.now.phase != Phase::Moving {
+            return 1.0;
+        }
+        let silent = now_ns().saturating_sub(self.now.received_ns) as f64 * 1e-9;
+        speed_share(self.now.delay + silent - self.delay)
     }
 
     fn sensors(&self, sensors: &mut Sensors) {

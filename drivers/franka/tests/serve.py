@@ -6,6 +6,8 @@ Makes the model for MuJoCo from the URDF inside the package, so nothing is downl
 `ready` when the server listens. The command of the package itself would bind to all networks.
 """
 
+import ctypes
+import gc
 import os
 import re
 import sys
@@ -39,6 +41,16 @@ def model(folder):
     return file
 
 
+def keep_time():
+    """Keeps the interpreter from holding up the cycle: memory stays in RAM where that is allowed, threads
+    take turns in less than a cycle, and nothing is collected."""
+    ctypes.CDLL(None).mlockall(3)
+    sys.setswitchinterval(1e-4)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+
+
 def main():
     os.environ["FR3_MJCF"] = str(model(FOLDER))
     server = franka_sim.FrankaSimServer(
@@ -50,6 +62,8 @@ def main():
         enforce_comm_constraints=True,
         enforce_motion_limits=True,
     )
+
+    keep_time()
 
     def ready():
         while not getattr(server, "running", False):

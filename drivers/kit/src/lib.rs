@@ -36,5 +36,5 @@ pub use measured::{Inputs, Measured, Measurement, Outputs, RobotFault, Sensors};
 pub use process::{DriverReport, RunOptions, asked_to_end, run};
 use ramp::Ramp;
 pub use reference::Reference;
-pub use resampler::{Resampler, ResamplerOptions};
+pub use resampler::{Resampler, ResamplerOptions, speed_share};
 pub use robot::{About, Readiness, Robot};

@@ -136,8 +136,19 @@ impl Limiter {
             // Largest error of the trapezoidal rule when the jerk keeps its limit.
             && gained.abs() <= jerk * period * period / 4.0 + SMALL
             && moved.abs() <= jerk * period * period * period / 12.0 + SMALL
+            && self.keeps_acceleration(from, next, period)
             && self.stays_below(next, AT_END)
             && self.stays_above(next, AT_END)
+    }
+
+    /// Whether the acceleration limit holds within the period too, so that differences of positions keep
+    /// it: a controller may measure these.
+    fn keeps_acceleration(&self, from: &Reference, next: &Reference, period: f64) -> bool {
+        let most = self.acceleration * (1.0 + ROUNDING) * period;
+        let (moved, half) = (next.position - from.position, most * period / 2.0 + SMALL);
+        (next.velocity - from.velocity).abs() <= most + SMALL
+            && (moved - from.velocity * period).abs() <= half
+            && (moved - next.velocity * period).abs() <= half
     }
 
     /// The mixture of `low` and `high` that is nearest to `share` and can stay within the range.

@@ -23,6 +23,35 @@ const LEARN: f64 = 1.0;
 const CLOCKS: f64 = 0.25;
 const PACE: f64 = 0.3;
 
+/// A lead up to this teaches the difference of the clocks (s): a larger one comes from a controller that
+/// stood still, and learning from it would send the playhead beyond the newest reference.
+const LEARNT: f64 = 0.0015;
+
+/// The share of the largest change of the pace with which the playhead comes near to its delay.
+const NEARING: f64 = 0.25;
+
+/// An arm that is behind by this much more than it should be (s) asks for less speed; by so much more
+/// again for half of it, and never for less than this share.
+const BEHIND: f64 = 0.006;
+const HALF: f64 = 0.02;
+const LEAST: f64 = 0.2;
+
+/// The share of the planned speed that an arm asks for which is `behind` by so much more time than it
+/// should be (s), because its controller stood still: the distance that it is behind stays small until it
+/// has caught up. For [`crate::Robot::speed_scaling`].
+///
+/// ```
+/// assert_eq!(driver_kit::speed_share(0.002), 1.0);
+/// assert_eq!(driver_kit::speed_share(0.026), 0.5);
+/// ```
+pub fn speed_share(behind: f64) -> f64 {
+    if behind.is_finite() {
+        (HALF / (HALF + (behind - BEHIND).max(0.0))).max(LEAST)
+    } else {
+        LEAST
+    }
+}
+
 /// Options of a [`Resampler`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResamplerOptions {
@@ -255,10 +284,14 @@ impl Resampler {
         let found = playhead.lead[1];
         // During a gap nothing is learnt.
         if self.waited < COAST && !rests {
-            playhead.clocks += BANDWIDTH * BANDWIDTH * found * advance;
+            let learnt = found.clamp(-LEARNT, LEARNT);
+            playhead.clocks += BANDWIDTH * BANDWIDTH * learnt * advance;
             playhead.clocks = playhead.clocks.clamp(-CLOCKS, CLOCKS);
         }
-        let pace = (playhead.clocks + 2.0 * BANDWIDTH * found).clamp(-CLOCKS, CLOCKS);
+        // No faster than it can be slowed down again on the way that is left.
+        let nearing = (2.0 * NEARING * PACE * found.abs()).sqrt();
+        let draw = (2.0 * BANDWIDTH * found.abs()).min(nearing);
+        let pace = (playhead.clocks + draw.copysign(found)).clamp(-CLOCKS, CLOCKS);
         if rests {
             // Nothing moves: the delay may be set at once, and the pace is that of the clocks.
             playhead.at += found;

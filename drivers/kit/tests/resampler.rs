@@ -208,9 +208,33 @@ fn a_million_periods_of_every_trouble() {
     assert!(peaks[1] > 0.9, "{peaks:?}");
 }
 
-/// A stop in the middle of a motion: to rest within the maker's limits, whatever is pushed.
+/// A controller that stands still for a while is behind then; it catches up without going ahead of the
+/// references.
 #[test]
-fn a_stop_is_within_the_limits_and_stays() {
+fn a_controller_that_stood_still_catches_up() {
+    for still in [10, 20, 40, 60_u64] {
+        let mut resampler = resampler();
+        resampler.begin(&[plan(0.0).position]);
+        let (mut least, mut last) = (f64::INFINITY, 0.0);
+        for period in 0..8_000_u64 {
+            resampler.push(period * 1_000_000, &[plan(period as f64 * PERIOD)]);
+            if !(3_500..3_500 + still).contains(&period) {
+                resampler.next(PERIOD);
+            }
+            if period > 3_500 {
+                least = resampler.delay().min(least);
+            }
+            if period == 5_500 {
+                last = resampler.delay();
+            }
+        }
+        println!("{still} ms: least delay {least:.4} s, after 2 s {last:.4} s");
+        assert!(least > 0.0, "{still} ms: {least} s");
+        assert!((last - DELAY).abs() < 2e-3, "{still} ms: {last} s");
+    }
+}
+
+fn resampler() -> Resampler {
     let about = About {
         lower: vec![-1.5],
         upper: vec![1.5],
@@ -226,8 +250,14 @@ fn a_stop_is_within_the_limits_and_stays() {
         acceleration: vec![ACCELERATION],
         jerk: vec![JERK],
     };
+    Resampler::new(&about, options).unwrap()
+}
+
+/// A stop in the middle of a motion: to rest within the maker's limits, whatever is pushed.
+#[test]
+fn a_stop_is_within_the_limits_and_stays() {
     for stop in [3_100, 3_400, 3_700, 4_000, 4_300] {
-        let mut resampler = Resampler::new(&about, options.clone()).unwrap();
+        let mut resampler = resampler();
         resampler.begin(&[plan(0.0).position]);
         let mut before = Reference::rest(plan(0.0).position);
         for period in 0..stop + 1_000_u64 {

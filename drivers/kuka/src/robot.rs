@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use driver_kit::{
     About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors,
+    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
 };
 use rtrb::{Consumer, Producer, RingBuffer};
 use scheduling::now_ns;
@@ -211,6 +211,14 @@ impl Robot for Kuka {
         }
         // A full ring has a controller that is silent: that is a fault of its own.
         let _ = self.rows.push(row);
+    }
+
+    fn speed_scaling(&self) -> f64 {
+        if !self.now.follows {
+            return 1.0;
+        }
+        let silent = now_ns().saturating_sub(self.now.received_ns) as f64 * 1e-9;
+        speed_share(self.now.delay + silent - self.options.delay - self.options.cycle)
     }
 
     fn sensors(&self, sensors: &mut Sensors) {

@@ -39,6 +39,8 @@ pub(crate) struct Snapshot {
     pub(crate) cycles: u64,
     /// Whether the references are followed.
     pub(crate) follows: bool,
+    /// How far the corrections are behind the newest reference (s).
+    pub(crate) delay: f64,
 }
 
 /// A reference of all joints with its time (ns).
@@ -141,6 +143,7 @@ impl SocketThread {
             for (to, from) in self.snapshot.commanded.iter_mut().zip(command) {
                 *to = from.position;
             }
+            self.snapshot.delay = self.resampler.delay();
         }
         self.snapshot.commanded
     }

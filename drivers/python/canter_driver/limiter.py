@@ -189,13 +189,17 @@ class Limiter:
         which they can still be kept."""
         (p, v, a), (q, w, b) = reference, target
         room = 1 + ROUNDING
-        jerk = self.jerk * room * period
+        jerk, most = self.jerk * room * period, self.acceleration * room * period
         return (
             abs(w) <= self.velocity * room
             and abs(b) <= self.acceleration * room
             and abs(b - a) <= jerk + SMALL
             and abs(w - v - (a + b) * period / 2) <= jerk * period / 4 + SMALL
             and abs(q - p - (v + w) * period / 2) <= jerk * period * period / 12 + SMALL
+            # Differences of positions keep the acceleration limit too: a controller may measure these.
+            and abs(w - v) <= most + SMALL
+            and abs(q - p - v * period) <= most * period / 2 + SMALL
+            and abs(q - p - w * period) <= most * period / 2 + SMALL
             and self.stays_below(target, AT_END)
             and self.stays_above(target, AT_END)
         )

@@ -19,6 +19,9 @@ pub(super) enum Awaited<const N: usize> {
         end: SVector<f64, N>,
         /// The last period in which the arm may arrive.
         until: u64,
+        /// The joint that was furthest from the end when the arm was nearest to it, and how far (rad, m):
+        /// meanwhile the next command may move the arm away.
+        nearest: (u32, f64),
     },
     /// An event behind it.
     Event(Event),
@@ -32,6 +35,7 @@ impl<const N: usize> Runner<N> {
             command,
             end: self.published.position,
             until: self.tick + patience as u64,
+            nearest: (0, f64::INFINITY),
         });
     }
 
@@ -56,14 +60,23 @@ impl<const N: usize> Runner<N> {
 
     /// Reports the commands at whose end the arm has arrived.
     pub(super) fn watch_arrival(&mut self) {
+        let measured = self.measured();
+        for awaited in &mut self.awaited {
+            if let Awaited::End { end, nearest, .. } = awaited {
+                let found = distance(&measured, end);
+                if found.1 < nearest.1 {
+                    *nearest = found;
+                }
+            }
+        }
         while let Some(first) = self.awaited.front().copied() {
             if let Awaited::End {
                 command,
-                end,
                 until,
+                nearest: (joint, error),
+                ..
             } = first
             {
-                let (joint, error) = self.distance(&end);
                 let arrived = self.config.arrival.tolerance;
                 if error > self.settles(command).unwrap_or(arrived) && self.tick < until {
                     return;
@@ -99,18 +112,17 @@ impl<const N: usize> Runner<N> {
             Awaited::Event(event) => event,
         });
     }
+}
 
-    /// The joint that is furthest from `end`, and how far it is (rad, m).
-    fn distance(&self, end: &SVector<f64, N>) -> (u32, f64) {
-        let measured = self.measured();
-        let joints = measured.iter().zip(end.iter()).enumerate();
-        joints.fold((0, 0.0), |(worst, most), (joint, (at, end))| {
-            let error = (at - end).abs();
-            if error > most {
-                (joint as u32, error)
-            } else {
-                (worst, most)
-            }
-        })
-    }
+/// The joint that is furthest from `end`, and how far it is (rad, m).
+fn distance<const N: usize>(measured: &SVector<f64, N>, end: &SVector<f64, N>) -> (u32, f64) {
+    let joints = measured.iter().zip(end.iter()).enumerate();
+    joints.fold((0, 0.0), |(worst, most), (joint, (at, end))| {
+        let error = (at - end).abs();
+        if error > most {
+            (joint as u32, error)
+        } else {
+            (worst, most)
+        }
+    })
 }

@@ -92,9 +92,10 @@ fn a_command_is_done_when_the_arm_has_arrived() {
         "{order:?}"
     );
 
+    // The next command moves the arm away meanwhile: the distance is that of before.
     let mut bench = Bench::new();
-    assert!(feed(&mut bench.sender, 0));
-    for _ in 0..5000 {
+    (0..2).for_each(|index| assert!(feed(&mut bench.sender, index)));
+    for _ in 0..8000 {
         bench.period(0, |mut state| {
             state.position[2] += 0.004;
             Some(state)
@@ -109,7 +110,7 @@ fn a_command_is_done_when_the_arm_has_arrived() {
     });
     let (joint, error, _) = warned.unwrap();
     assert_eq!(joint, 2);
-    assert!((error - 0.004).abs() < 1e-6);
+    assert!((0.001..0.004 + 1e-6).contains(&error), "{error}");
     assert!(
         events
             .iter()
