@@ -55,7 +55,7 @@ pub use node::{NodeCount, count_nodes, engines, look_at_services, remove_dead_no
 pub use observer::Observer;
 pub use ownership::Ownership;
 pub use payload::Payload;
-pub use probe::Probe;
+pub use probe::{AnsweringProbe, AskingProbe, Probe};
 pub use repair::{Inhabitant, inhabitants_of, repair};
 pub use request::{Answer, FollowPoint, Identity, LONGEST_ANSWER, Request, Verb};
 pub use room::{ROOM_NEEDED, room_left};

@@ -9,6 +9,8 @@ use planner::timed::{TimedPoint, TimedTrajectory};
 use trajectory::ToolLimits;
 
 type Joints = SVector<f64, 6>;
+/// A change that makes a trajectory one that is refused.
+type Change<'a> = &'a dyn Fn(&mut TimedTrajectory);
 
 fn ur5e() -> (Planner<6>, Joints, ToolLimits) {
     let robot = load("ur5e").unwrap();
@@ -276,12 +278,12 @@ fn a_time_law_of_our_own_keeps_the_way() {
 fn what_is_no_trajectory_is_refused() {
     let (planner, home, most) = ur5e();
     let whole = smooth(&home, 2.0, 10);
-    let try_with = |change: &dyn Fn(&mut TimedTrajectory)| {
+    let try_with = |change: Change<'_>| {
         let mut timed = whole.clone();
         change(&mut timed);
         refusal(planner.timed(&timed, &home, &most)).to_string()
     };
-    let cases: [(&str, &dyn Fn(&mut TimedTrajectory)); 14] = [
+    let cases: [(&str, Change<'_>); 14] = [
         ("1 to 100000 points, got 0", &|t| t.points.clear()),
         ("no joint \"x\"", &|t| t.joints[1] = "x".to_owned()),
         ("joint_6 is missing", &|t| {

@@ -12,6 +12,8 @@
 
 #[path = "../suite/canter.rs"]
 mod canter;
+mod cia402;
+mod drives;
 mod franka;
 mod kuka;
 mod ur;
@@ -22,54 +24,100 @@ use libtest_mimic::{Arguments, Trial};
 /// A test and its name.
 type Test = (&'static str, fn());
 
+/// The driver of Franka arms.
+const FRANKA: [Test; 3] = [
+    ("franka::pick_and_place", franka::pick_and_place),
+    ("franka::kills_and_restarts", franka::kills_and_restarts),
+    ("franka::the_driver_conforms", franka::the_driver_conforms),
+];
+
+/// The driver of arms of Universal Robots, and the stand-in for their controller.
+const UNIVERSAL: [Test; 8] = [
+    (
+        "motion::servoj_obeys_its_law",
+        ur_controller::motion::servoj_obeys_its_law,
+    ),
+    ("ur::programs_at_500_hz", ur::programs_at_500_hz),
+    ("ur::programs_at_125_hz", ur::programs_at_125_hz),
+    (
+        "ur::the_slider_slows_down_on_the_path",
+        ur::the_slider_slows_down_on_the_path,
+    ),
+    (
+        "ur::a_protective_stop_is_unlocked_by_the_next_run",
+        ur::a_protective_stop_is_unlocked_by_the_next_run,
+    ),
+    (
+        "ur::a_program_that_ends_is_started_again",
+        ur::a_program_that_ends_is_started_again,
+    ),
+    (
+        "ur::what_cannot_be_driven_is_refused_in_words",
+        ur::what_cannot_be_driven_is_refused_in_words,
+    ),
+    ("ur::the_driver_conforms", ur::the_driver_conforms),
+];
+
+/// The stand-in, seen by a client of others.
+const OUTSIDE: [Test; 1] = [(
+    "ur::a_client_from_outside_reads_the_states",
+    ur::a_client_from_outside_reads_the_states,
+)];
+
+/// The driver of KUKA arms.
+const RSI: [Test; 1] = [(
+    "kuka::programs_and_a_pulled_cable",
+    kuka::programs_and_a_pulled_cable,
+)];
+
+/// The driver of CiA 402 drives.
+const ETHERCAT: [Test; 8] = [
+    (
+        "cia402::programs_without_clocks",
+        cia402::programs_without_clocks,
+    ),
+    (
+        "cia402::programs_by_the_clock_of_the_drives",
+        cia402::programs_by_the_clock_of_the_drives,
+    ),
+    (
+        "cia402::a_drive_that_fails_stops_all",
+        cia402::a_drive_that_fails_stops_all,
+    ),
+    (
+        "cia402::a_slow_drive_is_named",
+        cia402::a_slow_drive_is_named,
+    ),
+    (
+        "cia402::a_cut_cable_is_mended",
+        cia402::a_cut_cable_is_mended,
+    ),
+    (
+        "cia402::the_watchdog_stops_the_drives",
+        cia402::the_watchdog_stops_the_drives,
+    ),
+    (
+        "cia402::what_does_not_fit_is_refused_in_words",
+        cia402::what_does_not_fit_is_refused_in_words,
+    ),
+    ("cia402::the_driver_conforms", cia402::the_driver_conforms),
+];
+
 fn main() {
-    let franka: [Test; 3] = [
-        ("franka::pick_and_place", franka::pick_and_place),
-        ("franka::kills_and_restarts", franka::kills_and_restarts),
-        ("franka::the_driver_conforms", franka::the_driver_conforms),
-    ];
-    let universal: [Test; 8] = [
-        (
-            "motion::servoj_obeys_its_law",
-            ur_controller::motion::servoj_obeys_its_law,
-        ),
-        ("ur::programs_at_500_hz", ur::programs_at_500_hz),
-        ("ur::programs_at_125_hz", ur::programs_at_125_hz),
-        (
-            "ur::the_slider_slows_down_on_the_path",
-            ur::the_slider_slows_down_on_the_path,
-        ),
-        (
-            "ur::a_protective_stop_is_unlocked_by_the_next_run",
-            ur::a_protective_stop_is_unlocked_by_the_next_run,
-        ),
-        (
-            "ur::a_program_that_ends_is_started_again",
-            ur::a_program_that_ends_is_started_again,
-        ),
-        (
-            "ur::what_cannot_be_driven_is_refused_in_words",
-            ur::what_cannot_be_driven_is_refused_in_words,
-        ),
-        ("ur::the_driver_conforms", ur::the_driver_conforms),
-    ];
-    let outside: [Test; 1] = [(
-        "ur::a_client_from_outside_reads_the_states",
-        ur::a_client_from_outside_reads_the_states,
-    )];
-    let rsi: [Test; 1] = [(
-        "kuka::programs_and_a_pulled_cable",
-        kuka::programs_and_a_pulled_cable,
-    )];
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if words.first().is_some_and(|word| word == cia402::STAND_IN) {
+        return drives::run(&words[1..]);
+    }
     let mut arguments = Arguments::from_args();
     // The gripper of the controller has a fixed port.
     arguments.test_threads = Some(1);
     let mut trials = Vec::new();
     for (tests, missing) in [
-        (&franka[..], franka::missing()),
-        (&universal, None),
-        (&outside, ur::missing()),
-        (&rsi, kuka::missing()),
+        (&FRANKA[..], franka::missing()),
+        (&UNIVERSAL, None),
+        (&OUTSIDE, ur::missing()),
+        (&RSI, kuka::missing()),
+        (&ETHERCAT, cia402::missing()),
     ] {
         if let Some(reason) = &missing {
             eprintln!("ignored: {reason}");

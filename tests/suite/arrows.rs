@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 /// The dependencies that are allowed between crates of Canter. `system-tests` and `benches` may
 /// depend on everything.
-const ARROWS: [(&str, &[&str]); 25] = [
+const ARROWS: [(&str, &[&str]); 26] = [
     (
         "cli",
         &[
@@ -29,6 +29,7 @@ const ARROWS: [(&str, &[&str]); 25] = [
             "driver-franka",
             "driver-ur",
             "driver-kuka",
+            "driver-cia402",
             "driver-conformance",
         ],
     ),
@@ -76,6 +77,7 @@ const ARROWS: [(&str, &[&str]); 25] = [
     ("driver-franka", &["driver-kit", "ipc", "scheduling"]),
     ("driver-ur", &["driver-kit", "ipc", "scheduling"]),
     ("driver-kuka", &["driver-kit", "ipc", "scheduling"]),
+    ("driver-cia402", &["driver-kit", "ipc", "scheduling"]),
     ("driver-conformance", &["ipc", "scheduling"]),
     ("crcl", &[]),
     ("kinematics", &["simd"]),
@@ -88,7 +90,7 @@ const ARROWS: [(&str, &[&str]); 25] = [
 
 /// External crates that only these crates of Canter may name. That the planner starts no thread and
 /// reads no clock is not in a manifest: see [`the_planner_is_pure`].
-const FENCES: [(&str, &[&str]); 19] = [
+const FENCES: [(&str, &[&str]); 20] = [
     ("k", &["kinematics"]),
     ("faer", &["trajectory"]),
     ("pulp", &["simd"]),
@@ -108,9 +110,16 @@ const FENCES: [(&str, &[&str]); 19] = [
     ("rcgen", &["canter-fleet"]),
     (
         "rtrb",
-        &["servo", "driver-franka", "driver-ur", "driver-kuka"],
+        &[
+            "servo",
+            "driver-franka",
+            "driver-ur",
+            "driver-kuka",
+            "driver-cia402",
+        ],
     ),
-    ("libc", &["ipc", "scheduling"]),
+    ("libc", &["ipc", "scheduling", "driver-cia402"]),
+    ("ethercrab", &["driver-cia402"]),
 ];
 
 const OUTERMOST: [&str; 2] = ["system-tests", "benches"];

@@ -19,7 +19,7 @@ mod wake_up;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
-use ipc::{Arm, Domain, Probe};
+use ipc::{AnsweringProbe, Arm, Domain};
 use nalgebra::SVector;
 use realtime::{JointLimits, Piece, Sample, Segment};
 
@@ -38,8 +38,8 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["--peer", "driver", arm] => return driver(arm),
-        ["--peer", "probe", arm] => return echo_probe(arm, Probe::receive),
-        ["--peer", "glance", arm] => return echo_probe(arm, Probe::glance),
+        ["--peer", "probe", arm] => return echo_probe(arm, AnsweringProbe::receive),
+        ["--peer", "glance", arm] => return echo_probe(arm, AnsweringProbe::glance),
         ["--peer", "link", arm] => return echo_link(arm),
         _ => {}
     }

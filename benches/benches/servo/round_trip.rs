@@ -1,15 +1,15 @@
-//! Round trips of setpoint and state, and of plain messages of their size.
+//! Round trips of setpoint and state, and of plain messages of their sizes.
 
 use std::time::{Duration, Instant};
 
-use ipc::{Arm, DriverLink, EngineLink, Probe, Setpoint, State};
+use ipc::{AnsweringProbe, Arm, AskingProbe, DriverLink, EngineLink, Setpoint, State};
 
 use crate::peer::Peer;
 use crate::statistics::{median, quantile};
 use crate::{N, ROUNDS, arm, named};
 
-pub(crate) fn echo_probe(arm: &str, look: fn(&Probe) -> Option<u64>) {
-    let probe = Probe::open(&named(arm), false).unwrap();
+pub(crate) fn echo_probe(arm: &str, look: fn(&AnsweringProbe) -> Option<u64>) {
+    let probe = AnsweringProbe::answering(&named(arm)).unwrap();
     loop {
         if let Some(number) = look(&probe) {
             probe.send(number);
@@ -35,16 +35,16 @@ pub(crate) fn echo_link(arm: &str) {
     }
 }
 
-/// Round trips of a checked setpoint and state, alternating with those of plain messages of that
-/// size: read as a whole, and with only one number read.
+/// Round trips of a checked setpoint and state, alternating with those of plain messages of their
+/// sizes: read as a whole, and with only one number read.
 pub(crate) fn ping(ratios: &mut Vec<(String, f64)>) {
     let rounds: Vec<[Vec<u64>; 3]> = (0..ROUNDS)
         .map(|number| {
             let arm = arm(&format!("ping{number}"));
             [
                 link_trips(&arm),
-                probe_trips(&arm, "probe", Probe::receive),
-                probe_trips(&arm, "glance", Probe::glance),
+                probe_trips(&arm, "probe", AskingProbe::receive),
+                probe_trips(&arm, "glance", AskingProbe::glance),
             ]
         })
         .collect();
@@ -52,7 +52,7 @@ pub(crate) fn ping(ratios: &mut Vec<(String, f64)>) {
     let at = |sorted: &[u64], share: f64| quantile(sorted, share) as f64;
     for (name, share) in [("p50", 0.5), ("p99", 0.99)] {
         println!(
-            "round trip {name}: setpoint and state, checked {} ns; bare messages of that size, read \
+            "round trip {name}: setpoint and state, checked {} ns; bare messages of their sizes, read \
              {} ns, glanced at {} ns",
             middle(&|[ours, _, _]| at(ours, share)),
             middle(&|[_, read, _]| at(read, share)),
@@ -68,9 +68,9 @@ pub(crate) fn ping(ratios: &mut Vec<(String, f64)>) {
 /// Round trips of a round.
 const TRIPS: u64 = 20_000;
 
-fn probe_trips(arm: &Arm, peer: &str, look: fn(&Probe) -> Option<u64>) -> Vec<u64> {
+fn probe_trips(arm: &Arm, peer: &str, look: fn(&AskingProbe) -> Option<u64>) -> Vec<u64> {
     let _probe = Peer::start(peer, arm);
-    let probe = Probe::open(arm, true).unwrap();
+    let probe = AskingProbe::asking(arm).unwrap();
     trips(TRIPS, |number| {
         probe.send(number);
         let end = Instant::now() + Duration::from_secs(1);

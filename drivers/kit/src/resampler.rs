@@ -89,6 +89,8 @@ pub struct Resampler {
     waited: f64,
     targets: Vec<Reference>,
     commands: Vec<Reference>,
+    /// The motion ends: references count no more.
+    stops: bool,
 }
 
 /// Where in the references the controller is.
@@ -129,6 +131,7 @@ impl Resampler {
             waited: 0.0,
             targets: vec![Reference::default(); joints],
             commands: vec![Reference::default(); joints],
+            stops: false,
         })
     }
 
@@ -139,6 +142,7 @@ impl Resampler {
         self.origin_ns = None;
         self.playhead = None;
         self.waited = 0.0;
+        self.stops = false;
         for (joint, at) in commanded.iter().enumerate().take(self.commands.len()) {
             self.commands[joint] = Reference::rest(*at);
         }
@@ -151,6 +155,13 @@ impl Resampler {
         for (command, found) in self.commands.iter_mut().zip(commanded) {
             *command = *found;
         }
+    }
+
+    /// Stops all joints as fast as the maker's limits allow, from the last command; references count
+    /// again after the next [`Resampler::begin`].
+    pub fn stop(&mut self) {
+        self.stops = true;
+        self.targets.clone_from(&self.commands);
     }
 
     /// A reference of all joints and its time (ns). One that is not newer than the last is left out.
@@ -204,6 +215,13 @@ impl Resampler {
         } else {
             0.0
         };
+        if self.stops {
+            let period = self.options.period;
+            for (limiter, command) in self.limiters.iter().zip(&mut self.commands) {
+                *command = limiter.stop(command, period);
+            }
+            return &self.commands;
+        }
         self.move_playhead(advance);
         self.waited += advance;
         self.find_targets(advance);

@@ -208,6 +208,52 @@ fn a_million_periods_of_every_trouble() {
     assert!(peaks[1] > 0.9, "{peaks:?}");
 }
 
+/// A stop in the middle of a motion: to rest within the maker's limits, whatever is pushed.
+#[test]
+fn a_stop_is_within_the_limits_and_stays() {
+    let about = About {
+        lower: vec![-1.5],
+        upper: vec![1.5],
+        velocity: vec![SPEED],
+        acceleration: vec![ACCELERATION],
+        jerk: vec![JERK],
+        ..About::default()
+    };
+    let options = ResamplerOptions {
+        delay: DELAY,
+        period: PERIOD,
+        velocity: vec![SPEED],
+        acceleration: vec![ACCELERATION],
+        jerk: vec![JERK],
+    };
+    for stop in [3_100, 3_400, 3_700, 4_000, 4_300] {
+        let mut resampler = Resampler::new(&about, options.clone()).unwrap();
+        resampler.begin(&[plan(0.0).position]);
+        let mut before = Reference::rest(plan(0.0).position);
+        for period in 0..stop + 1_000_u64 {
+            if period == stop {
+                assert!(!resampler.is_resting());
+                resampler.stop();
+            }
+            resampler.push(period * 1_000_000, &[plan(period as f64 * PERIOD)]);
+            let command = resampler.next(PERIOD)[0];
+            let jerk = (command.acceleration - before.acceleration).abs() / PERIOD;
+            assert!(command.acceleration.abs() <= ACCELERATION * 1.001);
+            assert!(jerk <= JERK * 1.001, "{jerk}");
+            before = command;
+        }
+        assert!(resampler.is_resting());
+        // Until it begins again.
+        resampler.begin(&[before.position]);
+        for period in stop..stop + 50 {
+            let moved = before.position + (period - stop) as f64 * 1e-5;
+            resampler.push(period * 1_000_000, &[Reference::rest(moved)]);
+            resampler.next(PERIOD);
+        }
+        assert!(resampler.command()[0].position > before.position);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         rng_seed: RngSeed::Fixed(13), cases: 24, failure_persistence: None, ..ProptestConfig::default()

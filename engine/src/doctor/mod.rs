@@ -6,7 +6,7 @@ use core::time::Duration;
 use std::fs;
 use std::thread;
 
-use ipc::{Arm, Domain, Probe};
+use ipc::{AnsweringProbe, Arm, AskingProbe, Domain};
 use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 use serde::Serialize;
 
@@ -311,10 +311,10 @@ fn round_trip(domain: &Domain) -> Check {
     const NAME: &str = "shared-memory round trip";
     let result = (|| {
         let arm = domain.arm(&format!("doctor/{}", std::process::id()))?;
-        let asks = Probe::open(&arm, true)?;
+        let asks = AskingProbe::asking(&arm)?;
         let other = arm.clone();
         let echo = thread::spawn(move || -> Result<(), ipc::IpcError> {
-            let answers = Probe::open(&other, false)?;
+            let answers = AnsweringProbe::answering(&other)?;
             let end = now_ns() + 3_000_000_000;
             let mut last = 0;
             while last < TRIPS && now_ns() < end {

@@ -1,5 +1,6 @@
 //! Drivers: one file per kind of driver, and the test of any driver.
 
+mod cia402;
 mod franka;
 mod kuka;
 mod mujoco;
@@ -42,6 +43,7 @@ enum What {
     Franka(franka::Franka),
     Ur(ur::Ur),
     Kuka(kuka::Kuka),
+    Cia402(cia402::Cia402),
     Test(test::Test),
 }
 
@@ -54,6 +56,7 @@ impl Driver {
             What::Franka(franka) => franka.run(),
             What::Ur(ur) => ur.run(),
             What::Kuka(kuka) => kuka.run(),
+            What::Cia402(cia402) => cia402.run(),
             What::Test(test) => test.run(),
         }
     }

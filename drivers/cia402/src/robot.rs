@@ -1,0 +1,223 @@
+//! The robot of `driver-kit`: passes everything to the thread that is the master of the bus.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::thread::{Builder, JoinHandle};
+
+use driver_kit::{
+    About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
+    ResamplerOptions, Robot, RobotFault, Sensors,
+};
+use ipc::{MAX_JOINTS, text_of};
+use rtrb::{Consumer, Producer, RingBuffer};
+use scheduling::now_ns;
+
+use crate::Cia402Options;
+use crate::axes::Axes;
+use crate::bus_thread::BusThread;
+use crate::snapshot::{Phase, Row, Snapshot};
+
+/// Room of the rings between the two threads.
+const RING: usize = 256;
+
+/// After so many cycles without process data the arm is unknown.
+const UNKNOWN: f64 = 5.0;
+
+/// An arm of CiA 402 drives.
+#[derive(Debug)]
+pub struct Cia402 {
+    about: About,
+    cycle: f64,
+    rows: Producer<Row>,
+    snapshots: Consumer<Snapshot>,
+    /// The newest cycle.
+    now: Snapshot,
+    wish: Arc<AtomicU32>,
+    /// The session that an engine asked for, and the number of the last one.
+    session: Option<u32>,
+    sessions: u32,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Cia402 {
+    /// Starts the thread that brings up the bus.
+    ///
+    /// # Errors
+    /// [`DriverError`] for options that do not fit together.
+    pub fn new(options: Cia402Options) -> Result<Self, DriverError> {
+        options.check()?;
+        let about = about(&options)?;
+        let keep = |values: &[f64]| values.iter().map(|value| value * options.share).collect();
+        let limits = ResamplerOptions {
+            delay: options.delay,
+            period: options.cycle,
+            velocity: keep(&about.velocity),
+            acceleration: keep(&about.acceleration),
+            jerk: keep(&about.jerk),
+        };
+        let resampler = Resampler::new(&about, limits)?;
+        let (rows, rows_out) = RingBuffer::new(RING);
+        let (snapshots_in, snapshots) = RingBuffer::new(RING);
+        let (stop, wish) = (
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(AtomicU32::new(0)),
+        );
+        let cycle = options.cycle;
+        let thread = BusThread {
+            axes: Axes::new(options.drives.clone(), resampler, cycle),
+            options,
+            rows: rows_out,
+            wish: Arc::clone(&wish),
+            snapshots: snapshots_in,
+            snapshot: Snapshot::default(),
+            stop: Arc::clone(&stop),
+        };
+        let thread = Builder::new()
+            .name("ethercat".to_owned())
+            .spawn(move || thread.run())
+            .map_err(|cause| DriverError::Thread {
+                cause: cause.to_string(),
+            })?;
+        Ok(Self {
+            about,
+            cycle,
+            rows,
+            snapshots,
+            now: Snapshot::default(),
+            wish,
+            session: None,
+            sessions: 0,
+            stop,
+            thread: Some(thread),
+        })
+    }
+
+    fn look(&mut self) {
+        while let Ok(snapshot) = self.snapshots.pop() {
+            self.now = snapshot;
+        }
+    }
+}
+
+/// What the kit must know.
+fn about(options: &Cia402Options) -> Result<About, DriverError> {
+    let about = About {
+        name: "cia402".to_owned(),
+        lock_step: false,
+        periods_ns: [500_000, 20_000_000],
+        own_clock: true,
+        real: true,
+        delay_ns: ((options.delay + 2.0 * options.cycle) * 1e9) as u64,
+        ..options.about.clone()
+    };
+    about.check()?;
+    Ok(about)
+}
+
+impl Robot for Cia402 {
+    fn about(&self) -> About {
+        self.about.clone()
+    }
+
+    fn begin(&mut self) -> Readiness {
+        self.look();
+        match self.now.phase {
+            Phase::Connecting => return Readiness::Wait("bringing up the bus".to_owned()),
+            Phase::Down => return Readiness::NotReady(text_of(&self.now.reason)),
+            _ => {}
+        }
+        let mine = self.session.filter(|session| *session == self.now.session);
+        match (mine, self.now.phase) {
+            (Some(_), Phase::Following) => return Readiness::Ready,
+            (Some(_), Phase::Faulted) => {
+                let fault = self.now.fault.unwrap_or(RobotFault::new(None, 0, ""));
+                let text = text_of(&fault.text);
+                self.session = None;
+                return Readiness::NotReady(match fault.joint {
+                    u32::MAX => text,
+                    joint => format!("joint {}: {text}", joint + 1),
+                });
+            }
+            _ => {}
+        }
+        if self.session.is_none() {
+            self.sessions = self.sessions.wrapping_add(1).max(1);
+            self.session = Some(self.sessions);
+            self.wish.store(self.sessions, Ordering::Relaxed);
+        }
+        Readiness::Wait(format!(
+            "enabling the drives: {}",
+            text_of(&self.now.reason)
+        ))
+    }
+
+    fn end(&mut self) {
+        self.session = None;
+        self.wish.store(0, Ordering::Relaxed);
+    }
+
+    fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
+        self.look();
+        joints
+            .iter_mut()
+            .zip(self.now.joints)
+            .for_each(|(to, from)| *to = from);
+        let silent = now_ns().saturating_sub(self.now.received_ns) as f64 * 1e-9;
+        if silent > UNKNOWN * self.cycle {
+            return Measurement::Unknown;
+        }
+        Measurement::At {
+            measured_ns: self.now.received_ns,
+            hardware_ns: 0,
+        }
+    }
+
+    fn commanded(&self, joints: &mut [f64]) -> bool {
+        joints
+            .iter_mut()
+            .zip(self.now.commanded)
+            .for_each(|(to, from)| *to = from);
+        self.now.received_ns > 0
+    }
+
+    fn follow(&mut self, command: &Command<'_>) {
+        if self.now.phase != Phase::Following {
+            return;
+        }
+        let mut row = Row {
+            at_ns: command.at_ns,
+            joints: [Reference::default(); MAX_JOINTS],
+        };
+        for (to, from) in row.joints.iter_mut().zip(command.joints) {
+            *to = *from;
+        }
+        // A full ring has a bus that stands still: that is a fault of its own.
+        let _ = self.rows.push(row);
+    }
+
+    fn sensors(&self, sensors: &mut Sensors) {
+        sensors.push("bus_cycles", self.now.cycles as f64);
+        sensors.push("bad_working_counters", self.now.bad_counters as f64);
+        sensors.push("lost_frames", self.now.lost_frames as f64);
+        sensors.push("clock_error", self.now.clock_error);
+    }
+
+    fn fault(&self) -> Option<RobotFault> {
+        let session = self.session?;
+        if self.now.session != session {
+            return None;
+        }
+        self.now.fault
+    }
+}
+
+impl Drop for Cia402 {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A thread that panicked has said so; there is nothing left to end.
+            let _ = thread.join();
+        }
+    }
+}
