@@ -17,6 +17,7 @@ mod failure;
 mod keys;
 mod link;
 mod member;
+mod one_thread;
 mod options;
 mod reporter;
 mod rights;

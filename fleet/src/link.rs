@@ -85,7 +85,11 @@ fn client(option: &LinkOption) -> Result<Config, Failure> {
         "scouting": {"multicast": {"enabled": false}, "gossip": {"enabled": false}},
         "transport": {"link": {
             "protocols": ["tls"],
-            "tx": {"lease": LEASE_MS},
+            "tx": {
+                "lease": LEASE_MS,
+                // A link that is full for longer is closed (decision 0146).
+                "queue": {"congestion_control": {"block": {"wait_before_close": 200_000}}},
+            },
             "tls": tls(&files(&option.keys)?),
         }},
     });

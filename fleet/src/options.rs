@@ -9,6 +9,7 @@ use crate::authority::Keys;
 use crate::commands::{All, Notes, One, Override, Router, Send, Top};
 use crate::failure::Failure;
 use crate::member::Cell;
+use crate::one_thread;
 
 /// Many cells: their reports, programs and stops over an encrypted network
 ///
@@ -47,7 +48,11 @@ enum Command {
 /// Reads the arguments of the process and does what they say.
 #[must_use]
 pub fn main() -> ExitCode {
-    let done = match Options::parse().command {
+    let options = Options::parse();
+    if let Err(failure) = one_thread::ensure() {
+        return say(&failure);
+    }
+    let done = match options.command {
         Command::Keys(keys) => keys.run(),
         Command::Router(router) => router.run(),
         Command::Cell(cell) => cell.run(),

@@ -9,6 +9,11 @@ import threading
 import time
 from pathlib import Path
 
+# Read when zenoh starts its threads (decision 0146).
+os.environ.setdefault(
+    "ZENOH_RUNTIME", "(rx: (handover: tx), net: (handover: tx), acc: (handover: tx), app: (handover: tx))"
+)
+
 import zenoh
 
 CANTER = os.environ["CANTER_COMMAND"]
@@ -54,9 +59,12 @@ class Processes:
                 process.kill()
                 process.wait()
 
-    def start(self, log, *words):
+    def start(self, log, *words, domain=None):
         out = open(self.folder / f"{log}.log", "ab")
-        process = subprocess.Popen(words, stdout=out, stderr=out)
+        variables = os.environ | ({"CANTER_DOMAIN": str(domain)} if domain else {})
+        # canter-fleet sets it by itself.
+        variables.pop("ZENOH_RUNTIME", None)
+        process = subprocess.Popen(words, stdout=out, stderr=out, env=variables)
         self.all.append(process)
         return process
 
@@ -82,18 +90,18 @@ class Processes:
         assert process.poll() is None, self.said("router")
         return process
 
-    def engine(self, arm, *more):
+    def engine(self, arm, *more, domain=None):
         log = "engine-" + arm.replace("/", "-")
         before = self.said(log).count("engine of")
-        process = self.start(log, CANTER, "engine", "--robot", "ur5e", "--arm", arm, *more)
+        process = self.start(log, CANTER, "engine", "--robot", "ur5e", "--arm", arm, *more, domain=domain)
         wait("the engine", lambda: self.said(log).count("engine of") > before or process.poll() is not None)
         assert process.poll() is None, self.said(log)
         return process
 
-    def cell(self, keys, arms, port):
+    def cell(self, keys, arms, port, domain=None):
         words = [word for arm in arms for word in ("--arm", arm)]
         name = arms[0].split("/")[0]
-        process = self.start(f"cell-{name}", FLEET, "cell", *words, *link(f"{keys}/cell.{name}", port))
+        process = self.start(f"cell-{name}", FLEET, "cell", *words, *link(f"{keys}/cell.{name}", port), domain=domain)
         wait("the cell", lambda: f"at tls/127.0.0.1:{port}" in self.said(f"cell-{name}") or process.poll() is not None)
         assert process.poll() is None, self.said(f"cell-{name}")
         return process

@@ -90,8 +90,11 @@ def main():
             print("1 kHz,", "with" if member else "without", json.dumps(period(processes, keys, port, member)))
         engines, members = [], []
         for cell in cells[:-1]:
-            engines.append(processes.engine(f"{cell}/arm", *words))
-            members.append(processes.cell(keys, [f"{cell}/arm"], port))
+            # Each cell as on a machine of its own.
+            domain = folder / cell
+            domain.mkdir(mode=0o700)
+            engines.append(processes.engine(f"{cell}/arm", *words, domain=domain))
+            members.append(processes.cell(keys, [f"{cell}/arm"], port, domain=domain))
         counter = Counter()
         with Peer(keys / "viewer.eva", port) as peer:
             wait("all cells", lambda: len(peer.sees("canter/*/*/alive")) == count, 300)

@@ -163,6 +163,15 @@ def refused_links(folder, keys, port):
         print(f"no link: {name}")
 
 
+def one_thread(process):
+    """Zenoh reads and writes its links in one thread (decision 0146)."""
+    names = [task.read_text().strip() for task in Path(f"/proc/{process.pid}/task").glob("*/comm")]
+    if "canter-fleet" not in Path(f"/proc/{process.pid}/cmdline").read_text():
+        return
+    assert not [name for name in names if name.startswith(("rx-", "net-", "acc-", "app-"))], names
+    assert "tx-0" in names, names
+
+
 def main():
     folder = Path(sys.argv[1])
     keys = folder / "keys"
@@ -176,6 +185,8 @@ def main():
         with Peer(keys / "plant.mes", port) as judge:
             wait("the arm", lambda: judge.status(ARM))
             refused_links(folder, keys, port)
+            for process in processes.all:
+                one_thread(process)
             found = {}
             for who in WHO:
                 with Peer(keys / who, port) as peer:
