@@ -71,7 +71,11 @@ const RSI: [Test; 1] = [(
 )];
 
 /// The driver of CiA 402 drives.
-const ETHERCAT: [Test; 8] = [
+const ETHERCAT: [Test; 9] = [
+    (
+        "cia402::the_doctor_measures_the_bus",
+        cia402::the_doctor_measures_the_bus,
+    ),
     (
         "cia402::programs_without_clocks",
         cia402::programs_without_clocks,
