@@ -476,6 +476,31 @@ pub(crate) fn what_does_not_fit_is_refused_in_words() {
     assert_eq!(refused.wait().unwrap().code(), Some(2));
 }
 
+/// `canter doctor --driver cia402` counts the drives and measures the way of its frames.
+pub(crate) fn the_doctor_measures_the_bus() {
+    let net = Net::new().unwrap();
+    let _drives = Drives::start(&net, "none");
+    let words = [
+        "doctor",
+        "--driver",
+        "cia402",
+        "--interface",
+        "bus",
+        "--seconds",
+        "0.1",
+    ];
+    let output = net.inside(&command(words)).output().unwrap();
+    let lines = String::from_utf8_lossy(&output.stdout).into_owned();
+    let frames = lines.lines().find(|line| line.contains("EtherCAT frames"));
+    println!("{}", frames.unwrap());
+    assert!(
+        frames.unwrap().contains("frames to 6 devices: 0 without"),
+        "{lines}"
+    );
+    assert!(lines.contains("network interface"), "{lines}");
+    assert!(lines.contains("SCHED_FIFO 80 granted"), "{lines}");
+}
+
 /// `canter driver test` on it: nothing fails.
 pub(crate) fn the_driver_conforms() {
     let cell = Cell::start("conforms", "none");

@@ -5,7 +5,8 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::canter::{Ran, canter, command};
@@ -145,7 +146,10 @@ fn arm() -> String {
 }
 
 fn run(arm: &str) -> Ran {
-    let program = "examples/pick_and_place.canon";
+    run_of("examples/pick_and_place.canon", arm)
+}
+
+fn run_of(program: &str, arm: &str) -> Ran {
     canter([
         "run", program, "--robot", "fr3", "--driver", "external", "--arm", arm,
     ])
@@ -162,12 +166,77 @@ pub(crate) fn pick_and_place() {
     let controller = Controller::start();
     let arm = arm();
     let _driver = Driver::start(&arm, controller.port);
+    many(&controller, || run(&arm), &arm);
+}
+
+/// A smooth path of 100 poses: no reflex.
+pub(crate) fn a_smooth_path_of_a_hundred_poses() {
+    let controller = Controller::start();
+    let arm = arm();
+    let _driver = Driver::start(&arm, controller.port);
+    let file = tempfile::Builder::new()
+        .suffix(".canon")
+        .tempfile()
+        .unwrap();
+    let pose = |number: u32| {
+        let turn = core::f64::consts::TAU * f64::from(number) / 99.0;
+        let (x, y) = (420.0 + 60.0 * (2.0 * turn).sin(), 180.0 * turn.sin());
+        let z = 320.0 + 50.0 * (3.0 * turn).cos();
+        format!("{{{{{x:.2}, {y:.2}, {z:.2}}}, {{0,0,-1}}, {{1,0,0}}}}")
+    };
+    let poses: Vec<String> = (1..100).map(pose).collect();
+    let program = format!(
+        "InitCanon()\nSetLengthUnits(\"mm\")\nSetRelativeSpeed(60)\nSetRelativeAcceleration(50)\n\
+         SetIntermediatePointTolerance(3)\nSetEndPointTolerance(0.5)\nMoveTo({})\n\
+         MoveSmoothlyTo({{{}}}, 99)\nEndCanon(0)\n",
+        pose(0),
+        poses.join(",\n")
+    );
+    std::fs::write(file.path(), program).unwrap();
+    let path = file.path().to_str().unwrap();
+    many(&controller, || run_of(path, &arm), &arm);
+}
+
+/// Runs that all must succeed without a reflex; prints the controller's success rate while the arm moves.
+fn many(controller: &Controller, run: impl Fn() -> Ran, arm: &str) {
+    let ends = Arc::new(AtomicBool::new(false));
+    let (watched, stop) = (arm.to_owned(), Arc::clone(&ends));
+    let rates = std::thread::spawn(move || success_rates(&watched, &stop));
     for number in 0..runs() {
-        let ran = run(&arm);
+        let ran = run();
         assert_eq!(ran.code, 0, "run {number}: {ran:?}\n{}", controller.log());
     }
+    ends.store(true, Ordering::Relaxed);
+    let (least, mean) = rates.join().unwrap();
+    println!(
+        "{} runs, success rate of the last 100 commands: mean {mean:.4}, least {least:.2}",
+        runs()
+    );
     let log = controller.log();
     assert!(!log.contains("violation"), "{log}");
+}
+
+/// The least and the mean success rate that the controller told while the arm moved.
+fn success_rates(arm: &str, ends: &AtomicBool) -> (f64, f64) {
+    let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
+    let (mut least, mut sum, mut count) = (1.0_f64, 0.0, 0.0_f64);
+    while !ends.load(Ordering::Relaxed) {
+        let Some(state) = observer.next_state() else {
+            std::thread::sleep(Duration::from_millis(1));
+            continue;
+        };
+        let sensors = &state.sensors[..state.sensor_count as usize];
+        let rate = sensors
+            .iter()
+            .find(|sensor| ipc::text_of(&sensor.name) == "success_rate");
+        let moves = state.velocity.iter().any(|speed| speed.abs() > 0.05);
+        if let (Some(rate), true) = (rate, moves) {
+            least = least.min(rate.value);
+            sum += rate.value;
+            count += 1.0;
+        }
+    }
+    (least, sum / count.max(1.0))
 }
 
 /// Driver and controller are killed in motion: the engine names what happened, and the next run works
@@ -177,7 +246,7 @@ pub(crate) fn kills_and_restarts() {
     let arm = arm();
     let driver = Driver::start(&arm, controller.port);
     // The controller is killed: the driver lives, and connects again.
-    let run_of = || {
+    let begin = || {
         let program = "examples/pick_and_place.canon";
         let words = [
             "run", program, "--robot", "fr3", "--driver", "external", "--arm", &arm,
@@ -188,7 +257,7 @@ pub(crate) fn kills_and_restarts() {
             .spawn()
             .unwrap()
     };
-    let ran = run_of();
+    let ran = begin();
     wait_for_motion(&arm);
     controller.kill();
     let ran = ran.wait_with_output().unwrap();
@@ -205,7 +274,7 @@ pub(crate) fn kills_and_restarts() {
         controller.log()
     );
     // The driver is killed: the controller lives.
-    let ran = run_of();
+    let ran = begin();
     wait_for_motion(&arm);
     drop(driver);
     let ran = ran.wait_with_output().unwrap();

@@ -25,7 +25,11 @@ use libtest_mimic::{Arguments, Trial};
 type Test = (&'static str, fn());
 
 /// The driver of Franka arms.
-const FRANKA: [Test; 3] = [
+const FRANKA: [Test; 4] = [
+    (
+        "franka::a_smooth_path_of_a_hundred_poses",
+        franka::a_smooth_path_of_a_hundred_poses,
+    ),
     ("franka::pick_and_place", franka::pick_and_place),
     ("franka::kills_and_restarts", franka::kills_and_restarts),
     ("franka::the_driver_conforms", franka::the_driver_conforms),
@@ -71,7 +75,11 @@ const RSI: [Test; 1] = [(
 )];
 
 /// The driver of CiA 402 drives.
-const ETHERCAT: [Test; 8] = [
+const ETHERCAT: [Test; 9] = [
+    (
+        "cia402::the_doctor_measures_the_bus",
+        cia402::the_doctor_measures_the_bus,
+    ),
     (
         "cia402::programs_without_clocks",
         cia402::programs_without_clocks,

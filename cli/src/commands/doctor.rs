@@ -3,12 +3,13 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::doctor::{Check, DoctorOptions, Health, examine};
 use ipc::{Domain, IpcError};
 use serde_json::json;
 
+use super::doctor_driver::{self, DriverName};
 use crate::client::DomainOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -34,6 +35,15 @@ pub(crate) struct Doctor {
     /// Check the limits of this robot: shipped name or folder
     #[arg(short, long, value_name = "R")]
     robot: Option<String>,
+    /// Check what the driver of a real arm needs: network latency and loss, ports, priority, firewall
+    #[arg(long, value_enum, value_name = "NAME")]
+    driver: Option<DriverName>,
+    /// With --driver: address of the arm's controller
+    #[arg(long, value_name = "ADDRESS", requires = "driver")]
+    address: Option<String>,
+    /// With --driver cia402: network interface of the bus
+    #[arg(long, value_name = "INTERFACE", requires = "driver")]
+    interface: Option<String>,
     /// Servo rate to measure at
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = rate)]
     rate: f64,
@@ -66,7 +76,8 @@ impl Doctor {
         let driver = self.arm.as_deref().map(|arm| domain.arm(arm));
         let driver = driver.transpose()?;
         let robot = self.robot.as_deref().map(crate::robot::load).transpose()?;
-        let checks = examine(&DoctorOptions {
+        let for_driver = self.for_driver()?;
+        let mut checks = examine(&DoctorOptions {
             rate_hz: self.rate,
             wake_up: Duration::from_secs_f64(self.seconds),
             driver,
@@ -74,6 +85,7 @@ impl Doctor {
             damage,
             ..DoctorOptions::new(domain)
         });
+        checks.extend(for_driver);
         let healthy = checks.iter().all(|check| check.health != Health::Fail);
         if self.json {
             output::json(&json!({"healthy": healthy, "checks": checks}))?;
@@ -81,6 +93,22 @@ impl Doctor {
             print(&checks)?;
         }
         Ok(if healthy { Exit::Done } else { Exit::Refused })
+    }
+}
+
+impl Doctor {
+    /// The checks for a driver.
+    fn for_driver(&self) -> Result<Vec<Check>, Failure> {
+        let Some(driver) = self.driver else {
+            return Ok(Vec::new());
+        };
+        let (place, option) = match driver {
+            DriverName::Cia402 => (&self.interface, "--interface"),
+            _ => (&self.address, "--address"),
+        };
+        let missing = || Failure::new(Exit::Usage, anyhow!("--driver {driver:?} needs {option}"));
+        let place = place.as_deref().ok_or_else(missing)?;
+        Ok(doctor_driver::examine(driver, place))
     }
 }
 

@@ -9,6 +9,7 @@ mod completions;
 mod convert;
 mod crcl;
 mod doctor;
+mod doctor_driver;
 mod driver;
 mod engine;
 mod fk;

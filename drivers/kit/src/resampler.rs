@@ -25,10 +25,10 @@ const PACE: f64 = 0.3;
 
 /// A lead up to this teaches the difference of the clocks (s): a larger one comes from a controller that
 /// stood still, and learning from it would send the playhead beyond the newest reference.
-const LEARNT: f64 = 0.0015;
+const LEARNT: f64 = 0.004;
 
 /// The share of the largest change of the pace with which the playhead comes near to its delay.
-const NEARING: f64 = 0.25;
+const NEARING: f64 = 0.8;
 
 /// An arm that is behind by this much more than it should be (s) asks for less speed; by so much more
 /// again for half of it, and never for less than this share.
