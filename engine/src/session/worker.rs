@@ -29,7 +29,6 @@ use crate::queue::Given;
 use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
-use planner::motion::WindowedMove;
 use planner::robot::Robot;
 use planner::task::{Task, ToolAction};
 use servo::{
@@ -338,18 +337,6 @@ impl<const N: usize> Worker<'_, N> {
             dropped,
         });
         flight.refused = true;
-    }
-
-    /// The way of a long smooth move that was not planned before, checked, if its windows can be
-    /// planned while it moves.
-    fn begin(&mut self, given: &Given) -> Option<WindowedMove<N>> {
-        match given {
-            Given::Command {
-                located,
-                planned: None,
-            } => self.controller.begin(&located.command),
-            _ => None,
-        }
     }
 
     /// The step of what left the queue: planned before, or planned now.

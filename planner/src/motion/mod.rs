@@ -222,13 +222,9 @@ impl<const N: usize> Planner<N> {
         (self.kernel.timed)(self, timed, start, most)
     }
 
-    /// Checks the whole way of a long smooth move from `start`, at rest, without its time law. The
-    /// windows of [`Self::window_of`] together are the motion of [`Self::plan`]. `None` for a move
-    /// that is planned as a whole.
-    ///
-    /// What is known then: a curve passes every pose in order within its tolerances and stays in the
-    /// corridor, and the joints follow all of it on one branch, inside their ranges and away from
-    /// singular places. Such a motion can be timed from rest to rest, from any place to any other.
+    /// Checks the whole way of a long smooth move from `start`, at rest, and times its first window; see
+    /// [`WindowedMove`]. All windows of [`Self::window_of`] together are the motion of [`Self::plan`].
+    /// `None` for a move that is planned as a whole.
     #[must_use]
     pub fn windows(&self, motion: &Move, start: &SVector<f64, N>) -> Option<WindowedMove<N>> {
         (self.kernel.windows)(self, motion, start)

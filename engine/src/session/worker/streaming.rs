@@ -5,6 +5,7 @@ use planner::motion::WindowedMove;
 use realtime::{Piece, Segment};
 
 use super::{InFlight, Work, Worker};
+use crate::queue::Given;
 
 /// A move that is under way and not planned to its end.
 #[derive(Debug)]
@@ -14,6 +15,18 @@ pub(super) struct Streaming<const N: usize> {
 }
 
 impl<const N: usize> Worker<'_, N> {
+    /// The way of a long smooth move that was not planned before, checked, if its windows can be
+    /// planned while it moves.
+    pub(super) fn begin(&mut self, given: &Given) -> Option<WindowedMove<N>> {
+        match given {
+            Given::Command {
+                located,
+                planned: None,
+            } => self.controller.begin(&located.command),
+            _ => None,
+        }
+    }
+
     /// Begins a move whose whole way was checked.
     pub(super) fn stream(&mut self, flight: &mut InFlight<N>, windowed: WindowedMove<N>) {
         flight.planned_s = windowed.duration();

@@ -25,6 +25,10 @@ const FROM_REST: [f64; 3] = [0.999, 0.98, 0.9];
 const MOVING: [f64; 3] = [0.998, 0.993, 1.0];
 
 /// A smooth move whose whole way was checked, and that is timed and certified window by window.
+///
+/// A curve passes every pose in order within its tolerances and stays in the corridor, and the joints
+/// follow all of it on one branch, inside their ranges and away from singular places. Such a way can be
+/// travelled from rest to rest, from any place on it to any other.
 #[derive(Clone, Debug)]
 pub struct WindowedMove<const N: usize> {
     motion: Move,
