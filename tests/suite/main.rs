@@ -38,6 +38,7 @@ mod session;
 mod shared_memory;
 mod soak;
 mod status;
+mod units;
 mod world_in_use;
 
 /// Every file of this folder is a module above: otherwise it would never run.
