@@ -16,6 +16,7 @@ __all__ = [
     "Motion",
     "otg",
     "otg_batch",
+    "otg_of",
     "Plan",
     "plan",
     "check",
@@ -83,6 +84,9 @@ class Motion:
     def pieces(self) -> tuple[_Array, _Array]: ...
 
 def otg(states: _Array, limits: _Array, choices: dict[str, Any]) -> Motion: ...
+def otg_of(
+    fields: dict[str, Any], dof: int, kind: tuple[str, bool], period: float | None
+) -> Motion | None: ...
 def otg_batch(
     states: _Array, limits: _Array, choices: dict[str, Any]
 ) -> tuple[_Array, _Array | None]: ...

@@ -292,6 +292,13 @@ class InputParameter:
 
     def _motion(self, period: float | None) -> Motion:
         dof = self.degrees_of_freedom
+        only_velocity = self.control_interface is ControlInterface.Velocity
+        if self.synchronization is not Synchronization.TimeIfNecessary:
+            # Plain numbers are read as they are; anything else goes through arrays, and errors too.
+            kind = (self.synchronization._value_, only_velocity)
+            own = _canter.otg_of(self.__dict__, dof, kind, period)
+            if own is not None:
+                return Motion(own)
         limits = _limits(
             dof,
             self.max_velocity,
@@ -310,7 +317,7 @@ class InputParameter:
             self.synchronization.value,
             self.minimum_duration or 0.0,
             period,
-            [self.control_interface is ControlInterface.Velocity] * dof,
+            [only_velocity] * dof,
             self.enabled,
         )
         return Motion(_canter.otg(self._states(), limits, choices))
@@ -333,7 +340,8 @@ class Trajectory:
     @property
     def duration(self) -> float:
         """How long it lasts, s."""
-        return self.motion.duration
+        motion = self._motion
+        return self.motion.duration if motion is None else motion._own.duration
 
     @property
     def independent_min_durations(self) -> list[float]:

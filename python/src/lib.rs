@@ -12,6 +12,7 @@ mod kinematic;
 mod link;
 mod otg;
 mod planning;
+mod problem;
 mod program;
 mod robot;
 mod smooth;
@@ -25,7 +26,7 @@ mod _canter {
     #[pymodule_export]
     use crate::link::{Link, engines};
     #[pymodule_export]
-    use crate::otg::{Motion, otg, otg_batch};
+    use crate::otg::{Motion, otg, otg_batch, otg_of};
     #[pymodule_export]
     use crate::planning::{Plan, plan};
     #[pymodule_export]

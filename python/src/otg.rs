@@ -5,10 +5,12 @@ use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use planner::kernels::Kernels;
 use planner::with_dof;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use trajectory::otg::{self as planned, Interface, OtgError, Synchronisation};
 
 use crate::arrays::{Numbers, joints, put, rows};
 use crate::error::{Field, Raise, argument};
+use crate::problem::Problem;
 use crate::wait;
 
 /// Durations (k,) and coefficients (k, dof, 6) of pieces.
@@ -218,11 +220,48 @@ pub(crate) fn otg(
             "limits: expected {dof} joints, got {also}"
         )));
     }
+    plan(py, (given, bounds), dof, &choices)
+}
+
+/// Plans one motion from the fields of an `InputParameter`; none where [`Problem`] cannot read
+/// them, and `otg` has to take them as arrays.
+#[pyfunction]
+#[pyo3(name = "otg_of")]
+pub(crate) fn otg_of(
+    py: Python<'_>,
+    fields: &Bound<'_, PyDict>,
+    dof: usize,
+    kind: (String, bool),
+    period: Option<f64>,
+) -> PyResult<Option<Motion>> {
+    let (synchronisation, velocity_only) = kind;
+    let Some(problem) = Problem::read(fields, joints(dof)?)? else {
+        return Ok(None);
+    };
+    let choices = Choices {
+        synchronisation,
+        velocity_only: vec![velocity_only; dof],
+        enabled: problem.enabled,
+        minimum_duration: problem.minimum_duration,
+        period,
+        at: None,
+        threads: 0,
+    };
+    plan(py, (&problem.states, &problem.limits), dof, &choices).map(Some)
+}
+
+/// Plans one motion: states (6, dof), limits (7, dof).
+fn plan(
+    py: Python<'_>,
+    (states, limits): (&[f64], &[f64]),
+    dof: usize,
+    choices: &Choices,
+) -> PyResult<Motion> {
     with_dof!(dof, N => {
         let options = choices.options::<N>()?;
         let motion = wait::short(py, "a state-to-state motion", || {
-            let (start, target) = (state(given, 0), state(given, 3));
-            (Kernels::<N>::get().otg)(&start, &target, &self::limits(bounds), &options)
+            let (start, target) = (state(states, 0), state(states, 3));
+            (Kernels::<N>::get().otg)(&start, &target, &self::limits(limits), &options)
         })?;
         Ok(Motion(Box::new(motion.map_err(Raise::from)?)))
     })

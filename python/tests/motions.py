@@ -2,6 +2,7 @@
 
 import pickle
 import unittest
+from unittest import mock
 
 import numpy as np
 import ruckig
@@ -128,6 +129,60 @@ class Interface(unittest.TestCase):
         found = otg.Trajectory(1)
         otg.Ruckig(1).calculate(inp, found)
         self.assertEqual(found.at_time(found.duration)[1], [0.5])
+
+
+class Fields(unittest.TestCase):
+    """The fields of a problem are read as they are or through arrays; nobody sees a difference."""
+
+    CHANGES = [
+        {},
+        {"max_velocity": 2.0},
+        {"current_position": np.zeros(6), "target_position": (1, 2, 3, 0.5, 0, -1)},
+        {"target_position": np.arange(12.0)[::2], "enabled": [True] * 5 + [False]},
+        {"min_velocity": [-0.5] * 6, "max_position": [3.0] * 6, "minimum_duration": 4},
+        {"min_acceleration": [-1] * 6, "min_position": None},
+        {"control_interface": otg.ControlInterface.Velocity, "target_velocity": [0.1] * 6},
+        {"synchronization": otg.Synchronization.Phase},
+        {"synchronization": otg.Synchronization.No},
+        {"max_jerk": [0.0] * 6},
+        {"max_velocity": [np.nan] * 6},
+        {"min_velocity": [np.nan] * 6},
+        {"target_velocity": [3.0] * 6},
+        {"current_position": [0.0] * 5},
+        {"current_position": ["a"] * 6},
+        {"enabled": [1] * 6},
+        {"enabled": [True] * 5},
+        {"synchronization": otg.Synchronization.TimeIfNecessary},
+    ]
+
+    def outcome(self, change):
+        inp = otg.InputParameter(6)
+        inp.max_velocity, inp.max_acceleration, inp.max_jerk = [2.0] * 6, [8.0] * 6, [80.0] * 6
+        inp.target_position = [1.0, 0.5, -0.5, 0.25, 0.1, 0.0]
+        for name, value in change.items():
+            setattr(inp, name, value)
+        trajectory = otg.Trajectory(6)
+        try:
+            otg.Ruckig(6).calculate(inp, trajectory)
+        except (ValueError, TypeError, canter.OtgError) as error:
+            return repr(error)
+        return trajectory.duration, trajectory.at_time(0.3 * trajectory.duration)
+
+    def test_both_ways_are_one(self):
+        with mock.patch.object(otg._canter, "otg_of", wraps=otg._canter.otg_of) as direct:
+            quick = [self.outcome(change) for change in self.CHANGES]
+            self.assertGreater(direct.call_count, len(self.CHANGES) - 2)
+        with mock.patch.object(otg._canter, "otg_of", return_value=None):
+            slow = [self.outcome(change) for change in self.CHANGES]
+        self.assertEqual(quick, slow)
+        self.assertEqual([isinstance(one, tuple) for one in quick], [True] * 9 + [False] * 9)
+
+    def test_plain_fields_need_no_arrays(self):
+        inp = otg.InputParameter(2)
+        inp.max_velocity = inp.max_acceleration = [1.0, 1.0]
+        inp.target_position = np.array([1.0, 2.0])
+        with mock.patch.object(otg, "_limits", side_effect=AssertionError("arrays were made")):
+            self.assertEqual(otg.Ruckig(2).calculate(inp, otg.Trajectory(2)), otg.Result.Working)
 
 
 class Errors(unittest.TestCase):

@@ -39,6 +39,7 @@ mod shared_memory;
 mod soak;
 mod status;
 mod streaming;
+mod units;
 mod world_in_use;
 
 /// Every file of this folder is a module above: otherwise it would never run.
