@@ -43,7 +43,7 @@ const GUARDED: usize = 64;
 const A_PERIOD: usize = 64;
 
 /// Time in which a driver returns to the setpoints after a stall, about (s).
-const REJOIN: f64 = 0.25;
+const REJOIN: f64 = 1.0;
 
 /// When a period runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,8 +110,8 @@ pub struct Runner<const N: usize> {
     orders: u32,
     tools: [ToolCommand; MAX_TOOLS],
     published: Sample<N>,
-    /// How far the driver may be ahead after a stall (rad).
-    ahead: f64,
+    /// How far the driver may be from the setpoint after a stall (rad).
+    apart: f64,
     pending: Option<Recorded<N>>,
     tick: u64,
 }
@@ -155,7 +155,7 @@ impl<const N: usize> Runner<N> {
             orders: 0,
             tools: [ToolCommand::default(); MAX_TOOLS],
             published: Sample::rest(rest),
-            ahead: 0.0,
+            apart: 0.0,
             pending: None,
             tick: 0,
             config,
@@ -192,7 +192,7 @@ impl<const N: usize> Runner<N> {
         self.forget_guards();
         self.orders = 0;
         self.tools = [ToolCommand::default(); MAX_TOOLS];
-        self.ahead = 0.0;
+        self.apart = 0.0;
         self.pending = None;
         self.share_position();
     }
@@ -399,9 +399,15 @@ impl<const N: usize> Runner<N> {
                 late_ms: (late * 1e3) as u64,
             });
         }
-        let ahead = self.published.velocity.amax() * late.min(self.config.watchdog.as_secs_f64());
-        let fading = self.ahead * (1.0 - self.period / REJOIN);
-        self.ahead = ahead.max(if fading > 1e-6 { fading } else { 0.0 });
+        let fading = self.apart * (1.0 - self.period / REJOIN);
+        self.apart = if fading > 1e-6 { fading } else { 0.0 };
+        self.forgive(late.min(self.config.watchdog.as_secs_f64()));
+    }
+
+    /// After a stall (s) of this thread the driver may be ahead, after one of its own it is behind: by the
+    /// way of that time, until it has returned to the plan.
+    fn forgive(&mut self, stall: f64) {
+        self.apart = self.apart.max(self.published.velocity.amax() * stall);
     }
 
     /// Moves along the path by one step. Periods that were left out delay the plan, so a setpoint

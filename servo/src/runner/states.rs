@@ -23,6 +23,7 @@ impl<const N: usize> Runner<N> {
         let Some(state) = fresh else {
             self.quiet += 1;
             let silent = self.quiet as f64 * self.period;
+            self.forgive(silent);
             if silent > self.config.patience.as_secs_f64() {
                 self.latch(Fault::DriverLost {
                     silent_ms: (silent * 1e3) as u64,
@@ -99,14 +100,14 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// How far the arm may be from the setpoint: more for a while after a stall, during which the
-    /// driver continued the motion; later by the driver's own delay; and later still while the arm
+    /// How far the arm may be from the setpoint: more for a while after a stall of this thread, during
+    /// which the driver continued the motion, or of the driver, which then is behind; later by the driver's own delay; and later still while the arm
     /// slows its own time down and the engine has not slowed down yet.
     fn following(&self) -> Following {
         let allowed = self.config.following;
         let share = self.state.speed_scaling.clamp(LEAST_SHARE, 1.0);
         Following {
-            base: allowed.base + self.ahead,
+            base: allowed.base + self.apart,
             delay: (allowed.delay + self.delay) / share,
         }
     }
