@@ -1,10 +1,10 @@
 //! The drives of all joints in a session: enabled, following, stopped.
 
-use driver_kit::{Measured, Resampler, RobotFault};
+use driver_kit::{Measured, Resampler, RobotFault, TimedReferences};
 use ipc::{MAX_JOINTS, bytes_of};
 
 use crate::process_data::Said;
-use crate::snapshot::{Phase, Row, Snapshot};
+use crate::snapshot::{Phase, Snapshot};
 use crate::{Drive, DriveState, control_word};
 
 /// How long the drives may take until they follow (s), for how long all must be enabled before, and
@@ -92,7 +92,7 @@ impl Axes {
         &mut self,
         said: &[Said],
         (wish, passed): (u32, f64),
-        rows: &mut dyn FnMut() -> Option<Row>,
+        rows: &mut dyn FnMut() -> Option<TimedReferences<MAX_JOINTS>>,
         now: &mut Snapshot,
     ) {
         self.time += passed * self.cycle;

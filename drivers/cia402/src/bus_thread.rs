@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use driver_kit::RobotFault;
+use driver_kit::{RobotFault, TimedReferences};
 use ethercrab::{
     Command, MainDevice, MainDeviceConfig, PduStorage, RegisterAddress, RetryBehaviour,
     SubDeviceState, Timeouts,
@@ -21,7 +21,7 @@ use crate::bus_error::BusError;
 use crate::group::Exchanged;
 use crate::process_data::Said;
 use crate::pump::Pump;
-use crate::snapshot::{Phase, Row, Snapshot};
+use crate::snapshot::{Phase, Snapshot};
 
 /// Frames that are under way at most, and the data of one (bytes).
 const FRAMES: usize = 16;
@@ -55,7 +55,7 @@ const DRAW_MOST: f64 = 0.02;
 pub(crate) struct BusThread {
     pub(crate) options: Cia402Options,
     pub(crate) axes: Axes,
-    pub(crate) rows: Consumer<Row>,
+    pub(crate) rows: Consumer<TimedReferences<MAX_JOINTS>>,
     /// The session that the engine wants; 0 for none.
     pub(crate) wish: Arc<AtomicU32>,
     pub(crate) snapshots: Producer<Snapshot>,

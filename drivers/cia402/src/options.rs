@@ -57,16 +57,7 @@ impl Cia402Options {
     /// # Errors
     /// [`DriverError`] with the option's name.
     pub(crate) fn check(&self) -> Result<(), DriverError> {
-        let within = |option, value: f64, [least, most]: [f64; 2], wanted| {
-            if (least..=most).contains(&value) {
-                return Ok(());
-            }
-            Err(DriverError::Value {
-                option,
-                wanted,
-                value,
-            })
-        };
+        let within = DriverError::check_range;
         within("cycle", self.cycle, [0.00025, 0.02], "0.25 to 20 ms")?;
         let twice = [2.0 * self.cycle, 6.5];
         within("watchdog", self.watchdog, twice, "two cycles to 6.5 s")?;

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::thread::{Builder, JoinHandle};
 
 use driver_kit::{
-    About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
+    About, Command, DriverError, Measured, Measurement, OwnThread, Readiness, Resampler,
+    ResamplerOptions, Robot, RobotFault, Sensors, TimedReferences, speed_share,
 };
 use ipc::{MAX_JOINTS, text_of};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -15,7 +14,7 @@ use scheduling::now_ns;
 use crate::Cia402Options;
 use crate::axes::Axes;
 use crate::bus_thread::BusThread;
-use crate::snapshot::{Phase, Row, Snapshot};
+use crate::snapshot::{Phase, Snapshot};
 
 /// Room of the rings between the two threads.
 const RING: usize = 256;
@@ -30,7 +29,7 @@ pub struct Cia402 {
     cycle: f64,
     /// How far the targets shall be behind the setpoints (s).
     delay: f64,
-    rows: Producer<Row>,
+    rows: Producer<TimedReferences<MAX_JOINTS>>,
     snapshots: Consumer<Snapshot>,
     /// The newest cycle.
     now: Snapshot,
@@ -39,7 +38,7 @@ pub struct Cia402 {
     session: Option<u32>,
     sessions: u32,
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl Cia402 {
@@ -50,14 +49,8 @@ impl Cia402 {
     pub fn new(options: Cia402Options) -> Result<Self, DriverError> {
         options.check()?;
         let about = about(&options)?;
-        let keep = |values: &[f64]| values.iter().map(|value| value * options.share).collect();
-        let limits = ResamplerOptions {
-            delay: options.delay,
-            period: options.cycle,
-            velocity: keep(&about.velocity),
-            acceleration: keep(&about.acceleration),
-            jerk: keep(&about.jerk),
-        };
+        let shares = [options.share; 3];
+        let limits = ResamplerOptions::of_shares(&about, options.delay, options.cycle, shares);
         let resampler = Resampler::new(&about, limits)?;
         let (rows, rows_out) = RingBuffer::new(RING);
         let (snapshots_in, snapshots) = RingBuffer::new(RING);
@@ -75,12 +68,7 @@ impl Cia402 {
             snapshot: Snapshot::default(),
             stop: Arc::clone(&stop),
         };
-        let thread = Builder::new()
-            .name("ethercat".to_owned())
-            .spawn(move || thread.run())
-            .map_err(|cause| DriverError::Thread {
-                cause: cause.to_string(),
-            })?;
+        let thread = OwnThread::start("ethercat", move || thread.run())?;
         Ok(Self {
             about,
             cycle,
@@ -92,7 +80,7 @@ impl Cia402 {
             session: None,
             sessions: 0,
             stop,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -188,15 +176,8 @@ impl Robot for Cia402 {
         if self.now.phase != Phase::Following {
             return;
         }
-        let mut row = Row {
-            at_ns: command.at_ns,
-            joints: [Reference::default(); MAX_JOINTS],
-        };
-        for (to, from) in row.joints.iter_mut().zip(command.joints) {
-            *to = *from;
-        }
         // A full ring has a bus that stands still: that is a fault of its own.
-        let _ = self.rows.push(row);
+        let _ = self.rows.push(command.into());
     }
 
     fn speed_scaling(&self) -> f64 {
@@ -226,9 +207,5 @@ impl Robot for Cia402 {
 impl Drop for Cia402 {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so; there is nothing left to end.
-            let _ = thread.join();
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! What the two threads tell each other.
 
-use driver_kit::{Measured, Reference, RobotFault};
+use driver_kit::{Measured, RobotFault};
 use ipc::MAX_JOINTS;
 
 /// Where the bus is in its life.
@@ -64,11 +64,4 @@ impl Default for Snapshot {
             clock_error: f64::NAN,
         }
     }
-}
-
-/// A reference of all joints with its time (ns).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
-    pub(crate) at_ns: u64,
-    pub(crate) joints: [Reference; MAX_JOINTS],
 }

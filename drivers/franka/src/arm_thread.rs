@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
 
-use driver_kit::{Reference, Resampler, RobotFault};
+use driver_kit::{Reference, Resampler, RobotFault, TimedReferences};
 use franka::{
     ActiveMotionGenerator, Errors, FrankaError, JointPositions, MoveControllerMode, RealtimeConfig,
     Robot, RobotMode, RobotOptions, RobotState, motion_finished,
@@ -14,7 +14,7 @@ use ipc::{Payload, bytes_of};
 use rtrb::{Consumer, Producer};
 use scheduling::{RealTimeRequest, now_ns, request_real_time};
 
-use crate::snapshot::{Phase, Row, Snapshot, Wish};
+use crate::snapshot::{Phase, Snapshot, Wish};
 use crate::{FrankaOptions, JOINTS};
 
 /// Time between two tries to connect, and the length of a look at whether the driver ends.
@@ -52,7 +52,7 @@ const PATIENCE: u32 = 2000;
 pub(crate) struct ArmThread {
     pub(crate) options: FrankaOptions,
     pub(crate) resampler: Resampler,
-    pub(crate) rows: Consumer<Row>,
+    pub(crate) rows: Consumer<TimedReferences<JOINTS>>,
     pub(crate) wishes: Consumer<Wish>,
     pub(crate) snapshots: Producer<Snapshot>,
     pub(crate) snapshot: Snapshot,

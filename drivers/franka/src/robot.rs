@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{Builder, JoinHandle};
 
 use driver_kit::{
-    About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
+    About, Command, DriverError, Measured, Measurement, OwnThread, Readiness, Resampler,
+    ResamplerOptions, Robot, RobotFault, Sensors, TimedReferences, speed_share,
 };
 use franka::RobotMode;
 use ipc::{GRIPPER, Payload, ToolCommand, ToolFeedback, ToolStatus, text_of};
@@ -15,7 +14,7 @@ use scheduling::now_ns;
 
 use crate::arm_thread::ArmThread;
 use crate::gripper::Hand;
-use crate::snapshot::{Phase, Row, Snapshot, Wish};
+use crate::snapshot::{Phase, Snapshot, Wish};
 use crate::{FrankaOptions, JOINTS};
 
 /// Room of the rings between the two threads: a quarter of a second.
@@ -37,7 +36,7 @@ pub struct Franka {
     address: String,
     /// How far the arm shall be behind the setpoints (s).
     delay: f64,
-    rows: Producer<Row>,
+    rows: Producer<TimedReferences<JOINTS>>,
     wishes: Producer<Wish>,
     snapshots: Consumer<Snapshot>,
     /// The newest state.
@@ -50,7 +49,7 @@ pub struct Franka {
     held: [f64; JOINTS],
     hand: Option<Hand>,
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl Franka {
@@ -60,18 +59,9 @@ impl Franka {
     /// [`DriverError`] for options that do not fit together.
     pub fn new(options: FrankaOptions) -> Result<Self, DriverError> {
         let about = about(&options)?;
-        let maker = &options.about;
-        let keep = |values: &[f64]| values.iter().map(|value| value * options.share).collect();
-        let resampler = Resampler::new(
-            &about,
-            ResamplerOptions {
-                delay: options.delay,
-                period: 1e-3,
-                velocity: keep(&maker.velocity),
-                acceleration: keep(&maker.acceleration),
-                jerk: keep(&maker.jerk),
-            },
-        )?;
+        let shares = [options.share; 3];
+        let limits = ResamplerOptions::of_shares(&options.about, options.delay, 1e-3, shares);
+        let resampler = Resampler::new(&about, limits)?;
         let (rows, rows_out) = RingBuffer::new(RING);
         let (wishes, wishes_out) = RingBuffer::new(16);
         let (snapshots_in, snapshots) = RingBuffer::new(RING);
@@ -90,12 +80,7 @@ impl Franka {
             payload: None,
             stop: Arc::clone(&stop),
         };
-        let thread = Builder::new()
-            .name("franka".to_owned())
-            .spawn(move || thread.run())
-            .map_err(|cause| DriverError::Thread {
-                cause: cause.to_string(),
-            })?;
+        let thread = OwnThread::start("franka", move || thread.run())?;
         Ok(Self {
             about,
             address,
@@ -109,7 +94,7 @@ impl Franka {
             held: [0.0; JOINTS],
             hand,
             stop,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -161,13 +146,7 @@ fn about(options: &FrankaOptions) -> Result<About, DriverError> {
         ..options.about.clone()
     };
     about.check()?;
-    if about.joints() != JOINTS {
-        return Err(DriverError::Count {
-            option: "joints",
-            found: about.joints(),
-            joints: JOINTS,
-        });
-    }
+    about.check_joints(JOINTS)?;
     DriverError::check_value("share", options.share, true)?;
     Ok(about)
 }
@@ -268,15 +247,8 @@ impl Robot for Franka {
         if self.now.phase != Phase::Moving {
             return;
         }
-        let mut row = Row {
-            at_ns: command.at_ns,
-            joints: [Reference::default(); JOINTS],
-        };
-        for (to, from) in row.joints.iter_mut().zip(command.joints) {
-            *to = *from;
-        }
         // A full ring has a thread that does not run: the controller says so itself.
-        let _ = self.rows.push(row);
+        let _ = self.rows.push(command.into());
     }
 
     fn act(&mut self, tool: usize, order: &ToolCommand) {
@@ -326,9 +298,5 @@ impl Robot for Franka {
 impl Drop for Franka {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so; there is nothing left to end.
-            let _ = thread.join();
-        }
     }
 }

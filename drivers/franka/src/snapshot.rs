@@ -1,6 +1,6 @@
 //! What the thread that owns the arm tells the kit, and what the kit tells it.
 
-use driver_kit::{Reference, RobotFault};
+use driver_kit::RobotFault;
 use franka::{RobotMode, RobotState};
 use ipc::Payload;
 
@@ -77,13 +77,6 @@ impl Snapshot {
         self.wrench = state.O_F_ext_hat_K;
         self.success_rate = state.control_command_success_rate;
     }
-}
-
-/// A reference of all joints with its time (ns).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
-    pub(crate) at_ns: u64,
-    pub(crate) joints: [Reference; JOINTS],
 }
 
 /// What the kit wants of the thread.

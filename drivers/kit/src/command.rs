@@ -16,3 +16,26 @@ pub struct Command<'a> {
     /// Length of the period (s).
     pub period: f64,
 }
+
+/// The references of a [`Command`] with their time, for the thread that owns a controller: up to `N`
+/// joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedReferences<const N: usize> {
+    /// See [`Command::at_ns`].
+    pub at_ns: u64,
+    /// See [`Command::joints`]; those that it does not have are zero.
+    pub joints: [Reference; N],
+}
+
+impl<const N: usize> From<&Command<'_>> for TimedReferences<N> {
+    fn from(command: &Command<'_>) -> Self {
+        let mut joints = [Reference::default(); N];
+        for (to, from) in joints.iter_mut().zip(command.joints) {
+            *to = *from;
+        }
+        Self {
+            at_ns: command.at_ns,
+            joints,
+        }
+    }
+}

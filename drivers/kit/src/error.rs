@@ -68,6 +68,26 @@ pub enum DriverError {
 }
 
 impl DriverError {
+    /// Whether the number of an option is in a range, its ends included; `wanted` says which one.
+    ///
+    /// # Errors
+    /// [`DriverError::Value`] with the option's name.
+    pub fn check_range(
+        option: &'static str,
+        value: f64,
+        [least, most]: [f64; 2],
+        wanted: &'static str,
+    ) -> Result<(), Self> {
+        if (least..=most).contains(&value) {
+            return Ok(());
+        }
+        Err(Self::Value {
+            option,
+            wanted,
+            value,
+        })
+    }
+
     /// Whether the number of an option is finite and, where it must be, positive.
     ///
     /// # Errors

@@ -69,6 +69,20 @@ pub struct ResamplerOptions {
     pub jerk: Vec<f64>,
 }
 
+impl ResamplerOptions {
+    /// With shares of the velocities, accelerations and jerks of an arm.
+    pub fn of_shares(about: &About, delay: f64, period: f64, shares: [f64; 3]) -> Self {
+        let part = |values: &[f64], share: f64| values.iter().map(|value| value * share).collect();
+        Self {
+            delay,
+            period,
+            velocity: part(&about.velocity, shares[0]),
+            acceleration: part(&about.acceleration, shares[1]),
+            jerk: part(&about.jerk, shares[2]),
+        }
+    }
+}
+
 /// A reference of all joints with its time.
 #[derive(Clone, Debug)]
 struct Row {

@@ -64,6 +64,22 @@ impl About {
         self.lower.len()
     }
 
+    /// Whether there are as many joints as a controller drives.
+    ///
+    /// # Errors
+    /// [`DriverError::Count`].
+    pub fn check_joints(&self, joints: usize) -> Result<(), DriverError> {
+        let found = self.joints();
+        if found == joints {
+            return Ok(());
+        }
+        Err(DriverError::Count {
+            option: "joints",
+            found,
+            joints,
+        })
+    }
+
     /// A limiter a joint.
     pub(crate) fn limiters(&self) -> Vec<Limiter> {
         let limiter = |joint: usize| Limiter {

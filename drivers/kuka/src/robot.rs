@@ -3,17 +3,16 @@
 use std::net::UdpSocket;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use driver_kit::{
-    About, Command, DriverError, Measured, Measurement, Readiness, Reference, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors, speed_share,
+    About, Command, DriverError, Measured, Measurement, OwnThread, Readiness, Resampler,
+    ResamplerOptions, Robot, RobotFault, Sensors, TimedReferences, speed_share,
 };
 use rtrb::{Consumer, Producer, RingBuffer};
 use scheduling::now_ns;
 
-use crate::socket_thread::{Row, Snapshot, SocketThread};
+use crate::socket_thread::{Snapshot, SocketThread};
 use crate::telegram::Telegram;
 use crate::{JOINTS, KukaOptions};
 
@@ -32,7 +31,7 @@ const LEARNT: u64 = 500;
 pub struct Kuka {
     about: About,
     options: KukaOptions,
-    rows: Producer<Row>,
+    rows: Producer<TimedReferences<JOINTS>>,
     snapshots: Consumer<Snapshot>,
     /// The newest telegram.
     now: Snapshot,
@@ -40,7 +39,7 @@ pub struct Kuka {
     /// The connection whose motion an engine asked for.
     session: Option<u32>,
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: OwnThread,
 }
 
 impl Kuka {
@@ -50,15 +49,9 @@ impl Kuka {
     /// [`DriverError`] for options that do not fit together, or a port that is taken.
     pub fn new(options: KukaOptions) -> Result<Self, DriverError> {
         let about = about(&options)?;
-        let keep = |values: &[f64]| values.iter().map(|value| value * options.share).collect();
-        let maker = &options.about;
-        let limits = ResamplerOptions {
-            delay: options.delay,
-            period: options.cycle,
-            velocity: keep(&maker.velocity),
-            acceleration: keep(&maker.acceleration),
-            jerk: keep(&maker.jerk),
-        };
+        let shares = [options.share; 3];
+        let limits =
+            ResamplerOptions::of_shares(&options.about, options.delay, options.cycle, shares);
         let resampler = Resampler::new(&about, limits.clone())?;
         let fail = |cause: std::io::Error| DriverError::Port {
             address: options.listen.clone(),
@@ -87,12 +80,7 @@ impl Kuka {
             origin: [0.0; JOINTS],
             stop: Arc::clone(&stop),
         };
-        let thread = Builder::new()
-            .name("kuka".to_owned())
-            .spawn(move || thread.run())
-            .map_err(|cause| DriverError::Thread {
-                cause: cause.to_string(),
-            })?;
+        let thread = OwnThread::start("kuka", move || thread.run())?;
         Ok(Self {
             about,
             options,
@@ -102,7 +90,7 @@ impl Kuka {
             follow,
             session: None,
             stop,
-            thread: Some(thread),
+            _thread: thread,
         })
     }
 
@@ -131,13 +119,7 @@ fn about(options: &KukaOptions) -> Result<About, DriverError> {
         ..options.about.clone()
     };
     about.check()?;
-    if about.joints() != JOINTS {
-        return Err(DriverError::Count {
-            option: "joints",
-            found: about.joints(),
-            joints: JOINTS,
-        });
-    }
+    about.check_joints(JOINTS)?;
     DriverError::check_value("cycle", options.cycle, true)?;
     DriverError::check_value("share", options.share, true)?;
     Ok(about)
@@ -202,15 +184,8 @@ impl Robot for Kuka {
         if !self.now.follows {
             return;
         }
-        let mut row = Row {
-            at_ns: command.at_ns,
-            joints: [Reference::default(); JOINTS],
-        };
-        for (to, from) in row.joints.iter_mut().zip(command.joints) {
-            *to = *from;
-        }
         // A full ring has a controller that is silent: that is a fault of its own.
-        let _ = self.rows.push(row);
+        let _ = self.rows.push(command.into());
     }
 
     fn speed_scaling(&self) -> f64 {
@@ -247,9 +222,5 @@ impl Robot for Kuka {
 impl Drop for Kuka {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so; there is nothing left to end.
-            let _ = thread.join();
-        }
     }
 }

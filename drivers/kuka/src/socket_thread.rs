@@ -4,7 +4,7 @@ use std::net::UdpSocket;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use driver_kit::{About, Reference, Resampler, ResamplerOptions};
+use driver_kit::{About, Resampler, ResamplerOptions, TimedReferences};
 use rtrb::{Consumer, Producer};
 use scheduling::{RealTimeRequest, now_ns, request_real_time};
 
@@ -43,13 +43,6 @@ pub(crate) struct Snapshot {
     pub(crate) delay: f64,
 }
 
-/// A reference of all joints with its time (ns).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
-    pub(crate) at_ns: u64,
-    pub(crate) joints: [Reference; JOINTS],
-}
-
 /// Everything that the thread owns.
 pub(crate) struct SocketThread {
     pub(crate) options: KukaOptions,
@@ -60,7 +53,7 @@ pub(crate) struct SocketThread {
     pub(crate) resampler: Resampler,
     /// Length of a cycle, estimated from the arrivals (s).
     pub(crate) cycle: f64,
-    pub(crate) rows: Consumer<Row>,
+    pub(crate) rows: Consumer<TimedReferences<JOINTS>>,
     /// Whether the references shall be followed.
     pub(crate) follow: Arc<AtomicBool>,
     pub(crate) snapshots: Producer<Snapshot>,

@@ -5,14 +5,14 @@ use std::sync::atomic::Ordering;
 use std::thread::sleep;
 use std::time::Duration;
 
-use driver_kit::{About, Reference, Resampler, ResamplerOptions, RobotFault};
+use driver_kit::{About, Reference, Resampler, ResamplerOptions, RobotFault, TimedReferences};
 use ipc::{bytes_of, text_of};
 use rtrb::{Consumer, Producer};
 use scheduling::{RealTimeRequest, now_ns, request_real_time};
 
 use crate::link::{Link, Refusal};
 use crate::rtde::Cycle;
-use crate::snapshot::{Alarm, Connection, Modes, Phase, Row, Snapshot};
+use crate::snapshot::{Alarm, Connection, Modes, Phase, Snapshot};
 use crate::stream::Stream;
 use crate::{JOINTS, UrOptions, words};
 
@@ -44,7 +44,7 @@ const PATIENCE: u32 = 1000;
 pub(crate) struct CycleThread {
     pub(crate) options: UrOptions,
     pub(crate) about: About,
-    pub(crate) rows: Consumer<Row>,
+    pub(crate) rows: Consumer<TimedReferences<JOINTS>>,
     pub(crate) connections: Consumer<Connection>,
     pub(crate) alarms: Consumer<Alarm>,
     pub(crate) snapshots: Producer<Snapshot>,
@@ -208,14 +208,8 @@ impl CycleThread {
     }
 
     fn resampler(&self, period: f64) -> Option<Resampler> {
-        let more = |values: &[f64], share: f64| values.iter().map(|value| value * share).collect();
-        let options = ResamplerOptions {
-            delay: self.options.delay,
-            period,
-            velocity: more(&self.about.velocity, CATCH_UP[0]),
-            acceleration: more(&self.about.acceleration, CATCH_UP[1]),
-            jerk: more(&self.about.jerk, CATCH_UP[2]),
-        };
+        let delay = self.options.delay;
+        let options = ResamplerOptions::of_shares(&self.about, delay, period, CATCH_UP);
         // The options were checked before the thread began.
         Resampler::new(&self.about, options).ok()
     }
@@ -246,7 +240,13 @@ impl CycleThread {
 
 impl Session {
     /// Moves on by `passed` cycles of `period` (s), and sends a setpoint for each.
-    fn go_on(&mut self, rows: &mut Consumer<Row>, passed: u32, period: f64, timeout: f64) {
+    fn go_on(
+        &mut self,
+        rows: &mut Consumer<TimedReferences<JOINTS>>,
+        passed: u32,
+        period: f64,
+        timeout: f64,
+    ) {
         while let Ok(row) = rows.pop() {
             self.resampler.push(row.at_ns, &row.joints);
         }

@@ -77,16 +77,7 @@ impl UrOptions {
     /// # Errors
     /// [`DriverError::Value`] with the option's name.
     pub(crate) fn check(&self) -> Result<(), DriverError> {
-        let within = |option, value: f64, [least, most]: [f64; 2], wanted| {
-            if (least..=most).contains(&value) {
-                return Ok(());
-            }
-            Err(DriverError::Value {
-                option,
-                wanted,
-                value,
-            })
-        };
+        let within = DriverError::check_range;
         within("lookahead", self.lookahead, [0.03, 0.2], "0.03 to 0.2 s")?;
         within("gain", self.gain, [100.0, 2000.0], "100 to 2000")?;
         within("timeout", self.timeout, [0.02, 0.5], "0.02 to 0.5 s")?;

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::{Builder, JoinHandle};
 
 use driver_kit::{
-    About, Command, DriverError, Inputs, Measured, Measurement, Outputs, Readiness, Reference,
-    Robot, RobotFault, Sensors,
+    About, Command, DriverError, Inputs, Measured, Measurement, Outputs, OwnThread, Readiness,
+    Robot, RobotFault, Sensors, TimedReferences,
 };
 use ipc::{GRIPPER, Payload, ToolAction, ToolCommand, ToolStatus, text_of};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -14,7 +13,7 @@ use scheduling::now_ns;
 
 use crate::control_thread::{ControlThread, Rings};
 use crate::cycle_thread::CycleThread;
-use crate::snapshot::{Modes, Notice, Phase, Row, Snapshot, Wish};
+use crate::snapshot::{Modes, Notice, Phase, Snapshot, Wish};
 use crate::{JOINTS, UrOptions, words};
 
 /// Room of the rings between the threads: a quarter of a second.
@@ -35,7 +34,7 @@ pub struct Ur {
     about: About,
     options: UrOptions,
     modes: Arc<Modes>,
-    rows: Producer<Row>,
+    rows: Producer<TimedReferences<JOINTS>>,
     wishes: Producer<Wish>,
     snapshots: Consumer<Snapshot>,
     notices: Consumer<Notice>,
@@ -49,7 +48,7 @@ pub struct Ur {
     held: [f64; JOINTS],
     /// When the gripper has done its last order (ns), and its status then.
     gripper: (u64, ToolStatus),
-    threads: Vec<JoinHandle<()>>,
+    _threads: [OwnThread; 2],
 }
 
 impl Ur {
@@ -88,16 +87,10 @@ impl Ur {
             snapshot: Snapshot::default(),
             modes: Arc::clone(&modes),
         };
-        let spawn = |name: &str, run: Box<dyn FnOnce() + Send>| {
-            let started = Builder::new().name(name.to_owned()).spawn(run);
-            started.map_err(|cause| DriverError::Thread {
-                cause: cause.to_string(),
-            })
-        };
-        let threads = vec![
-            spawn("ur", Box::new(move || cycle.run()))?,
-            spawn("ur-control", Box::new(move || control.run()))?,
-        ];
+        let cycle = OwnThread::start("ur", move || cycle.run())?;
+        // Without the second thread the first shall end: it is waited for.
+        let control = OwnThread::start("ur-control", move || control.run())
+            .inspect_err(|_| modes.stop.store(true, Ordering::Relaxed))?;
         Ok(Self {
             about,
             options,
@@ -112,7 +105,7 @@ impl Ur {
             begun: false,
             held: [f64::NAN; JOINTS],
             gripper: (0, ToolStatus::Unknown),
-            threads,
+            _threads: [cycle, control],
         })
     }
 
@@ -159,13 +152,7 @@ fn about(options: &UrOptions) -> Result<About, DriverError> {
     };
     about.check()?;
     options.check()?;
-    if about.joints() != JOINTS {
-        return Err(DriverError::Count {
-            option: "joints",
-            found: about.joints(),
-            joints: JOINTS,
-        });
-    }
+    about.check_joints(JOINTS)?;
     Ok(about)
 }
 
@@ -245,15 +232,8 @@ impl Robot for Ur {
         if self.now.phase != Phase::Moving {
             return;
         }
-        let mut row = Row {
-            at_ns: command.at_ns,
-            joints: [Reference::default(); JOINTS],
-        };
-        for (to, from) in row.joints.iter_mut().zip(command.joints) {
-            *to = *from;
-        }
         // A full ring has a controller that is silent: that is a fault of its own.
-        let _ = self.rows.push(row);
+        let _ = self.rows.push(command.into());
     }
 
     fn speed_scaling(&self) -> f64 {
@@ -334,9 +314,5 @@ impl Robot for Ur {
 impl Drop for Ur {
     fn drop(&mut self) {
         self.modes.stop.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            // A thread that panicked has said so; there is nothing left to end.
-            let _ = thread.join();
-        }
     }
 }

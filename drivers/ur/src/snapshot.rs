@@ -3,10 +3,9 @@
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, AtomicU64, Ordering};
 
-use driver_kit::{Outputs, Reference, RobotFault};
+use driver_kit::{Outputs, RobotFault};
 use ipc::Payload;
 
-use crate::JOINTS;
 use crate::rtde::{Cycle, Version};
 
 /// What the thread that answers the controller does.
@@ -50,13 +49,6 @@ impl Default for Snapshot {
             refused: false,
         }
     }
-}
-
-/// A reference of all joints with its time (ns).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
-    pub(crate) at_ns: u64,
-    pub(crate) joints: [Reference; JOINTS],
 }
 
 /// What the kit wants.
