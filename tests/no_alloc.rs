@@ -101,6 +101,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         ..State::default()
     };
     state.position = ack.position;
+    state.commanded = ack.position;
     state.sensor_count = 1;
     let force = Cell::new(0.0);
     let mut period = |number: u64| {
@@ -119,6 +120,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         }
         state.sensors[0] = Sensor::new("force", force.get());
         state.position = received.position;
+        state.commanded = received.position;
         state.sequence += 1;
         state.driver_state = DriverState::Active as u32;
         assert!(driver.send(state));

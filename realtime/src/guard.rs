@@ -20,8 +20,10 @@ pub enum Quantity {
     Jerk,
     /// Positions that do not follow from the velocities (rad).
     Step,
-    /// Distance between setpoint and measured position (rad).
+    /// Distance between commanded and measured position (rad).
     Following,
+    /// Distance between setpoint and the position that the driver commands (rad).
+    Commanded,
 }
 
 impl Quantity {
@@ -35,6 +37,7 @@ impl Quantity {
             Self::Jerk => "jerk",
             Self::Step => "position step",
             Self::Following => "following error",
+            Self::Commanded => "deviation of the driver's command from the setpoint",
         }
     }
 
@@ -42,7 +45,7 @@ impl Quantity {
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Finite => "",
-            Self::Position | Self::Step | Self::Following => "rad",
+            Self::Position | Self::Step | Self::Following | Self::Commanded => "rad",
             Self::Velocity => "rad/s",
             Self::Acceleration => "rad/s2",
             Self::Jerk => "rad/s3",
@@ -134,32 +137,50 @@ fn check_range<const N: usize>(
     }
 }
 
-/// How far the measured position may be from the setpoint.
+/// How far one position may be from another that it follows late.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Following {
     /// At rest (rad).
     pub base: f64,
-    /// More for each rad/s of the setpoint's speed: the delay that is allowed for (s).
+    /// More for each rad/s of speed: the delay that is allowed for (s).
     pub delay: f64,
 }
 
-/// Which joint's measured position is too far from the setpoint.
-pub fn check_following<const N: usize>(
-    setpoint: &Sample<N>,
-    measured: &SVector<f64, N>,
-    allowed: Following,
-) -> Option<Trip> {
-    (0..N).find_map(|joint| {
-        let value = of(measured, joint) - of(&setpoint.position, joint);
-        let limit = allowed.base + allowed.delay * libm::fabs(of(&setpoint.velocity, joint));
-        let bad = !value.is_finite() || libm::fabs(value) > limit;
-        bad.then_some(Trip {
-            joint,
-            quantity: Quantity::Following,
-            value,
-            limit,
+impl Following {
+    /// The first joint of `found` that is too far from `wanted` (both rad, m), where the joints moved
+    /// with up to `speed` (rad/s, m/s) in the time that counts. The trip has this `quantity`.
+    ///
+    /// # Example
+    /// ```
+    /// use nalgebra::vector;
+    /// use realtime::{Following, Quantity};
+    ///
+    /// let allowed = Following { base: 0.01, delay: 0.02 };
+    /// let (wanted, found) = (vector![0.0, 0.0], vector![0.0, 0.02]);
+    /// let trip = allowed.check(Quantity::Following, &wanted, &found, &vector![0.0, 0.0]);
+    /// assert_eq!(trip.map(|trip| trip.joint), Some(1));
+    /// let moving = allowed.check(Quantity::Following, &wanted, &found, &vector![0.0, 1.0]);
+    /// assert_eq!(moving, None);
+    /// ```
+    pub fn check<const N: usize>(
+        self,
+        quantity: Quantity,
+        wanted: &SVector<f64, N>,
+        found: &SVector<f64, N>,
+        speed: &SVector<f64, N>,
+    ) -> Option<Trip> {
+        (0..N).find_map(|joint| {
+            let value = of(found, joint) - of(wanted, joint);
+            let limit = self.base + self.delay * libm::fabs(of(speed, joint));
+            let bad = !value.is_finite() || libm::fabs(value) > limit;
+            bad.then_some(Trip {
+                joint,
+                quantity,
+                value,
+                limit,
+            })
         })
-    })
+    }
 }
 
 #[cfg(test)]
@@ -210,11 +231,12 @@ mod tests {
             base: 0.01,
             delay: 0.02,
         };
-        let mut setpoint = Sample::rest(vector![0.0, 0.0]);
-        let measured = vector![0.0, 0.02];
-        assert!(check_following(&setpoint, &measured, allowed).is_some());
-        setpoint.velocity[1] = 1.0;
-        assert!(check_following(&setpoint, &measured, allowed).is_none());
-        assert!(check_following(&setpoint, &vector![f64::NAN, 0.0], allowed).is_some());
+        let (rest, measured) = (vector![0.0, 0.0], vector![0.0, 0.02]);
+        let found = |measured, speed: SVector<f64, 2>| {
+            allowed.check(Quantity::Following, &rest, &measured, &speed)
+        };
+        assert!(found(measured, rest).is_some());
+        assert!(found(measured, vector![0.0, 1.0]).is_none());
+        assert!(found(vector![f64::NAN, 0.0], rest).is_some());
     }
 }

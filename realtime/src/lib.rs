@@ -33,6 +33,6 @@ pub use brake::{at_rest, brake};
 pub use buffer::Pushed;
 pub use cycle::{Cycle, Demand, Step};
 pub use governor::StopCategory;
-pub use guard::{Following, Quantity, Trip, check, check_following};
+pub use guard::{Following, Quantity, Trip, check};
 pub use limits::JointLimits;
 pub use piece::{Piece, Sample, Segment};

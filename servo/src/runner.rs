@@ -42,8 +42,9 @@ const GUARDED: usize = 64;
 /// Largest number of items taken from the ring per period.
 const A_PERIOD: usize = 64;
 
-/// Time in which a driver returns to the setpoints after a stall, about (s).
-const REJOIN: f64 = 1.0;
+/// How long the speed of a joint counts in its following error (s): an arm that follows late may be far
+/// from a plan that rests already.
+const MEMORY: f64 = 1.0;
 
 /// When a period runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,8 +111,8 @@ pub struct Runner<const N: usize> {
     orders: u32,
     tools: [ToolCommand; MAX_TOOLS],
     published: Sample<N>,
-    /// How far the driver may be from the setpoint after a stall (rad).
-    apart: f64,
+    /// How fast the joints moved lately (rad/s): the largest speed, which fades with [`MEMORY`].
+    speed: SVector<f64, N>,
     pending: Option<Recorded<N>>,
     tick: u64,
 }
@@ -155,7 +156,7 @@ impl<const N: usize> Runner<N> {
             orders: 0,
             tools: [ToolCommand::default(); MAX_TOOLS],
             published: Sample::rest(rest),
-            apart: 0.0,
+            speed: rest,
             pending: None,
             tick: 0,
             config,
@@ -192,7 +193,7 @@ impl<const N: usize> Runner<N> {
         self.forget_guards();
         self.orders = 0;
         self.tools = [ToolCommand::default(); MAX_TOOLS];
-        self.apart = 0.0;
+        self.speed = SVector::zeros();
         self.pending = None;
         self.share_position();
     }
@@ -399,15 +400,6 @@ impl<const N: usize> Runner<N> {
                 late_ms: (late * 1e3) as u64,
             });
         }
-        let fading = self.apart * (1.0 - self.period / REJOIN);
-        self.apart = if fading > 1e-6 { fading } else { 0.0 };
-        self.forgive(late.min(self.config.watchdog.as_secs_f64()));
-    }
-
-    /// After a stall (s) of this thread the driver may be ahead, after one of its own it is behind: by the
-    /// way of that time, until it has returned to the plan.
-    fn forgive(&mut self, stall: f64) {
-        self.apart = self.apart.max(self.published.velocity.amax() * stall);
     }
 
     /// Moves along the path by one step. Periods that were left out delay the plan, so a setpoint
@@ -416,6 +408,8 @@ impl<const N: usize> Runner<N> {
         let made = self.cycle.step(self.demand());
         self.tell(&made, self.tick);
         self.published = made.setpoint;
+        let fading = self.speed * (1.0 - self.period / MEMORY);
+        self.speed = made.setpoint.velocity.abs().sup(&fading);
         self.pending = self.samples.is_some().then_some(Recorded {
             tick: self.tick,
             command: made.command,

@@ -1,6 +1,7 @@
 //! The work of the real-time thread on a virtual clock, with an ideal driver: all times are exact.
 
 mod arms;
+mod following;
 mod orders;
 
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
@@ -41,6 +42,7 @@ impl Bench {
             ..State::default()
         };
         state.position = ack.position;
+        state.commanded = ack.position;
         Self {
             runner,
             sender,
@@ -67,6 +69,7 @@ impl Bench {
         };
         let setpoint = self.runner.tick(change(self.state), tick);
         self.state.position = setpoint.position;
+        self.state.commanded = setpoint.position;
         self.tick += 1;
         self.setpoints.push(setpoint);
         setpoint

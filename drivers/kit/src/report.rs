@@ -2,7 +2,7 @@
 
 use ipc::{Clock, State, StateFlags};
 
-use crate::{Driver, Measurement, Robot, Sensors};
+use crate::{Driver, Measurement, Robot, Sensors, speed_share};
 
 impl<R: Robot> Driver<R> {
     /// The state at `now_ns`, with the next sequence number.
@@ -36,12 +36,22 @@ impl<R: Robot> Driver<R> {
         (state.sensors, state.sensor_count) = sensors.all();
         let share = self.robot.speed_scaling();
         // A share that is not a number asks for no motion.
-        state.speed_scaling = if share.is_nan() {
-            0.0
-        } else {
-            share.clamp(0.0, 1.0)
-        };
+        let robot = if share.is_nan() { 0.0 } else { share };
+        state.speed_scaling = robot.clamp(0.0, speed_share(self.lag()));
         state
+    }
+
+    /// How far what the robot follows is from the setpoints, as the time that the farthest joint needs at
+    /// its largest speed (s); 0 in lock-step, where nobody is late.
+    fn lag(&self) -> f64 {
+        if !self.is_following() || self.clock() != Some(Clock::Wall) {
+            return 0.0;
+        }
+        let pairs = self.references.iter().zip(&self.targets);
+        let times = pairs
+            .zip(&self.about.velocity)
+            .map(|((reference, target), most)| (target.position - reference.position).abs() / most);
+        times.fold(0.0, f64::max)
     }
 
     fn report_joints(&self, state: &mut State, now_ns: u64) {

@@ -38,7 +38,8 @@ const LEAST: f64 = 0.2;
 
 /// The share of the planned speed that an arm asks for which is `behind` by so much more time than it
 /// should be (s), because its controller stood still: the distance that it is behind stays small until it
-/// has caught up. For [`crate::Robot::speed_scaling`].
+/// has caught up. For [`crate::Robot::speed_scaling`]; after a stall of the driver the kit asks for it by
+/// itself.
 ///
 /// ```
 /// assert_eq!(driver_kit::speed_share(0.002), 1.0);

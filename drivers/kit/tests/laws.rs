@@ -235,6 +235,21 @@ fn a_stall_of_the_driver_latches() {
     pair.assert_latched(&[FaultCode::Stalled]);
 }
 
+/// After a stall in motion the driver asks for less speed until it is back on the plan; without one it
+/// never does.
+#[test]
+fn a_driver_that_is_behind_asks_for_less_speed() {
+    let mut pair = Pair::new(&[1.0, -1.0, 1.0]);
+    for _ in 0..500 {
+        assert_eq!(pair.both(1).speed_scaling, 1.0);
+    }
+    pair.driver_stands(40);
+    let least = (0..200).map(|_| pair.both(1).speed_scaling);
+    let least = least.fold(1.0, f64::min);
+    assert!((0.2..0.9).contains(&least), "{least}");
+    assert_eq!(pair.both(1000).speed_scaling, 1.0);
+}
+
 /// The engine is killed at any moment of a move to the end of the range: the driver rests within
 /// the range, no later than the watchdog and a stop need.
 #[test]

@@ -17,6 +17,10 @@ BEGINNING_NS = 2_000_000_000
 # Largest velocity and acceleration of a setpoint, as a multiple of the limit.
 MARGIN = 1.001
 
+# A driver that is behind by so much (s) asks for less speed; by so much more again for half of it, and
+# never for less than this share.
+BEHIND, HALF, LEAST = 0.006, 0.02, 0.2
+
 
 class Driver:
     """The driver's side of the protocol."""
@@ -315,6 +319,15 @@ class Driver:
             self.reference = [(at, 0.0, 0.0) for at, _, _ in self.reference]
         self.fresh = False
 
+    def speed_share(self):
+        """The share of the planned speed that is asked for after a stall of the driver, until the
+        references are at the setpoints again."""
+        if not self.following or self.lock_step:
+            return 1.0
+        joints = zip(self.reference, self.target, self.limiters)
+        lag = max(abs(to[0] - at[0]) / limits.velocity for at, to, limits in joints)
+        return max(HALF / (HALF + max(lag - BEHIND, 0.0)), LEAST)
+
     def report(self, now_ns):
         self.sequence += 1
         n, state, last = self.joints, self.out, self.last
@@ -337,7 +350,7 @@ class Driver:
             state.fault_code = self.fault_code
             ctypes.memset(state.text, 0, len(state.text))
             fill(state.text, self.fault_text)
-        state.speed_scaling = min(max(self.robot.speed_scaling(), 0.0), 1.0)
+        state.speed_scaling = min(max(self.robot.speed_scaling(), 0.0), self.speed_share())
         self.sense(state)
         state.position[:n], state.velocity[:n] = position, velocity
         for tool, feedback in enumerate(self.feedback):

@@ -3,8 +3,10 @@
 use core::sync::atomic::Ordering;
 
 use ipc::{DriverState, State, StateFlags};
-use realtime::{Following, check_following};
+use nalgebra::SVector;
+use realtime::{Following, Quantity, Trip};
 
+use super::message::first;
 use super::{Runner, Tick};
 use crate::event::{Event, Fault, ShortText};
 
@@ -23,7 +25,6 @@ impl<const N: usize> Runner<N> {
         let Some(state) = fresh else {
             self.quiet += 1;
             let silent = self.quiet as f64 * self.period;
-            self.forgive(silent);
             if silent > self.config.patience.as_secs_f64() {
                 self.latch(Fault::DriverLost {
                     silent_ms: (silent * 1e3) as u64,
@@ -62,10 +63,9 @@ impl<const N: usize> Runner<N> {
         if self.is_blind() {
             return;
         }
-        let measured = self.measured();
         if self.ready
             && self.fault.is_none()
-            && let Some(trip) = check_following(&self.published, &measured, self.following())
+            && let Some(trip) = self.check_following()
         {
             self.latch(Fault::Limit(trip));
         }
@@ -100,15 +100,30 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// How far the arm may be from the setpoint: more for a while after a stall of this thread, during
-    /// which the driver continued the motion, or of the driver, which then is behind; later by the driver's own delay; and later still while the arm
-    /// slows its own time down and the engine has not slowed down yet.
-    fn following(&self) -> Following {
+    /// Whether the arm follows what the driver commands, and the driver the setpoints.
+    ///
+    /// An arm that does not follow is held or too weak: that must be seen soon. A driver may be a stall
+    /// away from the setpoints and then returns to them within the limits of the joints: behind them
+    /// after a stall of its own, ahead of them after one of this thread. It stops by itself when a stall
+    /// is longer than the watchdog, so the way of that time is the most that is allowed for.
+    fn check_following(&self) -> Option<Trip> {
         let allowed = self.config.following;
         let share = self.state.speed_scaling.clamp(LEAST_SHARE, 1.0);
-        Following {
-            base: allowed.base + self.apart,
-            delay: (allowed.delay + self.delay) / share,
-        }
+        let late = |delay: f64| Following {
+            base: allowed.base,
+            delay,
+        };
+        let told = self.state.flags & StateFlags::COMMANDED != 0;
+        // A controller that says what it commands is itself late; what a driver told one is not.
+        let of_arm = allowed.delay + if told { 0.0 } else { self.delay };
+        // An arm that slows its own time down is later still, until the engine has slowed down too.
+        let of_driver = (allowed.delay + self.delay) / share + self.config.watchdog.as_secs_f64();
+        let commanded: SVector<f64, N> = first(&self.state.commanded);
+        let (measured, speed) = (self.measured(), &self.speed);
+        let arm = || late(of_arm).check(Quantity::Following, &commanded, &measured, speed);
+        let setpoint = &self.published.position;
+        late(of_driver)
+            .check(Quantity::Commanded, setpoint, &commanded, speed)
+            .or_else(arm)
     }
 }
