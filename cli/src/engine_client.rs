@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ipc::{Arm, Client, Verb};
+use ipc::{Arm, Client, Verb, whole_text};
 use planner::robot::Robot;
 use serde_json::Value;
 
@@ -41,18 +41,7 @@ impl EngineClient {
     /// # Errors
     /// As [`Self::ask`].
     pub(crate) fn text(&self, of: &str) -> Result<String, Failure> {
-        let mut text = String::new();
-        loop {
-            let body = self.ask(Verb::Text {
-                of: of.to_owned(),
-                from: text.len(),
-            })?;
-            let part = body["text"].as_str().unwrap_or_default();
-            text.push_str(part);
-            if part.is_empty() || body["length"].as_u64() <= Some(text.len() as u64) {
-                return Ok(text);
-            }
-        }
+        whole_text(of, |verb| self.ask(verb))
     }
 
     /// The robot that the engine moves, by its own files.

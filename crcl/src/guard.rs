@@ -1,8 +1,12 @@
 //! Guards: conditions on sensors that end a motion before its time.
 
+use core::ops::Range;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::code;
+use crate::finding::Finding;
 use crate::value::{ValueError, within};
 
 /// The longest name of a sensor (bytes): the room that a driver's state has for it.
@@ -109,4 +113,13 @@ impl Guard {
         }
         within("the limit of a guard", self.value, LARGEST_LIMIT).map(drop)
     }
+}
+/// A name that is none of `names`.
+pub(crate) fn no_choice<T>(noun: &str, names: &[(&'static str, T)], span: Range<usize>) -> Finding {
+    let listed: Vec<_> = names
+        .iter()
+        .map(|(name, _)| format!("\"{name}\""))
+        .collect();
+    let message = format!("{noun} of a guard is one of a few names");
+    Finding::error(code::GUARD, span, message).expected(listed.join(" or "))
 }

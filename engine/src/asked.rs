@@ -39,21 +39,10 @@ fn done<E: std::fmt::Display>(result: Result<(), E>) -> Answer {
 
 /// Takes a program of a client: all its commands or none.
 pub(crate) fn submit(session: &Session, verb: &Verb) -> Answer {
-    let (Verb::Submit {
-        format,
-        name,
-        program,
-    }
-    | Verb::SubmitOnce {
-        format,
-        name,
-        program,
-        ..
-    }) = verb
-    else {
+    let Some(program) = verb.program() else {
         return Answer::refuse("this is no program");
     };
-    match read(format, name, program) {
+    match read(program.format, program.name, program.text) {
         Ok(commands) => taken(session.submit(commands)),
         Err(refusal) => refusal,
     }

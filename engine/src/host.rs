@@ -290,7 +290,7 @@ impl<D> Host<D> {
                     let start = status.idle.then_some(status.setpoint);
                     let answer = asked::submit(session, &verb);
                     once.keep(&verb, &answer);
-                    if let Some(given) = GivenProgram::taken(&answer, verb, start) {
+                    if let Some(given) = GivenProgram::taken(&answer, &verb, start) {
                         let given = given.in_unit(default_length);
                         if let Some(flight) = flight {
                             flight.program(&given, None);

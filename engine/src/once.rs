@@ -96,16 +96,10 @@ impl TakenOnce {
 
 /// A checksum of the program.
 fn hash_of(verb: &Verb) -> u64 {
-    let Verb::SubmitOnce {
-        format,
-        name,
-        program,
-        ..
-    } = verb
-    else {
-        return 0;
-    };
-    model_hash([format.as_str(), name, program].join("\0").as_bytes())
+    verb.program().map_or(0, |program| {
+        let parts = [program.format, program.name, program.text];
+        model_hash(parts.join("\0").as_bytes())
+    })
 }
 
 #[cfg(test)]

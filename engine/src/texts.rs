@@ -30,28 +30,15 @@ pub struct GivenProgram {
 
 impl GivenProgram {
     /// The program that the answer is about, if it was taken; the arm stood at `start` then.
-    pub(crate) fn taken(answer: &Answer, verb: Verb, start: Option<Vec<f64>>) -> Option<Self> {
-        let (Verb::Submit {
-            format,
-            name,
-            program,
-        }
-        | Verb::SubmitOnce {
-            format,
-            name,
-            program,
-            ..
-        }) = verb
-        else {
-            return None;
-        };
+    pub(crate) fn taken(answer: &Answer, verb: &Verb, start: Option<Vec<f64>>) -> Option<Self> {
+        let program = verb.program()?;
         let number = |of: &str| answer.body[of].as_u64().unwrap_or(0) as u32;
         answer.accepted.then(|| Self {
             first: number("first"),
             last: number("last"),
-            form: format,
-            name,
-            text: program,
+            form: program.format.to_owned(),
+            name: program.name.to_owned(),
+            text: program.text.to_owned(),
             start,
             default_length: "mm".to_owned(),
         })

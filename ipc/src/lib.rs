@@ -57,7 +57,9 @@ pub use ownership::Ownership;
 pub use payload::Payload;
 pub use probe::{AnsweringProbe, AskingProbe, Probe};
 pub use repair::{Inhabitant, inhabitants_of, repair};
-pub use request::{Answer, FollowPoint, Identity, LONGEST_ANSWER, Request, Verb};
+pub use request::{
+    Answer, FollowPoint, Identity, LONGEST_ANSWER, Request, SubmittedProgram, Verb, whole_text,
+};
 pub use room::{ROOM_NEEDED, room_left};
 pub use sensor::Sensor;
 pub use setpoint::{Setpoint, SetpointFlags};

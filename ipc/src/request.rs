@@ -1,6 +1,7 @@
 //! Requests of an operator to a running engine, and the answers.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::RequestId;
 
@@ -115,6 +116,69 @@ impl Verb {
             | Self::Next
             | Self::Shutdown => true,
             Self::Status | Self::Notes { .. } | Self::Text { .. } => false,
+        }
+    }
+
+    /// The program that it puts into the queue.
+    #[must_use]
+    pub fn program(&self) -> Option<SubmittedProgram<'_>> {
+        match self {
+            Self::Submit {
+                format,
+                name,
+                program,
+            }
+            | Self::SubmitOnce {
+                format,
+                name,
+                program,
+                ..
+            } => Some(SubmittedProgram {
+                format,
+                name,
+                text: program,
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// A program of a request, for the queue of commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SubmittedProgram<'a> {
+    /// `text`, `json` or `xml`.
+    pub format: &'a str,
+    /// Its name, for messages.
+    pub name: &'a str,
+    /// The program.
+    pub text: &'a str,
+}
+
+/// A long text of an engine: asks for its parts ([`Verb::Text`]) and puts them together. `ask` gives the
+/// body of an answer.
+///
+/// # Errors
+/// Those of `ask`.
+///
+/// # Example
+/// ```
+/// let parts = ["<robot ", "name=\"a\"/>"];
+/// let mut asked = parts.iter();
+/// let text = ipc::whole_text("urdf", |_verb| {
+///     Ok::<_, ()>(serde_json::json!({ "text": asked.next(), "length": 17 }))
+/// });
+/// assert_eq!(text, Ok("<robot name=\"a\"/>".to_owned()));
+/// ```
+pub fn whole_text<E>(of: &str, mut ask: impl FnMut(Verb) -> Result<Value, E>) -> Result<String, E> {
+    let mut text = String::new();
+    loop {
+        let of = of.to_owned();
+        let from = text.len();
+        let body = ask(Verb::Text { of, from })?;
+        let part = body["text"].as_str().unwrap_or_default();
+        text.push_str(part);
+        if part.is_empty() || body["length"].as_u64() <= Some(text.len() as u64) {
+            return Ok(text);
         }
     }
 }

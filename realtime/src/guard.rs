@@ -148,23 +148,22 @@ pub struct Following {
 
 impl Following {
     /// The first joint of `found` that is too far from `wanted` (both rad, m), where the joints moved
-    /// with up to `speed` (rad/s, m/s) in the time that counts. The trip has this `quantity`.
+    /// with up to `speed` (rad/s, m/s) in the time that counts, as a [`Quantity::Following`].
     ///
     /// # Example
     /// ```
     /// use nalgebra::vector;
-    /// use realtime::{Following, Quantity};
+    /// use realtime::Following;
     ///
     /// let allowed = Following { base: 0.01, delay: 0.02 };
     /// let (wanted, found) = (vector![0.0, 0.0], vector![0.0, 0.02]);
-    /// let trip = allowed.check(Quantity::Following, &wanted, &found, &vector![0.0, 0.0]);
+    /// let trip = allowed.check(&wanted, &found, &vector![0.0, 0.0]);
     /// assert_eq!(trip.map(|trip| trip.joint), Some(1));
-    /// let moving = allowed.check(Quantity::Following, &wanted, &found, &vector![0.0, 1.0]);
+    /// let moving = allowed.check(&wanted, &found, &vector![0.0, 1.0]);
     /// assert_eq!(moving, None);
     /// ```
     pub fn check<const N: usize>(
         self,
-        quantity: Quantity,
         wanted: &SVector<f64, N>,
         found: &SVector<f64, N>,
         speed: &SVector<f64, N>,
@@ -175,7 +174,7 @@ impl Following {
             let bad = !value.is_finite() || libm::fabs(value) > limit;
             bad.then_some(Trip {
                 joint,
-                quantity,
+                quantity: Quantity::Following,
                 value,
                 limit,
             })
@@ -232,9 +231,7 @@ mod tests {
             delay: 0.02,
         };
         let (rest, measured) = (vector![0.0, 0.0], vector![0.0, 0.02]);
-        let found = |measured, speed: SVector<f64, 2>| {
-            allowed.check(Quantity::Following, &rest, &measured, &speed)
-        };
+        let found = |measured, speed: SVector<f64, 2>| allowed.check(&rest, &measured, &speed);
         assert!(found(measured, rest).is_some());
         assert!(found(measured, vector![0.0, 1.0]).is_none());
         assert!(found(vector![f64::NAN, 0.0], rest).is_some());

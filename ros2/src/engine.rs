@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use ipc::{Arm, Client, FollowPoint, IpcError, Verb};
+use ipc::{Arm, Client, FollowPoint, IpcError, Verb, whole_text};
 use serde_json::Value;
 
 /// How long an engine may take to answer.
@@ -123,19 +123,7 @@ impl Engine {
     /// # Errors
     /// The engine does not answer.
     pub(crate) fn urdf(&self) -> Result<String, EngineError> {
-        let mut text = String::new();
-        loop {
-            let of = "urdf".to_owned();
-            let body = self.ask(Verb::Text {
-                of,
-                from: text.len(),
-            })?;
-            let part = body["text"].as_str().unwrap_or_default();
-            text.push_str(part);
-            if part.is_empty() || body["length"].as_u64() <= Some(text.len() as u64) {
-                return Ok(text);
-            }
-        }
+        whole_text("urdf", |verb| self.ask(verb))
     }
 
     /// Serves orders until nobody can give one any more.

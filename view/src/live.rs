@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use ipc::{
     Answer, Arm, Client, ControlAsk, ControlClient, IpcError, Observer, Setpoint, State, Verb,
+    whole_text,
 };
 use nalgebra::Isometry3;
 use planner::robot::Robot;
@@ -286,22 +287,12 @@ impl Talk {
 
 /// A long text of the engine.
 fn whole(client: &Client, of: &str) -> Option<String> {
-    let mut text = String::new();
-    loop {
-        let verb = Verb::Text {
-            of: of.to_owned(),
-            from: text.len(),
-        };
-        let answer = client
-            .ask(verb, PATIENCE)
-            .ok()
-            .filter(|answer| answer.accepted)?;
-        let part = answer.body["text"].as_str()?;
-        text.push_str(part);
-        if part.is_empty() || answer.body["length"].as_u64()? <= text.len() as u64 {
-            return Some(text);
-        }
-    }
+    let ask = |verb| {
+        let answer = client.ask(verb, PATIENCE).ok();
+        let taken = answer.filter(|answer| answer.accepted);
+        taken.map(|answer| answer.body).ok_or(())
+    };
+    whole_text(of, ask).ok()
 }
 
 /// Length of a period; the setpoints say it better, but come later.

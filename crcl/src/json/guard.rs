@@ -3,10 +3,8 @@
 use serde_json::value::RawValue;
 
 use super::reader::{Reader, describe, find};
-use crate::code;
 use crate::command_finding::value_finding;
-use crate::finding::Finding;
-use crate::guard::{Guard, GuardEnding, GuardLimit};
+use crate::guard::{Guard, GuardEnding, GuardLimit, no_choice};
 
 impl<'a> Reader<'a, '_> {
     /// A guard: the sensor, what trips it, the limit, and perhaps what the command is then.
@@ -46,14 +44,8 @@ impl<'a> Reader<'a, '_> {
         if let Some((_, value)) = names.iter().find(|(name, _)| *name == text) {
             return Some(*value);
         }
-        let message = format!("{noun} of a guard is one of a few names");
-        let listed: Vec<_> = names
-            .iter()
-            .map(|(name, _)| format!("\"{name}\""))
-            .collect();
-        let finding = Finding::error(code::GUARD, self.span(raw), message);
-        self.findings
-            .push(finding.expected(listed.join(" or ")).found(describe(raw)));
+        let finding = no_choice(noun, names, self.span(raw));
+        self.findings.push(finding.found(describe(raw)));
         None
     }
 }

@@ -5,7 +5,7 @@ use crate::call::{Node, Tree};
 use crate::code;
 use crate::command_finding::value_finding;
 use crate::finding::Finding;
-use crate::guard::{Guard, GuardEnding, GuardLimit};
+use crate::guard::{Guard, GuardEnding, GuardLimit, no_choice};
 use crate::shape::describe;
 
 /// How it is written.
@@ -61,15 +61,8 @@ impl Meaning<'_, '_> {
         if let Some((_, value)) = names.iter().find(|(name, _)| *name == text) {
             return Some(*value);
         }
-        let message = format!("{noun} of a guard is one of a few names");
-        let listed: Vec<_> = names
-            .iter()
-            .map(|(name, _)| format!("\"{name}\""))
-            .collect();
-        let finding = Finding::error(code::GUARD, node.span.clone(), message)
-            .expected(listed.join(" or "))
-            .found(describe(node, self.source));
-        self.fail(finding)
+        let finding = no_choice(noun, names, node.span.clone());
+        self.fail(finding.found(describe(node, self.source)))
     }
 
     fn no_guard<T>(&mut self, node: &Node) -> Option<T> {

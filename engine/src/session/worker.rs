@@ -1,6 +1,7 @@
 //! The worker: takes commands, plans ahead, feeds the executor, reports in order.
 
 mod guarding;
+mod in_flight;
 mod jogging;
 mod replacing;
 mod reports;
@@ -15,9 +16,9 @@ use std::time::Duration;
 use ipc::Clock;
 use kinematics::Chain;
 use realtime::{Piece, Segment};
-use trajectory::{ToolLimits, Trajectory};
+use trajectory::ToolLimits;
 
-use guarding::Guarding;
+use in_flight::InFlight;
 use jogging::Jogging;
 use sampling::Sampling;
 use streaming::Streaming;
@@ -46,28 +47,6 @@ pub(super) struct Ends {
     pub orders: Receiver<Order>,
     pub notes: Sender<Note>,
     pub shared: Arc<Shared>,
-}
-
-/// A command that left the queue and is not yet reported.
-pub(super) struct InFlight<const N: usize> {
-    id: u32,
-    line: usize,
-    name: &'static str,
-    planned_s: f64,
-    /// The chain with the tool that it begins with.
-    chain: Chain<N>,
-    started: Option<u64>,
-    finished: Option<u64>,
-    /// What is reported beside `Done` when its turn comes.
-    says: Option<Note>,
-    /// A refused command is reported as such and not as done.
-    refused: bool,
-    /// Number of the newest order when it was taken.
-    newest: u32,
-    /// The guards of a guarded command: where it ends is not known before.
-    guarding: Option<Guarding<N>>,
-    /// The motion of a move.
-    motion: Option<Trajectory<N>>,
 }
 
 pub(super) struct Worker<'a, const N: usize> {
@@ -276,24 +255,8 @@ impl<const N: usize> Worker<'_, N> {
         let newest = self.steering.newest();
         let given = queued.given;
         let language = matches!(given, Given::Command { .. });
-        self.sampling
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .begin(queued.id, *self.controller.chain());
-        let mut flight = InFlight {
-            id: queued.id,
-            line: given.line(),
-            name: given.name(),
-            planned_s: 0.0,
-            chain: *self.controller.chain(),
-            started: None,
-            finished: None,
-            says: None,
-            refused: false,
-            newest,
-            guarding: None,
-            motion: None,
-        };
+        let chain = *self.controller.chain();
+        let mut flight = self.take_off(queued.id, (given.line(), given.name()), chain, newest);
         if let Some(windowed) = self.begin(&given) {
             self.stream(&mut flight, windowed);
             self.flight.push_back(flight);
@@ -310,6 +273,22 @@ impl<const N: usize> Worker<'_, N> {
             }
         }
         self.flight.push_back(flight);
+    }
+
+    /// A command that will be executed, with the chain that it begins with; `newest` is the newest order
+    /// when it was taken.
+    fn take_off(
+        &self,
+        id: u32,
+        named: (usize, &'static str),
+        chain: Chain<N>,
+        newest: u32,
+    ) -> InFlight<N> {
+        self.sampling
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .begin(id, chain);
+        InFlight::new(id, named, chain, newest)
     }
 
     /// A command of the language or a trajectory has failed: says so when its turn comes, and does

@@ -114,16 +114,16 @@ impl<const N: usize> Runner<N> {
             delay,
         };
         let told = self.state.flags & StateFlags::COMMANDED != 0;
-        // A controller that says what it commands is itself late; what a driver told one is not.
+        // Where the controller does not say what it commands, the state has what the driver told it: the arm
+        // follows that later, by the driver's own delay.
         let of_arm = allowed.delay + if told { 0.0 } else { self.delay };
         // An arm that slows its own time down is later still, until the engine has slowed down too.
         let of_driver = (allowed.delay + self.delay) / share + self.config.watchdog.as_secs_f64();
         let commanded: SVector<f64, N> = first(&self.state.commanded);
         let (measured, speed) = (self.measured(), &self.speed);
-        let arm = || late(of_arm).check(Quantity::Following, &commanded, &measured, speed);
-        let setpoint = &self.published.position;
-        late(of_driver)
-            .check(Quantity::Commanded, setpoint, &commanded, speed)
-            .or_else(arm)
+        let arm = || late(of_arm).check(&commanded, &measured, speed);
+        let deviates = late(of_driver).check(&self.published.position, &commanded, speed);
+        let quantity = Quantity::Commanded;
+        deviates.map(|trip| Trip { quantity, ..trip }).or_else(arm)
     }
 }

@@ -2,10 +2,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use driver_cia402::{Cia402Options, Clocks, RunOptions, read_drives};
+use driver_cia402::{Cia402Options, Clocks, read_drives};
 
-use super::failure;
-use super::franka::about;
+use super::{about, until_signal};
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -81,10 +80,6 @@ impl Cia402 {
             },
             ..Cia402Options::new(&self.interface, about, drives)
         };
-        let stop = super::asked_to_end(false)?;
-        let how = RunOptions::default();
-        let report = driver_cia402::run(&arm, options, &how, &stop).map_err(failure)?;
-        super::tell(&report, true);
-        Ok(Exit::Done)
+        until_signal(|how, stop| driver_cia402::run(&arm, options, how, stop))
     }
 }

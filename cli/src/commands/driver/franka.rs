@@ -1,8 +1,8 @@
 use clap::Args;
-use driver_franka::{About, Collision, FrankaOptions, GripperOptions, RunOptions};
+use driver_franka::{Collision, FrankaOptions, GripperOptions};
 use planner::robot::Robot;
 
-use super::failure;
+use super::{about, until_signal};
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -52,11 +52,7 @@ impl Franka {
         let robot = self.robot.load()?;
         let arm = self.arm.open()?;
         let options = self.options(&robot)?;
-        let stop = super::asked_to_end(false)?;
-        let how = RunOptions::default();
-        let report = driver_franka::run(&arm, options, &how, &stop).map_err(failure)?;
-        super::tell(&report, true);
-        Ok(Exit::Done)
+        until_signal(|how, stop| driver_franka::run(&arm, options, how, stop))
     }
 
     fn options(&self, robot: &Robot) -> Result<FrankaOptions, Failure> {
@@ -76,20 +72,6 @@ impl Franka {
             }),
             ..FrankaOptions::new(&self.address, about(robot))
         })
-    }
-}
-
-/// The maker's limits of a robot folder, for a driver.
-pub(super) fn about(robot: &Robot) -> About {
-    let joints = robot.joints.of_the_maker();
-    About {
-        model: ipc::model_hash(robot.urdf.as_bytes()),
-        lower: joints.lower.iter().map(|value| value.max(-1e3)).collect(),
-        upper: joints.upper.iter().map(|value| value.min(1e3)).collect(),
-        velocity: joints.velocity,
-        acceleration: joints.acceleration,
-        jerk: joints.jerk,
-        ..About::default()
     }
 }
 

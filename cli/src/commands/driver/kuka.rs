@@ -1,8 +1,7 @@
 use clap::Args;
-use driver_kuka::{KukaOptions, RunOptions};
+use driver_kuka::KukaOptions;
 
-use super::failure;
-use super::franka::about;
+use super::{about, until_signal};
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -43,10 +42,6 @@ impl Kuka {
             share: self.share,
             ..KukaOptions::new(&self.listen, about(&robot))
         };
-        let stop = super::asked_to_end(false)?;
-        let how = RunOptions::default();
-        let report = driver_kuka::run(&arm, options, &how, &stop).map_err(failure)?;
-        super::tell(&report, true);
-        Ok(Exit::Done)
+        until_signal(|how, stop| driver_kuka::run(&arm, options, how, stop))
     }
 }

@@ -15,8 +15,10 @@ use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use driver_franka::{About, RunOptions};
 use driver_sim::{DriverError, DriverReport};
 use ipc::IpcError;
+use planner::robot::Robot;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -80,6 +82,30 @@ fn end_with_input(stop: Arc<AtomicBool>) {
         }
         stop.store(true, Ordering::Relaxed);
     });
+}
+
+/// Drives an arm until a signal, and tells what the run came to.
+fn until_signal(
+    drive: impl FnOnce(&RunOptions, &AtomicBool) -> Result<DriverReport, DriverError>,
+) -> Result<Exit, Failure> {
+    let stop = asked_to_end(false)?;
+    let report = drive(&RunOptions::default(), &stop).map_err(failure)?;
+    tell(&report, true);
+    Ok(Exit::Done)
+}
+
+/// The maker's limits of a robot folder, for a driver.
+fn about(robot: &Robot) -> About {
+    let joints = robot.joints.of_the_maker();
+    About {
+        model: ipc::model_hash(robot.urdf.as_bytes()),
+        lower: joints.lower.iter().map(|value| value.max(-1e3)).collect(),
+        upper: joints.upper.iter().map(|value| value.min(1e3)).collect(),
+        velocity: joints.velocity,
+        acceleration: joints.acceleration,
+        jerk: joints.jerk,
+        ..About::default()
+    }
 }
 
 /// Tells what a run of a driver came to; `counts` tells its periods too.

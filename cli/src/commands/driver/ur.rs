@@ -1,8 +1,7 @@
 use clap::Args;
-use driver_ur::{Delivery, GripperOutput, RunOptions, UrOptions};
+use driver_ur::{Delivery, GripperOutput, UrOptions};
 
-use super::failure;
-use super::franka::about;
+use super::{about, until_signal};
 use crate::client::ArmOption;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -76,10 +75,6 @@ impl Ur {
                 .map(|output| GripperOutput { output, time }),
             ..UrOptions::new(&self.address, about(&robot))
         };
-        let stop = super::asked_to_end(false)?;
-        let how = RunOptions::default();
-        let report = driver_ur::run(&arm, options, &how, &stop).map_err(failure)?;
-        super::tell(&report, true);
-        Ok(Exit::Done)
+        until_signal(|how, stop| driver_ur::run(&arm, options, how, stop))
     }
 }

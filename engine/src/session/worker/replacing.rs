@@ -1,6 +1,5 @@
 //! A move that takes the place of the one that moves, in the same state of motion.
 
-use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use crcl::Located;
@@ -11,7 +10,7 @@ use servo::Splice;
 
 use super::super::ReplaceError;
 use super::super::note::Note;
-use super::{InFlight, Work, Worker};
+use super::{Work, Worker};
 
 /// How long before the new motion begins it is planned (s of the old one).
 const LEAD: f64 = 0.05;
@@ -111,24 +110,9 @@ impl<const N: usize> Worker<'_, N> {
         let mut flights = Vec::with_capacity(ids.len());
         let mut by = 0;
         for (id, (located, step)) in ids.iter().zip(new.steps) {
-            self.sampling
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .begin(*id, *new.controller.chain());
-            let mut flight = InFlight {
-                id: *id,
-                line: located.line,
-                name: located.command.name(),
-                planned_s: step.ticks as f64 / self.config.rate_hz,
-                chain: *new.controller.chain(),
-                started: None,
-                finished: None,
-                says: None,
-                refused: false,
-                newest,
-                guarding: None,
-                motion: None,
-            };
+            let named = (located.line, located.command.name());
+            let mut flight = self.take_off(*id, named, *new.controller.chain(), newest);
+            flight.planned_s = step.ticks as f64 / self.config.rate_hz;
             match step.planned {
                 Some(planned) => {
                     by = *id;
