@@ -5,6 +5,7 @@
 
 pub mod arm;
 pub mod domain;
+pub mod driver_thread;
 pub mod killed;
 pub mod long_move;
 pub mod motion;

@@ -2,7 +2,7 @@
 //! the arm may go on, how far it went, and the peak of the value.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use driver_sim::{Places, Wall};
@@ -11,6 +11,7 @@ use ipc::Clock;
 use nalgebra::SVector;
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
+use system_tests::driver_thread::{DriverThread, options_of};
 
 /// Stiffness of the wall (N/m).
 const STIFFNESS: f64 = 20_000.0;
@@ -40,8 +41,7 @@ impl Random {
 pub(crate) struct Cell {
     pub(crate) session: Session,
     height: Arc<AtomicU64>,
-    stop: Arc<AtomicBool>,
-    driver: Option<std::thread::JoinHandle<()>>,
+    _driver: DriverThread,
 }
 
 impl Cell {
@@ -50,16 +50,10 @@ impl Cell {
         let arm = system_tests::domain::arm(&format!("guard/{name}"));
         let height = Arc::new(AtomicU64::new(0.0_f64.to_bits()));
         let options = driver_sim::Options {
-            position: robot.home.clone(),
-            model: ipc::model_hash(robot.urdf.as_bytes()),
             wall: Some(table(&robot, &height)),
-            ..driver_sim::Options::new(arm.clone(), robot.dof())
+            ..options_of(&robot, &arm)
         };
-        let stop = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&stop);
-        let driver = std::thread::spawn(move || {
-            driver_sim::run(options, &seen).unwrap();
-        });
+        let driver = DriverThread::start(options);
         let mut config = SessionConfig::new(arm);
         config.clock = Clock::LockStep;
         config.record = true;
@@ -67,8 +61,7 @@ impl Cell {
         Self {
             session: Session::start(&robot, &config).unwrap(),
             height,
-            stop,
-            driver: Some(driver),
+            _driver: driver,
         }
     }
 
@@ -104,8 +97,6 @@ impl Cell {
 impl Drop for Cell {
     fn drop(&mut self) {
         self.session.close();
-        self.stop.store(true, Ordering::Relaxed);
-        self.driver.take().map(std::thread::JoinHandle::join);
     }
 }
 

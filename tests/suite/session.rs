@@ -2,14 +2,13 @@
 //! the driver runs in a thread of this process; the tests of the command line have it in a separate
 //! process.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use engine::session::{Note, RunSample, Session, SessionConfig};
-use ipc::{Arm, Clock};
+use ipc::Clock;
 use planner::dry_run::{PlanOptions, PlanSample, plan_program};
 use planner::robot::Robot;
+use system_tests::driver_thread::{DriverThread, options_of};
 
 const PROGRAM: &str = r#"
 InitCanon()
@@ -27,40 +26,10 @@ MoveSmoothlyTo({{{400, 100, 200}, {0, 0, -1}, {1, 0, 0}}, {{400, -100, 200}, {0,
 EndCanon(0)
 "#;
 
-/// A simulated driver in a thread, ended when it is dropped.
-struct Driver {
-    stop: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
-}
-
-impl Driver {
-    fn start(robot: &Robot, arm: &Arm) -> Self {
-        let mut options = driver_sim::Options::new(arm.clone(), robot.dof());
-        options.position.clone_from(&robot.home);
-        options.model = ipc::model_hash(robot.urdf.as_bytes());
-        let stop = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || {
-            driver_sim::run(options, &seen).unwrap();
-        });
-        Self {
-            stop,
-            thread: Some(thread),
-        }
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().map(std::thread::JoinHandle::join);
-    }
-}
-
 /// Runs the program to its end and returns what was reported and recorded.
 fn run(robot: &Robot, name: &str) -> (Vec<Note>, Vec<RunSample>) {
     let arm = system_tests::domain::arm(&format!("test/{name}"));
-    let _driver = Driver::start(robot, &arm);
+    let _driver = DriverThread::start(options_of(robot, &arm));
     let mut config = SessionConfig::new(arm);
     config.clock = Clock::LockStep;
     config.record = true;

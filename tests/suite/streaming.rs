@@ -3,8 +3,6 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crcl::{LengthUnit, Located, ReadOptions};
@@ -13,6 +11,7 @@ use ipc::Clock;
 use planner::controller::Controller;
 use planner::robot::{Robot, load};
 use servo::Control;
+use system_tests::driver_thread::{DriverThread, options_of};
 
 /// Lists from this length on are planned in windows.
 const LONG: usize = 4200;
@@ -21,32 +20,21 @@ const LONG: usize = 4200;
 struct Chain {
     robot: Robot,
     session: Session,
-    stop: Arc<AtomicBool>,
-    driver: Option<std::thread::JoinHandle<()>>,
+    _driver: DriverThread,
 }
 
 impl Chain {
     fn start(name: &str, clock: Clock) -> Self {
         let robot = load("ur5e").unwrap();
         let arm = system_tests::domain::arm(&format!("stream/{name}"));
-        let options = driver_sim::Options {
-            position: robot.home.clone(),
-            model: ipc::model_hash(robot.urdf.as_bytes()),
-            ..driver_sim::Options::new(arm.clone(), robot.dof())
-        };
-        let stop = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&stop);
-        let driver = std::thread::spawn(move || {
-            driver_sim::run(options, &seen).unwrap();
-        });
+        let driver = DriverThread::start(options_of(&robot, &arm));
         let mut config = SessionConfig::new(arm);
         config.clock = clock;
         config.record = true;
         Self {
             session: Session::start(&robot, &config).unwrap(),
             robot,
-            stop,
-            driver: Some(driver),
+            _driver: driver,
         }
     }
 
@@ -72,8 +60,6 @@ impl Chain {
 impl Drop for Chain {
     fn drop(&mut self) {
         self.session.close();
-        self.stop.store(true, Ordering::Relaxed);
-        self.driver.take().map(std::thread::JoinHandle::join);
     }
 }
 
