@@ -41,8 +41,8 @@ impl<R: Robot> Driver<R> {
         state
     }
 
-    /// How far what the robot follows is from the setpoints, as the time that the farthest joint needs at
-    /// its largest speed (s); 0 in lock-step, where nobody is late.
+    /// How far what the robot follows is behind the setpoints, as the time that the last joint needs at its
+    /// largest speed (s); 0 in lock-step, where nobody is late.
     fn lag(&self) -> f64 {
         if !self.is_following() || self.clock() != Some(Clock::Wall) {
             return 0.0;
@@ -50,7 +50,15 @@ impl<R: Robot> Driver<R> {
         let pairs = self.references.iter().zip(&self.targets);
         let times = pairs
             .zip(&self.about.velocity)
-            .map(|((reference, target), most)| (target.position - reference.position).abs() / most);
+            .map(|((reference, target), most)| {
+                let ahead = target.position - reference.position;
+                let towards = if target.velocity == 0.0 {
+                    0.0
+                } else {
+                    target.velocity.signum()
+                };
+                ahead * towards / most
+            });
         times.fold(0.0, f64::max)
     }
 

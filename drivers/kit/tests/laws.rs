@@ -248,6 +248,13 @@ fn a_driver_that_is_behind_asks_for_less_speed() {
     let least = least.fold(1.0, f64::min);
     assert!((0.2..0.9).contains(&least), "{least}");
     assert_eq!(pair.both(1000).speed_scaling, 1.0);
+    // Ahead of the plan, after a stall of the engine, it waits for the plan.
+    let mut pair = Pair::new(&[1.0, -1.0, 1.0]);
+    pair.both(500);
+    pair.engine_stands(30, false);
+    for _ in 0..400 {
+        assert_eq!(pair.both(1).speed_scaling, 1.0);
+    }
 }
 
 /// The engine is killed at any moment of a move to the end of the range: the driver rests within

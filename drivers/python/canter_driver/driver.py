@@ -22,6 +22,10 @@ MARGIN = 1.001
 BEHIND, HALF, LEAST = 0.006, 0.02, 0.2
 
 
+def sign(value):
+    return (value > 0.0) - (value < 0.0)
+
+
 class Driver:
     """The driver's side of the protocol."""
 
@@ -325,7 +329,8 @@ class Driver:
         if not self.following or self.lock_step:
             return 1.0
         joints = zip(self.reference, self.target, self.limiters)
-        lag = max(abs(to[0] - at[0]) / limits.velocity for at, to, limits in joints)
+        behind = [(to[0] - at[0]) * sign(to[1]) / limits.velocity for at, to, limits in joints]
+        lag = max(behind)
         return max(HALF / (HALF + max(lag - BEHIND, 0.0)), LEAST)
 
     def report(self, now_ns):
