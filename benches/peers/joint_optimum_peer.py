@@ -59,7 +59,7 @@ def frame(element):
 class Robot:
     """The chain from the base to the flange, and the limits of joints and controlled point."""
 
-    def __init__(self, name):
+    def __init__(self, canter, name):
         tree = xml.parse(ROBOTS / name / "robot.urdf").getroot()
         file = tomllib.loads((ROBOTS / name / "robot.toml").read_text())
         by_child = {joint.find("child").get("link"): joint for joint in tree.iter("joint")}
@@ -68,13 +68,12 @@ class Robot:
             chain.insert(0, by_child[link])
             link = by_child[link].find("parent").get("link")
         self.chain = [(j.get("type"), frame(j.find("origin")), axis(j)) for j in chain]
-        moving = [j for j in chain if j.get("type") != "fixed"]
-        limit = lambda key: np.array([float(j.find("limit").get(key)) for j in moving])
-        self.lower, self.upper, self.velocity = limit("lower"), limit("upper"), limit("velocity")
-        joints, margin = file["joints"], file.get("margin", {})
-        self.velocity = np.array(joints.get("velocity_per_s", self.velocity)) * margin.get("velocity", 1.0)
-        self.acceleration = np.array(joints["acceleration_per_s2"]) * margin.get("acceleration", 1.0)
-        self.jerk = np.array(joints["jerk_per_s3"]) * margin.get("jerk", 1.0)
+        # With the margins that are planned with.
+        shown = subprocess.run([canter, "robots", "show", name, "--json"], capture_output=True, check=True)
+        joints = json.loads(shown.stdout)["joints"]
+        self.lower, self.upper = np.array(joints["lower"]), np.array(joints["upper"])
+        limits = (joints[key] for key in ("velocity", "acceleration", "jerk"))
+        self.velocity, self.acceleration, self.jerk = map(np.array, limits)
         tool = file["tool_limits"]
         keys = ["speed_m_per_s", "acceleration_m_per_s2", "jerk_m_per_s3"]
         self.tool_limits = [float(tool[key]) for key in keys]
@@ -271,7 +270,7 @@ def main():
     cases = json.loads(Path(suite).read_text())["cases"]
     print("robot    list         poses  Canter s  optimum s  ratio  joints rule  Canter  casadi")
     for name in names or ["ur5e", "panda", "iiwa7"]:
-        robot, ratios = Robot(name), []
+        robot, ratios = Robot(canter, name), []
         q = ca.SX.sym("q", len(robot.home))
         home = ca.Function("home", [q], list(robot.forward(q)))
         middle, turn = (np.array(x) for x in home(robot.home))
