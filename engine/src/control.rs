@@ -13,8 +13,8 @@ use ipc::{Arm, ControlAnswer, ControlAsk, ControlServer, Controlled, IpcError};
 use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
 use servo::{Control, Progress, Steering};
 
-/// Time between two polls for requests (ns).
-const LOOK_NS: u64 = 300_000;
+/// Time between two polls for requests (ns), at least and at most.
+const LOOK_NS: (u64, u64) = (300_000, 3_000_000);
 
 /// Largest number of requests per poll.
 const A_LOOK: usize = 32;
@@ -41,11 +41,12 @@ pub struct ControlThread {
 }
 
 impl ControlThread {
-    /// Opens the control channel of `arm` and executes the requests that come through it.
+    /// Opens the control channel of `arm` and executes the requests that come through it: the orders act in
+    /// the periods of a servo of this rate (Hz).
     ///
     /// # Errors
     /// [`IpcError::Taken`] when another engine serves this arm; errors of shared memory or threads.
-    pub fn start(arm: &Arm, steering: Steering) -> Result<Self, IpcError> {
+    pub fn start(arm: &Arm, steering: Steering, rate_hz: f64) -> Result<Self, IpcError> {
         let ends = Arc::new(AtomicBool::new(false));
         let (tell, opened) = sync_channel(1);
         let (name, stop) = (arm.clone(), Arc::clone(&ends));
@@ -56,7 +57,7 @@ impl ControlThread {
         };
         let thread = Builder::new()
             .name("control".to_owned())
-            .spawn(move || run(&name, &steering, &stop, &tell))
+            .spawn(move || run((&name, look_ns(rate_hz)), &steering, &stop, &tell))
             .map_err(|cause| failed(cause.to_string()))?;
         match opened.recv() {
             Ok(Ok(())) => Ok(Self {
@@ -95,7 +96,20 @@ struct Waiting {
     until: Instant,
 }
 
-fn run(arm: &Arm, steering: &Steering, ends: &AtomicBool, tell: &SyncSender<Result<(), IpcError>>) {
+/// Three polls in each period: an order acts in the next one. A slow servo needs no more.
+fn look_ns(rate_hz: f64) -> u64 {
+    let (least, most) = LOOK_NS;
+    let third = 1e9 / (3.0 * rate_hz);
+    // What is no number or too large ends at the bounds.
+    (third as u64).clamp(least, most)
+}
+
+fn run(
+    (arm, look_ns): (&Arm, u64),
+    steering: &Steering,
+    ends: &AtomicBool,
+    tell: &SyncSender<Result<(), IpcError>>,
+) {
     let server = match ControlServer::open(arm) {
         Ok(server) => server,
         Err(error) => {
@@ -118,7 +132,7 @@ fn run(arm: &Arm, steering: &Steering, ends: &AtomicBool, tell: &SyncSender<Resu
         }
         let progress = steering.progress();
         waiting.retain(|given| !answered(given, &progress));
-        next = (next + LOOK_NS).max(now_ns());
+        next = (next + look_ns).max(now_ns());
         sleep_until_ns(next);
     }
     let progress = steering.progress();
@@ -205,5 +219,21 @@ fn report(progress: &Progress) -> ControlAnswer {
         tick: progress.tick,
         time_scaling: progress.time_scaling,
         ..ControlAnswer::refuse("")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LOOK_NS, look_ns};
+
+    /// At least three polls in a period, as far as the bounds allow, and never none.
+    #[test]
+    fn polls_follow_the_period() {
+        assert_eq!(look_ns(1000.0), 333_333);
+        assert_eq!(look_ns(100.0), LOOK_NS.1);
+        assert_eq!(look_ns(4000.0), LOOK_NS.0);
+        for rate_hz in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+            assert!((LOOK_NS.0..=LOOK_NS.1).contains(&look_ns(rate_hz)));
+        }
     }
 }

@@ -87,8 +87,8 @@ impl<D> Host<D> {
         driver: D,
     ) -> Result<Self, SessionError> {
         let session = Session::start(robot, config)?;
-        let control =
-            ControlThread::start(&config.arm, session.steering()).map_err(ExecutorError::from)?;
+        let control = ControlThread::start(&config.arm, session.steering(), config.rate_hz)
+            .map_err(ExecutorError::from)?;
         Ok(Self {
             arm: config.arm.clone(),
             session,

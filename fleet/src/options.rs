@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::authority::Keys;
-use crate::commands::{All, Notes, One, Override, Router, Send, Top};
+use crate::commands::{All, Completions, Man, Notes, One, Override, Router, Send, Top};
 use crate::failure::Failure;
 use crate::member::Cell;
 use crate::one_thread;
@@ -18,7 +18,7 @@ use crate::one_thread;
 /// other commands show and command the arms. A stop over a network is no safety function.
 #[derive(Debug, Parser)]
 #[command(name = "canter-fleet", version)]
-struct Options {
+pub(crate) struct Options {
     #[command(subcommand)]
     command: Command,
 }
@@ -43,6 +43,8 @@ enum Command {
     /// Go on after a stop or pause
     Resume(One),
     Override(Override),
+    Man(Man),
+    Completions(Completions),
 }
 
 /// Reads the arguments of the process and does what they say.
@@ -64,6 +66,8 @@ pub fn main() -> ExitCode {
         Command::Pause(all) => all.ask("pause"),
         Command::Resume(one) => one.resume(),
         Command::Override(share) => share.run(),
+        Command::Man(man) => man.run(),
+        Command::Completions(completions) => completions.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

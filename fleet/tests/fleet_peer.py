@@ -19,6 +19,8 @@ import zenoh
 CANTER = os.environ["CANTER_COMMAND"]
 FLEET = os.environ["CANTER_FLEET_COMMAND"]
 PATIENCE = 60.0
+# Where the router of a test listens, and what is started before it (a network of its own).
+HOST, INSIDE = "127.0.0.1", []
 
 
 def wait(what, check, patience=PATIENCE):
@@ -77,15 +79,17 @@ class Processes:
         process.wait()
         self.all.remove(process)
 
-    def canter_status(self, arm):
+    def canter_status(self, arm, domain=None):
         """The report of an engine of this machine."""
-        ran = subprocess.run([CANTER, "status", "--json", "--arm", arm], capture_output=True, text=True, timeout=30)
+        words = [CANTER, "status", "--json", "--arm", arm, *(["--domain", str(domain)] if domain else [])]
+        ran = subprocess.run(words, capture_output=True, text=True, timeout=30)
         assert ran.returncode == 0, ran.stderr
         return json.loads(ran.stdout)
 
     def router(self, keys, port):
         before = self.said("router").count("router listens")
-        process = self.start("router", FLEET, "router", "--keys", f"{keys}/router", "--listen", f"tls/127.0.0.1:{port}")
+        words = ["router", "--keys", f"{keys}/router", "--listen", f"tls/{HOST}:{port}"]
+        process = self.start("router", *INSIDE, FLEET, *words)
         wait("the router", lambda: self.said("router").count("router listens") > before or process.poll() is not None)
         assert process.poll() is None, self.said("router")
         return process
@@ -102,13 +106,13 @@ class Processes:
         words = [word for arm in arms for word in ("--arm", arm)]
         name = arms[0].split("/")[0]
         process = self.start(f"cell-{name}", FLEET, "cell", *words, *link(f"{keys}/cell.{name}", port), domain=domain)
-        wait("the cell", lambda: f"at tls/127.0.0.1:{port}" in self.said(f"cell-{name}") or process.poll() is not None)
+        wait("the cell", lambda: f"at tls/{HOST}:{port}" in self.said(f"cell-{name}") or process.poll() is not None)
         assert process.poll() is None, self.said(f"cell-{name}")
         return process
 
 
 def link(folder, port):
-    return "--keys", str(folder), "--router", f"tls/127.0.0.1:{port}"
+    return "--keys", str(folder), "--router", f"tls/{HOST}:{port}"
 
 
 def fleet(*words, **more):
@@ -127,7 +131,7 @@ def settings(folder, port, authority=None, certificate=True):
         }
     return {
         "mode": "client",
-        "connect": {"endpoints": [f"tls/127.0.0.1:{port}"], "timeout_ms": 3000, "exit_on_failure": True},
+        "connect": {"endpoints": [f"tls/{HOST}:{port}"], "timeout_ms": 3000, "exit_on_failure": True},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {"link": {"tx": {"lease": 4000}, "tls": tls}},
     }

@@ -2,9 +2,14 @@
 lines and drives the simulated arm in ten, and says how long it took:
 
     python3 python/tests/wheel.py dist/canter-*.whl
+
+Without a wheel it runs the commands of docs/python.md as they stand there, the last one first, since it
+makes the wheel; this compiles for minutes. Then it does the same with that wheel.
 """
 
+import glob
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -62,5 +67,21 @@ def main(wheel):
         subprocess.run([python, "-c", kit], env=bare, cwd=folder, check=True)
 
 
+def page():
+    """Runs the commands of docs/python.md in a new virtual environment; the wheel that they make."""
+    text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```sh\n(.*?)^```$", text, re.S | re.M)
+    lines = [line.split("  #")[0].strip() for line in block.splitlines()]
+    assert lines[-1].startswith("pip wheel") and len(lines) == 3, lines
+    folder = tempfile.mkdtemp()
+    subprocess.run([sys.executable, "-m", "venv", folder + "/venv"], check=True)
+    os.symlink(ROOT / "python", folder + "/python")
+    variables = os.environ | {"PATH": f"{folder}/venv/bin:{os.environ['PATH']}"}
+    for line in reversed(lines):
+        print(f"$ {line}", flush=True)
+        subprocess.run(line, shell=True, cwd=folder, env=variables, check=True)
+    return glob.glob(folder + "/canter-*.whl")[0]
+
+
 if __name__ == "__main__":
-    main(str(Path(sys.argv[1]).resolve()))
+    main(str(Path(sys.argv[1]).resolve()) if sys.argv[1:] else page())

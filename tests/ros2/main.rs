@@ -15,7 +15,8 @@ use system_tests::domain;
 use system_tests::repository::root;
 
 /// Scripts of `ros2/tests` with their arguments, and the Python package and the header that each needs.
-const SCRIPTS: [(&str, &[&str], &str, &str); 3] = [
+const SCRIPTS: [(&str, &[&str], &str, &str); 4] = [
+    ("page", &[], "json", ""),
     ("golden", &["check"], "rosbags", ""),
     ("cyclone", &[], "cyclonedds", ""),
     (

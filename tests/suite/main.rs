@@ -36,6 +36,7 @@ mod replacing;
 mod runs;
 mod session;
 mod shared_memory;
+mod snippets;
 mod soak;
 mod status;
 mod streaming;

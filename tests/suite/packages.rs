@@ -10,6 +10,10 @@ fn package(folder: &Path) -> PathBuf {
     let ran = Command::new(root().join("packaging/deb.sh"))
         .arg(folder)
         .env("CANTER", env!("CARGO_BIN_EXE_canter-under-test"))
+        .env(
+            "CANTER_FLEET",
+            env!("CARGO_BIN_EXE_canter-fleet-under-test"),
+        )
         .env("SOURCE_DATE_EPOCH", "1700000000")
         .env("COMPRESSION", "none")
         .output()
@@ -45,13 +49,19 @@ fn the_debian_package_is_whole_and_the_same_every_time() {
     let files = said("dpkg-deb", &["--contents", path]).unwrap();
     for file in [
         "./usr/bin/canter",
+        "./usr/bin/canter-fleet",
         "./usr/share/man/man1/canter.1.gz",
         "./usr/share/man/man1/canter-engine.1.gz",
+        "./usr/share/man/man1/canter-fleet.1.gz",
+        "./usr/share/man/man1/canter-fleet-cell.1.gz",
         "./usr/share/bash-completion/completions/canter",
+        "./usr/share/bash-completion/completions/canter-fleet",
         "./usr/share/zsh/vendor-completions/_canter",
         "./usr/share/fish/vendor_completions.d/canter.fish",
         "./etc/security/limits.d/canter.conf",
         "./usr/lib/systemd/system/canter@.service",
+        "./usr/lib/systemd/system/canter-fleet@.service",
+        "./usr/lib/systemd/system/canter-fleet-router.service",
         "./usr/lib/sysusers.d/canter.conf",
         "./usr/share/doc/canter/examples/pick_and_place.canon",
     ] {

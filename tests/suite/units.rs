@@ -1,4 +1,5 @@
-//! The systemd unit of the Debian package: what it starts, stopped and killed as systemd does it.
+//! The systemd units of the Debian package: what they start, stopped and killed as systemd does it.
+//! `packaging/clean_root.py` shows the same with systemd, as root.
 
 use std::fs;
 use std::process::{Child, Command};
@@ -6,7 +7,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use system_tests::repository::root;
+use system_tests::repository::{files, root};
 
 use crate::canter::{canter, command};
 
@@ -196,20 +197,32 @@ fn a_stopped_service_has_not_failed() {
     assert!(code == 0 || fine, "systemd would call {code} a failure");
 }
 
-/// systemd reads the unit without a complaint.
+/// systemd reads all units without a complaint.
 #[test]
-fn systemd_can_read_the_unit() {
+fn systemd_can_read_the_units() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("canter@cell-arm.service");
-    let own = env!("CARGO_BIN_EXE_canter-under-test");
-    fs::write(&path, unit().replace("/usr/bin/canter", own)).unwrap();
-    let ran = Command::new("systemd-analyze")
-        .args(["verify", "--man=no"])
-        .arg(&path)
-        .output();
-    let Ok(ran) = ran else {
-        return println!("ignored: there is no systemd-analyze");
-    };
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.success() && !said.contains("canter@"), "{said}");
+    let units = files("packaging/systemd", "service").unwrap();
+    assert_eq!(units.len(), 3);
+    for path in units {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let own = folder.path().join(name.replace('@', "@cell-arm"));
+        let text = fs::read_to_string(&path).unwrap();
+        let fleet = env!("CARGO_BIN_EXE_canter-fleet-under-test");
+        let text = text.replace("/usr/bin/canter-fleet", fleet);
+        let text = text.replace(
+            "/usr/bin/canter ",
+            concat!(env!("CARGO_BIN_EXE_canter-under-test"), " "),
+        );
+        fs::write(&own, text).unwrap();
+        let ran = Command::new("systemd-analyze")
+            .args(["verify", "--man=no"])
+            .arg(&own)
+            .output();
+        let Ok(ran) = ran else {
+            return println!("ignored: there is no systemd-analyze");
+        };
+        let said = String::from_utf8_lossy(&ran.stderr);
+        let complains = said.contains(name.split(['@', '.']).next().unwrap());
+        assert!(ran.status.success() && !complains, "{said}");
+    }
 }

@@ -211,7 +211,10 @@ impl<const N: usize> Worker<'_, N> {
         let busy = !self.work.is_empty() || waiting || self.streaming.is_some();
         // In lock-step the driver waits for this thread.
         let stepping = self.config.clock == Clock::LockStep && !self.flight.is_empty();
-        let wait = Duration::from_micros(if busy || stepping { 20 } else { 500 });
+        // Nothing comes from the servo thread more often than once in a period.
+        let idle = (0.5 / self.config.rate_hz).clamp(0.0005, 0.005);
+        let wait = if busy || stepping { 20e-6 } else { idle };
+        let wait = Duration::from_secs_f64(wait);
         let mut order = match self.ends.orders.recv_timeout(wait) {
             Ok(order) => Some(order),
             Err(RecvTimeoutError::Timeout) => None,

@@ -1,7 +1,9 @@
 //! The commands that show and command the arms.
 
 mod all;
+mod completions;
 mod keyboard;
+mod man;
 mod notes;
 mod one;
 mod router;
@@ -9,6 +11,8 @@ mod send;
 mod top;
 
 pub(crate) use all::All;
+pub(crate) use completions::Completions;
+pub(crate) use man::Man;
 pub(crate) use notes::Notes;
 pub(crate) use one::{One, Override};
 pub(crate) use router::Router;

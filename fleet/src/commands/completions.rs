@@ -1,0 +1,33 @@
+use std::io::{self, Write};
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+use crate::failure::Failure;
+use crate::options::Options;
+
+/// Print the completion script of a shell
+///
+/// For bash: `canter-fleet completions bash > ~/.local/share/bash-completion/completions/canter-fleet`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Completions {
+    /// The shell
+    shell: Shell,
+}
+
+impl Completions {
+    /// Prints the script.
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        let mut script = Vec::new();
+        clap_complete::generate(
+            self.shell,
+            &mut Options::command(),
+            "canter-fleet",
+            &mut script,
+        );
+        io::stdout()
+            .lock()
+            .write_all(&script)
+            .map_err(|cause| Failure::Unreadable(format!("standard output: {cause}")))
+    }
+}

@@ -1,0 +1,33 @@
+use std::io;
+use std::path::PathBuf;
+
+use clap::CommandFactory;
+use clap_mangen::Man as Page;
+
+use crate::failure::Failure;
+use crate::options::Options;
+
+/// Print the manual page, or write the pages of all commands to a folder
+///
+/// To read it at once: `canter-fleet man | man -l -`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Man {
+    /// Folder for one page per command (canter-fleet.1, canter-fleet-cell.1, ...), made if it is missing
+    #[arg(long, value_name = "FOLDER")]
+    folder: Option<PathBuf>,
+}
+
+impl Man {
+    /// Prints the main page or writes them all.
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        let command = Options::command();
+        let Some(folder) = &self.folder else {
+            return Page::new(command)
+                .render(&mut io::stdout().lock())
+                .map_err(|cause| Failure::Unreadable(format!("standard output: {cause}")));
+        };
+        std::fs::create_dir_all(folder)
+            .and_then(|()| clap_mangen::generate_to(command, folder))
+            .map_err(|cause| Failure::Unreadable(format!("{}: {cause}", folder.display())))
+    }
+}
