@@ -268,7 +268,7 @@ impl Resampler {
         }
         self.move_playhead(advance);
         self.waited += advance;
-        self.find_targets(advance);
+        self.find_targets();
         let joints = self.commands.iter_mut().zip(&self.targets);
         for (limiter, (command, target)) in self.limiters.iter().zip(joints) {
             *command = limiter.approach(command, target, self.options.period);
@@ -319,7 +319,7 @@ impl Resampler {
     }
 
     /// The motion at the playhead.
-    fn find_targets(&mut self, advance: f64) {
+    fn find_targets(&mut self) {
         let Some(playhead) = &self.playhead else {
             return;
         };
@@ -333,26 +333,38 @@ impl Resampler {
                 for (joint, target) in self.targets.iter_mut().enumerate() {
                     let ends = [&before.joints[joint], &after.joints[joint]];
                     let found = between(ends, after.at - before.at, (at - before.at).max(0.0));
-                    *target = Reference {
-                        velocity: found.velocity * pace,
-                        acceleration: found.acceleration * pace * pace,
-                        ..found
-                    };
+                    *target = at_pace(&found, pace);
                 }
             }
             (Some(only), None) if at <= only.at => {}
             _ => {
-                // The newest reference has been passed.
-                let stops = at - self.ring.back().map_or(at, |row| row.at) > COAST;
-                for (limiter, target) in self.limiters.iter().zip(&mut self.targets) {
-                    *target = if stops {
-                        limiter.stop(target, advance)
+                let Some(newest) = self.ring.back() else {
+                    return;
+                };
+                // The newest reference has been passed. It is the one to go on from: the references that come
+                // meanwhile may brake.
+                let passed = at - newest.at;
+                let joints = newest.joints.iter().zip(&mut self.targets);
+                for (limiter, (from, target)) in self.limiters.iter().zip(joints) {
+                    let found = limiter.go_on(from, passed.min(COAST));
+                    let found = if passed > COAST {
+                        limiter.stop(&found, passed - COAST)
                     } else {
-                        limiter.go_on(target, advance)
+                        found
                     };
+                    *target = at_pace(&found, pace);
                 }
             }
         }
+    }
+}
+
+/// The same motion as one goes through it at another pace.
+fn at_pace(motion: &Reference, pace: f64) -> Reference {
+    Reference {
+        velocity: motion.velocity * pace,
+        acceleration: motion.acceleration * pace * pace,
+        ..*motion
     }
 }
 

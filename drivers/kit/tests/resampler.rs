@@ -235,6 +235,11 @@ fn a_controller_that_stood_still_catches_up() {
 }
 
 fn resampler() -> Resampler {
+    resampler_of(1.0)
+}
+
+/// With a share of the maker's limits.
+fn resampler_of(share: f64) -> Resampler {
     let about = About {
         lower: vec![-1.5],
         upper: vec![1.5],
@@ -246,11 +251,118 @@ fn resampler() -> Resampler {
     let options = ResamplerOptions {
         delay: DELAY,
         period: PERIOD,
-        velocity: vec![SPEED],
-        acceleration: vec![ACCELERATION],
-        jerk: vec![JERK],
+        velocity: vec![SPEED * share],
+        acceleration: vec![ACCELERATION * share],
+        jerk: vec![JERK * share],
     };
     Resampler::new(&about, options).unwrap()
+}
+
+/// A controller that differences what it commands, as that of Franka arms does: acceleration goes on while commands
+/// are missing, and its states are single precision.
+#[derive(Default)]
+struct Differences {
+    position: f64,
+    velocity: f64,
+    acceleration: f64,
+}
+
+impl Differences {
+    fn miss(&mut self) {
+        self.velocity += self.acceleration * PERIOD;
+        self.position += self.velocity * PERIOD;
+    }
+
+    /// Takes a command; returns the shares of the maker's limits.
+    fn take(&mut self, position: f64) -> [f64; 3] {
+        let velocity = (position - self.position) / PERIOD;
+        let acceleration = (velocity - self.velocity) / PERIOD;
+        let jerk = (acceleration - self.acceleration) / PERIOD;
+        *self = Self {
+            position,
+            velocity,
+            acceleration,
+        };
+        let shares = [velocity / SPEED, acceleration / ACCELERATION, jerk / JERK];
+        shares.map(f64::abs)
+    }
+
+    /// What it says that it commands, as of the end of its period.
+    fn told(&self) -> Reference {
+        let [position, velocity, acceleration] =
+            [self.position, self.velocity, self.acceleration].map(|value| f64::from(value as f32));
+        Reference {
+            position,
+            velocity: velocity + acceleration * PERIOD / 2.0,
+            acceleration,
+        }
+    }
+}
+
+/// Up to 18 commands in a row are lost at random times while the references come on: the command after them starts from
+/// what the controller commands by itself, and none is beyond the maker's limits.
+#[test]
+fn commands_that_were_lost_are_joined() {
+    let mut resampler = resampler_of(0.95);
+    resampler.begin(&[-1.0]);
+    let mut random = Random(5);
+    let mut controller = Differences {
+        position: -1.0,
+        ..Differences::default()
+    };
+    let (mut lost, mut passed) = (0, 1.0);
+    let mut peaks = [0.0_f64; 3];
+    for number in 0..200_000_u64 {
+        if lost == 0 && random.next() < 0.004 {
+            lost = 1 + (18.0 * random.next()) as u64;
+        }
+        resampler.push(
+            1_000_000_000 + number * 1_000_000,
+            &[plan(number as f64 * PERIOD)],
+        );
+        if lost > 0 {
+            (lost, passed) = (lost - 1, passed + 1.0);
+            controller.miss();
+            continue;
+        }
+        if passed > 1.0 {
+            resampler.rejoin(&[controller.told()]);
+        }
+        let command = resampler.next(passed * PERIOD)[0].position;
+        passed = 1.0;
+        for (peak, share) in peaks.iter_mut().zip(controller.take(command)) {
+            *peak = peak.max(share);
+        }
+    }
+    println!("{peaks:?}");
+    assert!(
+        peaks[0] > 0.5 && peaks.iter().all(|peak| *peak <= 1.0),
+        "{peaks:?}"
+    );
+}
+
+/// From a moment on references come 12 ms later than before, in the middle of motions: the playhead is beyond the newest
+/// one for a while, and the command follows those that come, also where they brake.
+#[test]
+fn references_that_come_later_are_followed() {
+    for begin in 0..40_u64 {
+        let mut resampler = resampler_of(0.95);
+        resampler.begin(&[-1.0]);
+        let mut worst = 0.0_f64;
+        for number in 0..8000_u64 {
+            let later = if number > 4000 + 25 * begin { 12 } else { 0 };
+            let sent = number.saturating_sub(later);
+            resampler.push(
+                1_000_000_000 + sent * 1_000_000,
+                &[plan(sent as f64 * PERIOD)],
+            );
+            let command = resampler.next(PERIOD)[0];
+            let wanted = plan(sent as f64 * PERIOD).position;
+            worst = worst.max((command.position - wanted).abs());
+        }
+        // The way of 16 ms at the largest speed, and what braking takes.
+        assert!(worst < 0.04, "{begin}: {worst} rad");
+    }
 }
 
 /// A stop in the middle of a motion: to rest within the maker's limits, whatever is pushed.
