@@ -8,8 +8,8 @@
 use std::process::Command;
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use system_tests::domain;
 use system_tests::repository::root;
+use system_tests::{domain, python};
 
 /// Scripts of `fleet/tests`.
 const SCRIPTS: [&str; 4] = ["rights", "faults", "top", "page"];
@@ -25,7 +25,7 @@ fn main() {
         ),
         Trial::test("wrong_arguments", wrong_arguments),
     ];
-    let missing = has_client().err();
+    let missing = python::has("zenoh", "eclipse-zenoh==1.10.2").err();
     if let Some(reason) = &missing {
         eprintln!("{reason}: the scripts of fleet/tests are ignored");
     }
@@ -36,40 +36,19 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-/// Whether `python3` has the outside client; the reason if not.
-fn has_client() -> Result<(), String> {
-    let ran = Command::new("python3")
-        .args(["-c", "import zenoh"])
-        .output();
-    match ran {
-        Err(error) => Err(format!("there is no python3 ({error})")),
-        Ok(ran) if ran.status.success() => Ok(()),
-        Ok(_) => Err("python3 cannot import zenoh (pip install eclipse-zenoh==1.10.2)".to_owned()),
-    }
-}
-
 fn run(script: &str) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let mut command = Command::new("python3");
-    command
-        .arg("-B")
-        .arg(root().join(format!("fleet/tests/{script}.py")))
-        .arg(folder.path());
-    let ran = domain::join(&mut command)
-        .current_dir(root())
-        .env("CANTER_COMMAND", env!("CARGO_BIN_EXE_canter-under-test"))
-        .env(
-            "CANTER_FLEET_COMMAND",
-            env!("CARGO_BIN_EXE_canter-fleet-under-test"),
-        )
-        .output()?;
-    let said = String::from_utf8_lossy(&ran.stdout).into_owned();
-    if ran.status.success() {
-        println!("{said}");
-        return Ok(());
-    }
-    let why = String::from_utf8_lossy(&ran.stderr).into_owned();
-    Err(format!("{}\n{said}\n{why}", ran.status).into())
+    let (canter, fleet) = (
+        env!("CARGO_BIN_EXE_canter-under-test"),
+        env!("CARGO_BIN_EXE_canter-fleet-under-test"),
+    );
+    let programs = [
+        ("CANTER_COMMAND", canter.to_owned()),
+        ("CANTER_FLEET_COMMAND", fleet.to_owned()),
+    ];
+    let script = format!("fleet/tests/{script}.py");
+    println!("{}", python::run(&script, [folder.path()], programs)?);
+    Ok(())
 }
 
 /// The crates of the network are not among those of `canter`.

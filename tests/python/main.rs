@@ -5,13 +5,12 @@
 //! start engines of the command under test.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use system_tests::python;
 use system_tests::repository::root;
 
 /// Scripts of `python/tests`, and the packages that each needs besides NumPy.
@@ -31,14 +30,16 @@ fn main() {
     // Engines and their threads want the processors to themselves.
     arguments.test_threads = Some(1);
     let package = tempfile::tempdir().unwrap();
-    let numpy = has("numpy");
+    let numpy = python::has("numpy", "numpy");
     if let Err(reason) = &numpy {
         eprintln!("{reason}: the tests of the Python package are ignored");
     } else {
         put_together(package.path());
     }
     let trials = SCRIPTS.iter().map(|(script, needs)| {
-        let missing = needs.iter().find_map(|package| has(package).err());
+        let missing = needs
+            .iter()
+            .find_map(|package| python::has(package, package).err());
         if let (Ok(()), Some(reason)) = (&numpy, &missing) {
             eprintln!("{reason}: python/tests/{script}.py is ignored");
         }
@@ -50,20 +51,6 @@ fn main() {
     let conclusion = libtest_mimic::run(&arguments, trials);
     drop(package);
     conclusion.exit();
-}
-
-/// Whether `python3` can import a package; the reason if not.
-fn has(package: &str) -> Result<(), String> {
-    let ran = Command::new("python3")
-        .args(["-c", &format!("import {package}")])
-        .output();
-    match ran {
-        Err(error) => Err(format!("there is no python3 ({error})")),
-        Ok(ran) if ran.status.success() => Ok(()),
-        Ok(_) => Err(format!(
-            "python3 cannot import {package} (pip install {package})"
-        )),
-    }
 }
 
 /// The package as a wheel would install it, by links.
@@ -93,20 +80,17 @@ fn module() -> PathBuf {
 }
 
 fn run(script: &str, package: &Path) -> Result<(), Failed> {
-    let path = root().join(format!("python/tests/{script}.py"));
-    let mut command = Command::new("python3");
-    system_tests::domain::join(&mut command)
-        .arg("-B")
-        .arg(path)
-        .current_dir(root())
-        .env("PYTHONPATH", package)
-        .env("CANTER_COMMAND", package.join("bin/canter"))
-        .env("MPLBACKEND", OsStr::new("Agg"))
-        .env("PYTHONWARNINGS", "error::DeprecationWarning:canter");
-    let ran = command.output()?;
-    if ran.status.success() {
-        return Ok(());
-    }
-    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-    Err(format!("{}\n{said}", ran.status).into())
+    let path = |path: &Path| path.display().to_string();
+    let environment = [
+        ("PYTHONPATH", path(package)),
+        ("CANTER_COMMAND", path(&package.join("bin/canter"))),
+        ("MPLBACKEND", "Agg".to_owned()),
+        (
+            "PYTHONWARNINGS",
+            "error::DeprecationWarning:canter".to_owned(),
+        ),
+    ];
+    let script = format!("python/tests/{script}.py");
+    python::run(&script, [""; 0], environment)?;
+    Ok(())
 }

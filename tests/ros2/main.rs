@@ -11,8 +11,7 @@ use std::path::Path;
 use std::process::Command;
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use system_tests::domain;
-use system_tests::repository::root;
+use system_tests::{domain, python};
 
 /// Scripts of `ros2/tests` with their arguments, and the Python package and the header that each needs.
 const SCRIPTS: [(&str, &[&str], &str, &str); 4] = [
@@ -37,7 +36,9 @@ fn main() {
         Trial::test("without_an_engine", without_an_engine),
     ];
     for (script, words, package, header) in SCRIPTS {
-        let missing = has(package).and_then(|()| has_header(header)).err();
+        let missing = python::has(package, package)
+            .and_then(|()| has_header(header))
+            .err();
         if let Some(reason) = &missing {
             eprintln!("{reason}: ros2/tests/{script}.py is ignored");
         }
@@ -45,20 +46,6 @@ fn main() {
         trials.push(trial.with_ignored_flag(missing.is_some()));
     }
     libtest_mimic::run(&arguments, trials).exit();
-}
-
-/// Whether `python3` can import a package; the reason if not.
-fn has(package: &str) -> Result<(), String> {
-    let ran = Command::new("python3")
-        .args(["-c", &format!("import {package}")])
-        .output();
-    match ran {
-        Err(error) => Err(format!("there is no python3 ({error})")),
-        Ok(ran) if ran.status.success() => Ok(()),
-        Ok(_) => Err(format!(
-            "python3 cannot import {package} (pip install {package})"
-        )),
-    }
 }
 
 /// Whether a header of Fast DDS is installed, where one is needed; the reason if not.
@@ -75,33 +62,23 @@ fn has_header(header: &str) -> Result<(), String> {
 
 fn run(script: &str, words: &[&str]) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
-    let mut command = Command::new("python3");
-    if words.is_empty() {
-        command
-            .arg("-B")
-            .arg(root().join(format!("ros2/tests/{script}.py")))
-            .arg(folder.path());
+    let path = folder.path().display().to_string();
+    let words = if words.is_empty() {
+        &[path.as_str()]
     } else {
-        command
-            .arg("-B")
-            .arg(root().join(format!("ros2/tests/{script}.py")))
-            .args(words);
-    }
-    let ran = domain::join(&mut command)
-        .current_dir(root())
-        .env("CANTER_COMMAND", env!("CARGO_BIN_EXE_canter-under-test"))
-        .env(
-            "CANTER_ROS2_COMMAND",
-            env!("CARGO_BIN_EXE_canter-ros2-under-test"),
-        )
-        .output()?;
-    let said = String::from_utf8_lossy(&ran.stdout).into_owned();
-    if ran.status.success() {
-        println!("{said}");
-        return Ok(());
-    }
-    let why = String::from_utf8_lossy(&ran.stderr).into_owned();
-    Err(format!("{}\n{said}\n{why}", ran.status).into())
+        words
+    };
+    let (canter, bridge) = (
+        env!("CARGO_BIN_EXE_canter-under-test"),
+        env!("CARGO_BIN_EXE_canter-ros2-under-test"),
+    );
+    let programs = [
+        ("CANTER_COMMAND", canter.to_owned()),
+        ("CANTER_ROS2_COMMAND", bridge.to_owned()),
+    ];
+    let said = python::run(&format!("ros2/tests/{script}.py"), words, programs)?;
+    println!("{said}");
+    Ok(())
 }
 
 /// `canter serve ros2` with these folders as its path.

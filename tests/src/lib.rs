@@ -11,6 +11,7 @@ pub mod long_move;
 pub mod motion;
 pub mod peer;
 pub mod pipe;
+pub mod python;
 pub mod repository;
 pub mod servo_arm;
 pub mod signal;
