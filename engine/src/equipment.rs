@@ -47,6 +47,7 @@ pub fn equip(robot: &mut Robot, world: &Model) -> Result<(), plan::PlanError> {
                 closing: NOMINAL_S,
                 width: None,
             }),
+            inertia: None,
             workstation_from_holder,
         });
     }

@@ -1,5 +1,6 @@
 //! End effectors of an arm, their grippers, and the tool changer.
 
+use kinematics::Inertia;
 use nalgebra::Isometry3;
 
 /// How long a gripper takes.
@@ -22,6 +23,8 @@ pub struct EndEffector {
     pub flange_from_tcp: Isometry3<f64>,
     /// Present when it opens and closes.
     pub gripper: Option<Gripper>,
+    /// Mass, centre and inertia in the flange's frame, where they are known.
+    pub inertia: Option<Inertia>,
     /// Where it is kept in the changing station, in the workstation.
     pub workstation_from_holder: Option<Isometry3<f64>>,
 }

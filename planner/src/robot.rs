@@ -20,7 +20,7 @@ pub use import::{from_urdf, import};
 pub use meshes::{mesh_file, mesh_names};
 pub use shipped::list;
 
-use kinematics::{Chain, Model, UrdfError};
+use kinematics::{Chain, Inertia, Model, UrdfError};
 use nalgebra::{Isometry3, SVector};
 use std::path::{Path, PathBuf};
 
@@ -137,6 +137,8 @@ pub struct Robot {
     pub tool: ToolLimits,
     /// Limits of the efforts of the joints, if the robot asks for them.
     pub efforts: Option<EffortLimits>,
+    /// What the flange carries all the time beside its end effector, where it is known.
+    pub payload: Option<Inertia>,
     /// When a command is done: the measured arm has arrived.
     pub arrival: Arrival,
     /// Pose of the robot's base in the workstation.
@@ -380,6 +382,7 @@ impl Robot {
             gripper_open: self.mounted.map(|_| true),
             changer_open: false,
             changer: self.tool_changer,
+            payload: self.payload,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Which end effector is on the arm, which are in the station, and the rules of changing them.
 
+use kinematics::Inertia;
 use nalgebra::Isometry3;
 
 use crate::command_error::{CommandError, ErrorClass};
@@ -32,6 +33,8 @@ pub struct Tooling {
     pub changer_open: bool,
     /// Nominal times of the tool changer; `None` for an arm without one.
     pub changer: Option<ToolChanger>,
+    /// What the flange carries beside the end effector, where it is known.
+    pub payload: Option<Inertia>,
 }
 
 /// How near the arm's end must be to a holder's pose, m and rad.
@@ -44,6 +47,19 @@ impl Tooling {
     pub fn flange_from_tool(&self) -> Isometry3<f64> {
         self.mounted_tool()
             .map_or_else(Isometry3::identity, |tool| tool.flange_from_tcp)
+    }
+
+    /// What the flange carries now, in its frame: the mounted end effector and what is always there.
+    /// `None` where no mass is known: then the arm's controller keeps what it was told by others.
+    #[must_use]
+    pub fn carried(&self) -> Option<Inertia> {
+        let mut tools = self.end_effectors.iter();
+        if self.payload.is_none() && tools.all(|tool| tool.inertia.is_none()) {
+            return None;
+        }
+        let always = self.payload.unwrap_or_else(Inertia::none);
+        let mounted = self.mounted_tool().and_then(|tool| tool.inertia);
+        Some(mounted.map_or(always, |tool| always.with(&tool)))
     }
 
     /// Nominal time of an action in the present state, s.
@@ -217,6 +233,7 @@ mod tests {
                 closing: 0.2,
                 width: Some(0.08),
             }),
+            inertia: None,
             workstation_from_holder: None,
         };
         let holder = Holder {
@@ -234,7 +251,29 @@ mod tests {
                 opening: 0.5,
                 closing: 0.5,
             }),
+            payload: None,
         }
+    }
+
+    #[test]
+    fn what_the_flange_carries_changes_with_the_end_effector() {
+        let mut tools = tooling();
+        assert_eq!(tools.carried(), None);
+        let body = |mass: f64, height: f64| Inertia {
+            mass,
+            centre: nalgebra::vector![0.0, 0.0, height],
+            ..Inertia::none()
+        };
+        tools.end_effectors[0].inertia = Some(body(1.0, 0.1));
+        assert_eq!(tools.carried(), Some(body(1.0, 0.1)));
+        tools.payload = Some(body(3.0, 0.02));
+        let both = tools.carried().unwrap();
+        assert_eq!(both.mass, 4.0);
+        assert!((both.centre.z - 0.04).abs() < 1e-15);
+        tools.mounted = None;
+        assert_eq!(tools.carried(), tools.payload);
+        tools.payload = None;
+        assert_eq!(tools.carried(), Some(Inertia::none()));
     }
 
     #[test]

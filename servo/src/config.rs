@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use ipc::{Arm, Clock, IpcError};
+use ipc::{Arm, Clock, IpcError, Payload};
 use realtime::{Following, JointLimits};
 use scheduling::RealTimeRequest;
 use thiserror::Error;
@@ -65,6 +65,8 @@ pub struct ExecutorConfig<const N: usize> {
     pub record: bool,
     /// The efforts that setpoints carry as feed-forward; zeros without.
     pub feed_forward: Option<FeedForward<N>>,
+    /// What the arm carries at the start, where it is known; its number is given by the thread.
+    pub payload: Option<Payload>,
 }
 
 impl<const N: usize> ExecutorConfig<N> {
@@ -90,6 +92,7 @@ impl<const N: usize> ExecutorConfig<N> {
             wait_for_planner: false,
             record: false,
             feed_forward: None,
+            payload: None,
         }
     }
 

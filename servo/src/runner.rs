@@ -11,7 +11,7 @@ use core::sync::atomic::Ordering;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use ipc::{HelloAck, MAX_TOOLS, Setpoint, State, ToolCommand};
+use ipc::{HelloAck, MAX_TOOLS, Payload, Setpoint, State, ToolCommand};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Pushed, Sample, Step, StopCategory};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -110,6 +110,8 @@ pub struct Runner<const N: usize> {
     refused: Option<u32>,
     orders: u32,
     tools: [ToolCommand; MAX_TOOLS],
+    /// What the arm carries, with its number in this session; number 0 where it is not known.
+    payload: Payload,
     published: Sample<N>,
     /// How fast the joints moved lately (rad/s): the largest speed, which fades with [`MEMORY`].
     speed: SVector<f64, N>,
@@ -155,6 +157,10 @@ impl<const N: usize> Runner<N> {
             refused: None,
             orders: 0,
             tools: [ToolCommand::default(); MAX_TOOLS],
+            payload: Payload {
+                number: u32::from(config.payload.is_some()),
+                ..config.payload.unwrap_or_default()
+            },
             published: Sample::rest(rest),
             speed: rest,
             pending: None,
@@ -193,6 +199,8 @@ impl<const N: usize> Runner<N> {
         self.forget_guards();
         self.orders = 0;
         self.tools = [ToolCommand::default(); MAX_TOOLS];
+        // A session begins without any.
+        self.payload.number = self.payload.number.min(1);
         self.speed = SVector::zeros();
         self.pending = None;
         self.share_position();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use ipc::ToolAction;
+use ipc::{Payload, ToolAction};
 use realtime::Segment;
 use rtrb::Producer;
 use thiserror::Error;
@@ -30,6 +30,9 @@ pub struct ToolOrder {
     pub force: f64,
     /// How far the opening may be from `position` with an object held (m); 0 is any.
     pub tolerance: f64,
+    /// What the arm carries when the tool has done it; `None` is as before. Its number is given by the
+    /// real-time thread.
+    pub payload: Option<Payload>,
 }
 
 impl ToolOrder {
@@ -44,6 +47,7 @@ impl ToolOrder {
             velocity: 0.0,
             force: 0.0,
             tolerance: 0.0,
+            payload: None,
         }
     }
 }

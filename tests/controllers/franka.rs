@@ -1,15 +1,16 @@
 //! The driver of Franka arms against franka-sim, with the limits and the rules for lost packets of
 //! its maker enforced.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::canter::{Ran, canter, command};
+use crate::robot_folder::{MASSES, with_masses};
+use crate::watch::Watch;
 
 /// Why there is no controller, or nothing if there is one.
 pub(crate) fn missing() -> Option<String> {
@@ -30,30 +31,48 @@ fn python() -> String {
 }
 
 /// The controller of an arm, as a process group.
-struct Controller {
+pub(crate) struct Controller {
     child: Child,
-    port: u16,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+    pub(crate) port: u16,
     folder: tempfile::TempDir,
+}
+
+/// What the controller noted of the commands since it was last asked.
+#[derive(Clone, Debug)]
+pub(crate) struct Record {
+    /// Largest acceleration (rad/s2) and jerk (rad/s3) of a joint.
+    pub(crate) acceleration: f64,
+    pub(crate) jerk: f64,
+    /// Commands that it took, those of them that were late, and cycles that it had to fill itself.
+    pub(crate) taken: u64,
+    pub(crate) late: u64,
+    pub(crate) missed: u64,
+    /// The masses that it was told (kg).
+    pub(crate) loads: Vec<f64>,
 }
 
 impl Controller {
     /// Starts it on a port of its own and waits until it listens.
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         let port = TcpListener::bind("127.0.0.1:0")
             .unwrap()
             .local_addr()
             .unwrap()
             .port();
         let folder = tempfile::tempdir().unwrap();
-        let child = Self::spawn(port, folder.path());
+        let (child, input, output) = Self::spawn(port, folder.path());
         Self {
             child,
+            input,
+            output,
             port,
             folder,
         }
     }
 
-    fn spawn(port: u16, folder: &std::path::Path) -> Child {
+    fn spawn(port: u16, folder: &std::path::Path) -> (Child, ChildStdin, BufReader<ChildStdout>) {
         let serve = system_tests::repository::root().join("drivers/franka/tests/serve.py");
         let log = std::fs::File::create(folder.join("log")).unwrap();
         // With priority where that is allowed: the simulation must keep its millisecond.
@@ -71,30 +90,48 @@ impl Controller {
             .arg(port.to_string())
             .arg(folder)
             .arg("0.04")
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(log)
             .process_group(0)
             .spawn()
             .unwrap();
+        let input = child.stdin.take().unwrap();
+        let mut output = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap())
-            .read_line(&mut line)
-            .unwrap();
+        output.read_line(&mut line).unwrap();
         assert_eq!(line, "ready\n", "the controller did not start");
-        child
+        (child, input, output)
     }
 
-    fn kill(&mut self) {
+    pub(crate) fn kill(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.kill();
-        self.child = Self::spawn(self.port, self.folder.path());
+        (self.child, self.input, self.output) = Self::spawn(self.port, self.folder.path());
     }
 
-    fn log(&self) -> String {
+    /// What it noted since it was last asked.
+    pub(crate) fn record(&mut self) -> Record {
+        writeln!(self.input, "record").unwrap();
+        let mut line = String::new();
+        self.output.read_line(&mut line).unwrap();
+        let told: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let loads = told["loads"].as_array().unwrap();
+        Record {
+            loads: loads.iter().map(|mass| mass.as_f64().unwrap()).collect(),
+            acceleration: told["acceleration"].as_f64().unwrap(),
+            jerk: told["jerk"].as_f64().unwrap(),
+            taken: told["taken"].as_u64().unwrap(),
+            late: told["late"].as_u64().unwrap(),
+            missed: told["missed"].as_u64().unwrap(),
+        }
+    }
+
+    pub(crate) fn log(&self) -> String {
         std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default()
     }
 }
@@ -106,10 +143,10 @@ impl Drop for Controller {
 }
 
 /// The driver, ended when dropped.
-struct Driver(Child);
+pub(crate) struct Driver(pub(crate) Child);
 
 impl Driver {
-    fn start(arm: &str, port: u16) -> Self {
+    pub(crate) fn start(arm: &str, port: u16) -> Self {
         let address = format!("127.0.0.1:{port}");
         let words = [
             "driver",
@@ -126,6 +163,13 @@ impl Driver {
             .unwrap();
         Self(child)
     }
+
+    /// Kills `this` and starts another one.
+    pub(crate) fn start_again(this: &mut Self, arm: &str, port: u16) -> Self {
+        let _ = this.0.kill();
+        let _ = this.0.wait();
+        Self::start(arm, port)
+    }
 }
 
 impl Drop for Driver {
@@ -136,7 +180,7 @@ impl Drop for Driver {
 }
 
 /// An arm name that no other test uses.
-fn arm() -> String {
+pub(crate) fn arm() -> String {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     format!(
         "franka{}/{}",
@@ -145,11 +189,11 @@ fn arm() -> String {
     )
 }
 
-fn run(arm: &str) -> Ran {
+pub(crate) fn run(arm: &str) -> Ran {
     run_of("examples/pick_and_place.canon", arm)
 }
 
-fn run_of(program: &str, arm: &str) -> Ran {
+pub(crate) fn run_of(program: &str, arm: &str) -> Ran {
     canter([
         "run", program, "--robot", "fr3", "--driver", "external", "--arm", arm,
     ])
@@ -163,15 +207,15 @@ fn runs() -> usize {
 
 /// The example with the gripper and an object of 40 mm: no reflex.
 pub(crate) fn pick_and_place() {
-    let controller = Controller::start();
+    let mut controller = Controller::start();
     let arm = arm();
     let _driver = Driver::start(&arm, controller.port);
-    many(&controller, || run(&arm), &arm);
+    many(&mut controller, || run(&arm), &arm);
 }
 
 /// A smooth path of 100 poses: no reflex.
 pub(crate) fn a_smooth_path_of_a_hundred_poses() {
-    let controller = Controller::start();
+    let mut controller = Controller::start();
     let arm = arm();
     let _driver = Driver::start(&arm, controller.port);
     let file = tempfile::Builder::new()
@@ -194,49 +238,30 @@ pub(crate) fn a_smooth_path_of_a_hundred_poses() {
     );
     std::fs::write(file.path(), program).unwrap();
     let path = file.path().to_str().unwrap();
-    many(&controller, || run_of(path, &arm), &arm);
+    many(&mut controller, || run_of(path, &arm), &arm);
 }
 
-/// Runs that all must succeed without a reflex; prints the controller's success rate while the arm moves.
-fn many(controller: &Controller, run: impl Fn() -> Ran, arm: &str) {
-    let ends = Arc::new(AtomicBool::new(false));
-    let (watched, stop) = (arm.to_owned(), Arc::clone(&ends));
-    let rates = std::thread::spawn(move || success_rates(&watched, &stop));
+/// The maker's largest acceleration (rad/s2) and jerk (rad/s3) of a joint.
+pub(crate) const LIMITS: [f64; 2] = [10.0, 5000.0];
+
+/// Runs that all must succeed without a reflex; prints what the controller noted and how late the arm was.
+fn many(controller: &mut Controller, run: impl Fn() -> Ran, arm: &str) {
+    let watch = Watch::start(arm);
     for number in 0..runs() {
         let ran = run();
         assert_eq!(ran.code, 0, "run {number}: {ran:?}\n{}", controller.log());
     }
-    ends.store(true, Ordering::Relaxed);
-    let (least, mean) = rates.join().unwrap();
-    println!(
-        "{} runs, success rate of the last 100 commands: mean {mean:.4}, least {least:.2}",
-        runs()
-    );
+    let seen = watch.end();
+    let record = controller.record();
+    println!("{} runs: {record:?}", runs());
+    println!("{seen}");
     let log = controller.log();
     assert!(!log.contains("violation"), "{log}");
-}
-
-/// The least and the mean success rate that the controller told while the arm moved.
-fn success_rates(arm: &str, ends: &AtomicBool) -> (f64, f64) {
-    let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
-    let (mut least, mut sum, mut count) = (1.0_f64, 0.0, 0.0_f64);
-    while !ends.load(Ordering::Relaxed) {
-        let Some(state) = observer.next_state() else {
-            std::thread::sleep(Duration::from_millis(1));
-            continue;
-        };
-        let sensors = &state.sensors[..state.sensor_count as usize];
-        let rate = sensors
-            .iter()
-            .find(|sensor| ipc::text_of(&sensor.name) == "success_rate");
-        let moves = state.velocity.iter().any(|speed| speed.abs() > 0.05);
-        if let (Some(rate), true) = (rate, moves) {
-            least = least.min(rate.value);
-            sum += rate.value;
-            count += 1.0;
-        }
-    }
-    (least, sum / count.max(1.0))
+    let peaks = [record.acceleration, record.jerk];
+    assert!(
+        peaks.iter().zip(LIMITS).all(|(peak, most)| *peak <= most),
+        "{record:?}"
+    );
 }
 
 /// Driver and controller are killed in motion: the engine names what happened, and the next run works
@@ -289,6 +314,23 @@ pub(crate) fn kills_and_restarts() {
     );
 }
 
+/// The robot's folder has masses: the controller is told that of the mounted end effector, between two
+/// motions of its own, and the program runs through.
+pub(crate) fn the_controller_is_told_the_payload() {
+    let mut controller = Controller::start();
+    let arm = arm();
+    let _driver = Driver::start(&arm, controller.port);
+    let folder = with_masses("fr3");
+    let robot = folder.path().to_str().unwrap();
+    let program = "examples/pick_and_place.canon";
+    let words = [
+        "run", program, "--robot", robot, "--driver", "external", "--arm", &arm,
+    ];
+    let ran = canter(words);
+    assert_eq!(ran.code, 0, "{ran:?}\n{}", controller.log());
+    assert_eq!(controller.record().loads, [MASSES[0]]);
+}
+
 /// `canter driver test` on it: nothing fails; what only a simulation can do is skipped.
 pub(crate) fn the_driver_conforms() {
     let controller = Controller::start();
@@ -299,7 +341,7 @@ pub(crate) fn the_driver_conforms() {
 }
 
 /// Waits until a joint moves with more than 0.05 rad/s.
-fn wait_for_motion(arm: &str) {
+pub(crate) fn wait_for_motion(arm: &str) {
     let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(60) {

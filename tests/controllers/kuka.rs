@@ -13,16 +13,8 @@ const ROBOT: &str = "irb120";
 
 /// Its folder with a margin, as every arm needs whose controller has its own clock.
 fn robot() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let from = system_tests::repository::root().join("robots").join(ROBOT);
-    for name in ["robot.urdf", "robot.toml"] {
-        std::fs::copy(from.join(name), folder.path().join(name)).unwrap();
-    }
-    let file = folder.path().join("robot.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
     let margin = "\n[joints.margin]\nvelocity = 0.9\nacceleration = 0.8\njerk = 0.5\n";
-    std::fs::write(file, text + margin).unwrap();
-    folder
+    crate::robot_folder::changed(ROBOT, |text| text + margin)
 }
 
 /// Why there is no controller, or nothing if there is one.
@@ -42,6 +34,12 @@ pub(crate) fn missing() -> Option<String> {
 /// The Python that has the controller.
 fn python() -> String {
     std::env::var("CANTER_RSI_PYTHON").unwrap_or("python3".to_owned())
+}
+
+/// How many programs the environment asks for; two without.
+fn runs() -> usize {
+    let text = std::env::var("CANTER_RSI_RUNS").unwrap_or_default();
+    text.parse().unwrap_or(2)
 }
 
 struct Controller {
@@ -190,7 +188,7 @@ pub(crate) fn programs_and_a_pulled_cable() {
     std::fs::write(moves.path(), without.join("\n")).unwrap();
     let mut words = words;
     words[1] = moves.path().to_str().unwrap();
-    for number in 0..2 {
+    for number in 0..runs() {
         let ran = canter(words);
         assert_eq!(ran.code, 0, "run {number}: {ran:?}");
     }
@@ -217,4 +215,15 @@ pub(crate) fn programs_and_a_pulled_cable() {
     let _controller = Controller::start(port, &home());
     let ran = canter(words);
     assert_eq!(ran.code, 0, "after the cable was pulled: {ran:?}");
+}
+
+/// `canter driver test` on it: nothing fails; what a real arm cannot do is skipped.
+pub(crate) fn the_driver_conforms() {
+    let (port, arm) = (free_port(), format!("kuka{}/conforms", std::process::id()));
+    let folder = robot();
+    let robot = folder.path().to_str().unwrap();
+    let _driver = Driver::start(&arm, port, robot);
+    let _controller = Controller::start(port, &home());
+    let ran = canter(["driver", "test", "--arm", &arm]);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
 }

@@ -15,9 +15,13 @@ mod canter;
 mod cia402;
 mod drives;
 mod franka;
+mod franka_trials;
 mod kuka;
+mod payloads;
+mod robot_folder;
 mod ur;
 mod ur_controller;
+mod watch;
 
 use libtest_mimic::{Arguments, Trial};
 
@@ -25,7 +29,7 @@ use libtest_mimic::{Arguments, Trial};
 type Test = (&'static str, fn());
 
 /// The driver of Franka arms.
-const FRANKA: [Test; 4] = [
+const FRANKA: [Test; 5] = [
     (
         "franka::a_smooth_path_of_a_hundred_poses",
         franka::a_smooth_path_of_a_hundred_poses,
@@ -33,10 +37,17 @@ const FRANKA: [Test; 4] = [
     ("franka::pick_and_place", franka::pick_and_place),
     ("franka::kills_and_restarts", franka::kills_and_restarts),
     ("franka::the_driver_conforms", franka::the_driver_conforms),
+    (
+        "franka::the_controller_is_told_the_payload",
+        franka::the_controller_is_told_the_payload,
+    ),
 ];
 
+/// The same with stalls and kills at random moments, as often as the environment asks for.
+const TRIALS: [Test; 1] = [("franka::stalls_and_kills", franka_trials::stalls_and_kills)];
+
 /// The driver of arms of Universal Robots, and the stand-in for their controller.
-const UNIVERSAL: [Test; 8] = [
+const UNIVERSAL: [Test; 9] = [
     (
         "motion::servoj_obeys_its_law",
         ur_controller::motion::servoj_obeys_its_law,
@@ -60,6 +71,10 @@ const UNIVERSAL: [Test; 8] = [
         ur::what_cannot_be_driven_is_refused_in_words,
     ),
     ("ur::the_driver_conforms", ur::the_driver_conforms),
+    (
+        "ur::the_controller_is_told_the_payload",
+        ur::the_controller_is_told_the_payload,
+    ),
 ];
 
 /// The stand-in, seen by a client of others.
@@ -68,11 +83,20 @@ const OUTSIDE: [Test; 1] = [(
     ur::a_client_from_outside_reads_the_states,
 )];
 
-/// The driver of KUKA arms.
-const RSI: [Test; 1] = [(
-    "kuka::programs_and_a_pulled_cable",
-    kuka::programs_and_a_pulled_cable,
+/// The engine with the simulated driver.
+const SIMULATED: [Test; 1] = [(
+    "payloads::a_tool_change_tells_the_payload",
+    payloads::a_tool_change_tells_the_payload,
 )];
+
+/// The driver of KUKA arms.
+const RSI: [Test; 2] = [
+    (
+        "kuka::programs_and_a_pulled_cable",
+        kuka::programs_and_a_pulled_cable,
+    ),
+    ("kuka::the_driver_conforms", kuka::the_driver_conforms),
+];
 
 /// The driver of CiA 402 drives.
 const ETHERCAT: [Test; 9] = [
@@ -122,7 +146,9 @@ fn main() {
     let mut trials = Vec::new();
     for (tests, missing) in [
         (&FRANKA[..], franka::missing()),
+        (&TRIALS, franka::missing().or(franka_trials::unasked())),
         (&UNIVERSAL, None),
+        (&SIMULATED, None),
         (&OUTSIDE, ur::missing()),
         (&RSI, kuka::missing()),
         (&ETHERCAT, cia402::missing()),

@@ -5,6 +5,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::canter::{Ran, canter, command};
+use crate::robot_folder::{MASSES, with_masses};
 use crate::ur_controller::Controller;
 use crate::ur_controller::state::{PLAYING, Record, STOPPED, Setting, State};
 
@@ -300,6 +301,17 @@ pub(crate) fn what_cannot_be_driven_is_refused_in_words() {
     let ran = cell.run();
     assert_eq!(ran.code, 4, "{ran:?}");
     assert!(ran.stderr.contains("another program"), "{ran:?}");
+}
+
+/// The robot's folder has masses: the controller is told that of the mounted end effector.
+pub(crate) fn the_controller_is_told_the_payload() {
+    let cell = Cell::start("payload", Setting::e_series(home()));
+    let folder = with_masses(ROBOT);
+    let mut words = cell.words();
+    words[3] = folder.path().to_str().unwrap();
+    let ran = canter(words);
+    assert_eq!(ran.code, 0, "{ran:?}");
+    assert_eq!(cell.controller.state().payload, MASSES[0]);
 }
 
 /// `canter driver test` on it: nothing fails.

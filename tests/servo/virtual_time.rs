@@ -3,10 +3,11 @@
 mod arms;
 mod following;
 mod orders;
+mod payloads;
 
 use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
 use realtime::{Piece, Sample, Segment};
-use servo::{Control, Event, Fault, Monitor, Remote, Runner, SegmentSender, Tick};
+use servo::{Control, Event, ExecutorConfig, Fault, Monitor, Remote, Runner, SegmentSender, Tick};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
 
 /// A runner, its handles, and a driver that is always exactly at the last setpoint.
@@ -27,9 +28,14 @@ impl Bench {
 
     /// The same with another tolerance of arriving (rad).
     fn arriving(tolerance: f64) -> Self {
+        Self::of(|config| config.arrival.tolerance = tolerance)
+    }
+
+    /// The same with another configuration.
+    fn of(change: impl Fn(&mut ExecutorConfig<JOINTS>)) -> Self {
         let mut config = executor_config(system_tests::domain::arm("virtual/arm"), Clock::Wall);
-        config.arrival.tolerance = tolerance;
         config.record = false;
+        change(&mut config);
         let (mut runner, sender, remote, monitor) = Runner::new(config);
         let mut ack = HelloAck::refusal(JOINTS, Verdict::Welcome, "");
         ack.session = 1;

@@ -36,11 +36,10 @@ const STRANGE: u32 = 6;
 /// Period of the controller (s).
 const PERIOD: f64 = 1e-3;
 
-/// An answer is late that leaves so long after its state was read, or to a state that was read so much
-/// later than the arm's time says (s). A state after it that was read within this time was waiting, and
-/// is late too (s).
+/// An answer is late that leaves when its state is older than this (s). A state was waited for if its read
+/// took longer than this (s).
 const LATE: f64 = 0.7e-3;
-const WAITING: f64 = 0.1e-3;
+const WAITED: f64 = 0.05e-3;
 
 /// For so many states at its beginning a motion holds what the controller commands.
 const FIRST: usize = 5;
@@ -56,7 +55,7 @@ pub(crate) struct ArmThread {
     pub(crate) wishes: Consumer<Wish>,
     pub(crate) snapshots: Producer<Snapshot>,
     pub(crate) snapshot: Snapshot,
-    pub(crate) payload: Option<Payload>,
+    pub(crate) payload: Option<(Payload, u32)>,
     pub(crate) stop: Arc<AtomicBool>,
 }
 
@@ -129,7 +128,7 @@ impl ArmThread {
                         return lost;
                     }
                 }
-                Ok(Wish::Carry(payload)) => self.payload = Some(payload),
+                Ok(Wish::Carry(payload, number)) => self.payload = Some((payload, number)),
                 Ok(Wish::End) | Err(_) => {}
             }
         }
@@ -145,11 +144,7 @@ impl ArmThread {
         self.snapshot.fault = None;
         self.snapshot.reason = [0; 96];
         self.tell();
-        let ended = self.prepare(robot).and_then(|()| {
-            let mut control =
-                robot.start_joint_position_control(MoveControllerMode::JointImpedance)?;
-            self.follow(&mut control)
-        });
+        let ended = self.prepare(robot).and_then(|()| self.motions(robot));
         match ended {
             Ok(()) => self.snapshot.phase = Phase::Idle,
             Err(FrankaError::Network(text)) => return Err(text),
@@ -159,6 +154,33 @@ impl ArmThread {
             }
         }
         self.tell();
+        Ok(())
+    }
+
+    /// The motion, and another one after each payload: the controller takes a payload between them only.
+    fn motions(&mut self, robot: &Robot) -> Result<(), FrankaError> {
+        loop {
+            while self.rows.pop().is_ok() {}
+            let mut control =
+                robot.start_joint_position_control(MoveControllerMode::JointImpedance)?;
+            let goes_on = self.follow(&mut control)?;
+            drop(control);
+            if !goes_on {
+                return Ok(());
+            }
+            self.load(robot)?;
+        }
+    }
+
+    /// Tells the controller what the arm carries.
+    fn load(&mut self, robot: &Robot) -> Result<(), FrankaError> {
+        let Some((payload, number)) = self.payload.take() else {
+            return Ok(());
+        };
+        let [xx, yy, zz, xy, xz, yz] = payload.inertia;
+        let inertia = [xx, xy, xz, xy, yy, yz, xz, yz, zz];
+        robot.set_load(payload.mass, payload.centre, inertia)?;
+        self.snapshot.carried = number;
         Ok(())
     }
 
@@ -174,22 +196,19 @@ impl ArmThread {
         if let Some(impedance) = self.options.impedance {
             robot.set_joint_impedance(impedance)?;
         }
-        if let Some(payload) = self.payload.take() {
-            let [xx, yy, zz, xy, xz, yz] = payload.inertia;
-            let inertia = [xx, xy, xz, xy, yy, yz, xz, yz, zz];
-            robot.set_load(payload.mass, payload.centre, inertia)?;
-        }
-        Ok(())
+        self.load(robot)
     }
 
-    /// Answers each state of the controller with a command, until the motion shall end.
-    fn follow(&mut self, control: &mut Control<'_>) -> Result<(), FrankaError> {
+    /// Answers each state of the controller with a command, until the motion shall end; says whether
+    /// another motion shall follow it, after a new payload.
+    fn follow(&mut self, control: &mut Control<'_>) -> Result<bool, FrankaError> {
         let mut sent = Sent::default();
-        let mut ending = 0_u32;
+        let (mut ending, mut ends) = (0_u32, false);
         loop {
+            let asked_ns = now_ns();
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
-            sent.read(advance);
+            sent.read(asked_ns, advance);
             if sent.count < FIRST {
                 self.resampler.begin(&state.q_d);
             } else if sent.has_gone_on(&state, advance) {
@@ -205,13 +224,19 @@ impl ArmThread {
             let q: [f64; JOINTS] =
                 core::array::from_fn(|joint| command.get(joint).map_or(0.0, |c| c.position));
             self.snapshot.delay = self.resampler.delay();
-            if matches!(self.wishes.pop(), Ok(Wish::End)) || self.ends() {
-                ending = ending.max(1);
+            match self.wishes.pop() {
+                Ok(Wish::End) => ends = true,
+                Ok(Wish::Carry(payload, number)) => self.payload = Some((payload, number)),
+                Ok(Wish::Begin) | Err(_) => {}
             }
-            ending += u32::from(ending > 0);
+            ends |= self.ends();
+            ending += u32::from(ends || self.payload.is_some());
             let positions = JointPositions::new(q);
             if ending > 0 && (self.resampler.is_resting() || ending > PATIENCE) {
-                return control.write_once(&motion_finished(positions), None);
+                self.snapshot.phase = Phase::Starting;
+                self.tell();
+                control.write_once(&motion_finished(positions), None)?;
+                return Ok(!ends);
             }
             if sent.is_late() {
                 // The controller has dropped this cycle and gone on by itself; an answer that comes later
@@ -243,27 +268,38 @@ struct Sent {
     commands: [[f64; JOINTS]; ON_THE_WAY],
     count: usize,
     strange: u32,
-    /// When the last state was read (ns of `CLOCK_MONOTONIC`), and whether it was late.
+    /// When the last state was read (ns of `CLOCK_MONOTONIC`), and how old it was then (s).
     read_ns: u64,
-    late: bool,
+    age: f64,
     /// The last state was not answered.
     skipped: bool,
 }
 
 impl Sent {
-    /// A state was read, `passed` after the last one by the arm's time (s).
-    fn read(&mut self, passed: f64) {
+    /// A state was read, which was asked for at `asked_ns` and is `passed` after the last one by the arm's
+    /// time (s).
+    fn read(&mut self, asked_ns: u64, passed: f64) {
         let now = now_ns();
-        let waited = now.saturating_sub(self.read_ns) as f64 * 1e-9;
-        let first = self.read_ns == 0;
-        self.late = !first && (waited - passed > LATE || (self.late && waited < WAITING));
+        let since = |time: u64| now.saturating_sub(time) as f64 * 1e-9;
+        // One that was waited for is as old as the wait was too long; one that was there already came so much
+        // later than the last one as the arm's time says.
+        let before = if self.read_ns == 0 || since(asked_ns) > WAITED {
+            0.0
+        } else {
+            self.age
+        };
+        self.age = if self.read_ns == 0 {
+            0.0
+        } else {
+            (before + since(self.read_ns) - passed).max(0.0)
+        };
         self.read_ns = now;
     }
 
     /// Whether an answer that leaves now is late.
     fn is_late(&self) -> bool {
         let since = now_ns().saturating_sub(self.read_ns) as f64 * 1e-9;
-        self.late || since > LATE
+        self.age + since > LATE
     }
 
     fn push(&mut self, command: [f64; JOINTS]) {

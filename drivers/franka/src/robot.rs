@@ -45,6 +45,8 @@ pub struct Franka {
     starting: bool,
     /// Whether the motion was told to end and has not ended yet.
     ending: bool,
+    /// How many payloads the thread was given.
+    carried: u32,
     /// What the controller commanded when it was last asked (rad): a motion begins at rest.
     held: [f64; JOINTS],
     hand: Option<Hand>,
@@ -91,6 +93,7 @@ impl Franka {
             now: Snapshot::default(),
             starting: false,
             ending: false,
+            carried: 0,
             held: [0.0; JOINTS],
             hand,
             stop,
@@ -104,9 +107,9 @@ impl Franka {
         }
     }
 
-    fn wish(&mut self, wish: Wish) {
-        // The ring is empty but for the last moment; a wish that finds no room is asked for again.
-        let _ = self.wishes.push(wish);
+    /// Says whether there was room: the ring is empty but for the last moment.
+    fn wish(&mut self, wish: Wish) -> bool {
+        self.wishes.push(wish).is_ok()
     }
 
     /// Why a motion cannot start in the arm's mode.
@@ -202,7 +205,10 @@ impl Robot for Franka {
             self.starting = true;
             // A fault of before is over when the thread has taken the wish.
             self.now.fault = None;
-            self.wish(Wish::Begin);
+            // What was not told before counts no more: the engine tells it again.
+            self.carried = self.now.carried;
+            // One that finds no room is asked for again.
+            let _ = self.wish(Wish::Begin);
         }
         Readiness::Wait(match self.now.mode {
             RobotMode::Reflex => "recovering from an error".to_owned(),
@@ -213,7 +219,7 @@ impl Robot for Franka {
     fn end(&mut self) {
         self.starting = false;
         self.ending = true;
-        self.wish(Wish::End);
+        let _ = self.wish(Wish::End);
     }
 
     fn measure(&mut self, joints: &mut [Measured]) -> Measurement {
@@ -268,10 +274,18 @@ impl Robot for Franka {
     }
 
     fn carry(&mut self, payload: &Payload) {
-        self.wish(Wish::Carry(*payload));
+        let number = self.carried + 1;
+        if self.wish(Wish::Carry(*payload, number)) {
+            self.carried = number;
+        }
     }
 
     fn speed_scaling(&self) -> f64 {
+        let busy = matches!(self.now.phase, Phase::Moving | Phase::Starting);
+        if busy && self.now.carried < self.carried {
+            // The controller takes a payload between two motions only: the arm rests meanwhile.
+            return 0.0;
+        }
         if self.now.phase != Phase::Moving {
             return 1.0;
         }

@@ -41,6 +41,8 @@ pub(crate) struct Snapshot {
     pub(crate) success_rate: f64,
     /// How far the commands are behind the newest reference (s).
     pub(crate) delay: f64,
+    /// How many payloads the controller was told.
+    pub(crate) carried: u32,
     pub(crate) fault: Option<RobotFault>,
     /// Why there is no connection, or why the motion did not start.
     pub(crate) reason: [u8; 96],
@@ -60,6 +62,7 @@ impl Default for Snapshot {
             wrench: [0.0; 6],
             success_rate: 0.0,
             delay: 0.0,
+            carried: 0,
             fault: None,
             reason: [0; 96],
         }
@@ -86,6 +89,6 @@ pub(crate) enum Wish {
     Begin,
     /// End the motion.
     End,
-    /// The arm carries something else.
-    Carry(Payload),
+    /// The arm carries something else; the number counts them.
+    Carry(Payload, u32),
 }

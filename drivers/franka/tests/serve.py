@@ -3,7 +3,8 @@
     python serve.py PORT FOLDER [GRIPPER_OBJECT_WIDTH]
 
 Makes the model for MuJoCo from the URDF inside the package, so nothing is downloaded; prints
-`ready` when the server listens. The command of the package itself would bind to all networks.
+`ready` when the server listens, and a line of its record (record.py) for each line of standard input. The command of the
+package itself would bind to all networks.
 """
 
 import ctypes
@@ -20,6 +21,7 @@ PORT, FOLDER = int(sys.argv[1]), Path(sys.argv[2])
 WIDTH = float(sys.argv[3]) if len(sys.argv) > 3 else None
 
 import franka_sim  # noqa: E402
+from record import Record  # noqa: E402
 
 # Damping (N m s/rad) and inertia of the motors (kg m2): what the URDF does not have.
 DAMPING, ARMATURE = 1.0, 0.1
@@ -63,6 +65,7 @@ def main():
         enforce_motion_limits=True,
     )
 
+    record = Record(FOLDER)
     keep_time()
 
     def ready():
@@ -70,6 +73,7 @@ def main():
             if stop.wait(0.05):
                 return
         print("ready", flush=True)
+        record.answer()
 
     stop = threading.Event()
     threading.Thread(target=ready, daemon=True).start()

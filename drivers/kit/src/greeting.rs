@@ -141,7 +141,7 @@ impl<R: Robot> Driver<R> {
                 ))
             }
             _ if self.leaving => Some((Verdict::NotReady, "the driver ends".to_owned())),
-            _ if !self.is_resting() => Some((Verdict::NotReady, "the arm still moves".to_owned())),
+            _ if !self.is_resting() => Some((Verdict::Wait, "the arm comes to rest".to_owned())),
             _ => None,
         }
     }

@@ -315,6 +315,20 @@ fn the_age_of_a_setpoint_is_its_own() {
     pair.assert_latched(&[FaultCode::BadSetpoint]);
 }
 
+/// A session is asked for while the arm still brakes: the engine waits until it rests.
+#[test]
+fn a_session_waits_until_the_arm_rests() {
+    let mut pair = Pair::new(&[1.0, -1.0]);
+    pair.both(300);
+    pair.engine_stands(WATCHDOG / PERIOD + 2, false);
+    let hello = Hello::new(1, PERIOD, WATCHDOG, Clock::Wall);
+    let ack = pair.driver.greet(&hello, pair.now);
+    assert_eq!(ack.verdict, Verdict::Wait as u32);
+    pair.engine_stands(1000, false);
+    let ack = pair.driver.greet(&hello, pair.now);
+    assert_eq!(ack.verdict, Verdict::Welcome as u32);
+}
+
 /// A driver that is told to end brakes, reports why, and opens no new session.
 #[test]
 fn a_driver_that_leaves_brakes_first() {

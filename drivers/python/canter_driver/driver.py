@@ -108,7 +108,7 @@ class Driver:
         if self.leaving:
             return m.NOT_READY, "the driver ends"
         if not self.resting:
-            return m.NOT_READY, "the arm still moves"
+            return m.WAIT, "the arm comes to rest"
         return None
 
     def answer(self, verdict, reason=""):

@@ -180,6 +180,14 @@ class Laws(unittest.TestCase):
                 pair.drive()
             pair.assert_latched(fault)
 
+    def test_a_session_waits_until_the_arm_rests(self):
+        pair = Pair([1.0, -1.0])
+        pair.both(300)
+        pair.engine_stands(WATCHDOG // PERIOD + 2, False)
+        self.assertEqual(pair.driver.greet(pair.hello).verdict, m.WAIT)
+        pair.engine_stands(1000, False)
+        self.assertEqual(pair.driver.greet(pair.hello).verdict, m.WELCOME)
+
     def test_a_driver_that_leaves_brakes_first(self):
         pair = Pair([1.0, -1.0])
         pair.both(300)

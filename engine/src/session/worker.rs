@@ -7,6 +7,7 @@ mod replacing;
 mod reports;
 mod sampling;
 mod streaming;
+mod tools;
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
@@ -22,6 +23,7 @@ use in_flight::InFlight;
 use jogging::Jogging;
 use sampling::Sampling;
 use streaming::Streaming;
+use tools::{payload, tool_order};
 
 use super::note::Note;
 use super::status::state_name;
@@ -31,10 +33,10 @@ use planner::command_error::CommandError;
 use planner::controller::{AnyStep, Controller, Step};
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
-use planner::task::{Task, ToolAction};
+use planner::task::Task;
 use servo::{
     Arrival, Events, Executor, ExecutorConfig, FeedForward, Monitor, Remote, SegmentSender,
-    Steering, ToolOrder, Work,
+    Steering, Work,
 };
 
 /// Largest number of commands in work, the one that moves among them.
@@ -136,6 +138,7 @@ fn start<'a, const N: usize>(
     wanted.feed_forward = robot
         .efforts::<N>()
         .map(|efforts| FeedForward::new(move |[q, dq, ddq]| efforts.dynamics.effort(q, dq, ddq)));
+    wanted.payload = payload(controller.modal().tooling());
     let (executor, sender, monitor) = Executor::start(wanted)?;
     let Monitor { events, samples } = monitor;
     let remote = executor.remote();
@@ -353,7 +356,8 @@ impl<const N: usize> Worker<'_, N> {
                 return;
             }
             Task::Tool(action) => {
-                let order = tool_order(command, action, flight.planned_s);
+                let tooling = self.controller.modal().tooling();
+                let order = tool_order(command, action, flight.planned_s, tooling);
                 self.work.push_back(Work::Tool(order));
                 return;
             }
@@ -460,23 +464,5 @@ impl<const N: usize> Worker<'_, N> {
     pub(super) fn say(&self, note: Note) {
         // The receiver may have been dropped.
         let _ = self.ends.notes.send(note);
-    }
-}
-
-fn tool_order(command: u32, action: ToolAction, nominal: f64) -> ToolOrder {
-    let position = match action {
-        ToolAction::MoveGripper { opening_um } => f64::from(opening_um) * 1e-6,
-        _ => 0.0,
-    };
-    let (tool, action) = match action {
-        ToolAction::OpenGripper => (ipc::GRIPPER, ipc::ToolAction::Open),
-        ToolAction::CloseGripper => (ipc::GRIPPER, ipc::ToolAction::Close),
-        ToolAction::MoveGripper { .. } => (ipc::GRIPPER, ipc::ToolAction::Move),
-        ToolAction::OpenToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Open),
-        ToolAction::CloseToolChanger => (ipc::TOOL_CHANGER, ipc::ToolAction::Close),
-    };
-    ToolOrder {
-        position,
-        ..ToolOrder::new(command, tool, action, nominal + TOOL_PATIENCE)
     }
 }

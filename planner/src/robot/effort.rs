@@ -45,12 +45,8 @@ impl Files<'_> {
         &self,
         model: &Model,
         limits: Option<&Limits>,
-        payload: Option<&Payload>,
+        payload: Option<Inertia>,
     ) -> Result<Option<EffortLimits>, RobotError> {
-        let payload = match payload {
-            Some(payload) => self.payload(payload)?,
-            None => Inertia::none(),
-        };
         let Some(limits) = limits.filter(|limits| *limits.effort.get_ref()) else {
             return Ok(None);
         };
@@ -72,27 +68,31 @@ impl Files<'_> {
         }
         Ok(Some(EffortLimits {
             limits: efforts,
-            payload,
+            payload: payload.unwrap_or_else(Inertia::none),
         }))
     }
 
-    fn payload(&self, payload: &Payload) -> Result<Inertia, RobotError> {
+    /// A body; `key` is where it stands in the file.
+    pub(super) fn payload(&self, key: &str, payload: &Payload) -> Result<Inertia, RobotError> {
         let mass = *payload.mass_kg.get_ref();
         if !(0.0..=1e5).contains(&mass) {
             let expected = "a mass from 0 to 100000 kg";
-            return Err(self.value(payload.mass_kg.span(), "payload.mass_kg", expected));
+            let key = format!("{key}.mass_kg");
+            return Err(self.value(payload.mass_kg.span(), &key, expected));
         }
         let centre = *payload.center_m.get_ref();
         if !centre.iter().all(|x| x.abs() <= 100.0) {
             let expected = "three numbers of at most 100";
-            return Err(self.value(payload.center_m.span(), "payload.center_m", expected));
+            let key = format!("{key}.center_m");
+            return Err(self.value(payload.center_m.span(), &key, expected));
         }
         let mut moments = [0.0; 3];
         if let Some(given) = &payload.inertia_kg_m2 {
             moments = *given.get_ref();
             if !moments.iter().all(|x| (0.0..=1e6).contains(x)) {
                 let expected = "three moments of at least zero, about the centre of mass";
-                return Err(self.value(given.span(), "payload.inertia_kg_m2", expected));
+                let key = format!("{key}.inertia_kg_m2");
+                return Err(self.value(given.span(), &key, expected));
             }
         }
         Ok(Inertia {

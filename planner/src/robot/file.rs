@@ -4,7 +4,7 @@ use super::effort::{Limits, Payload};
 use super::error::RobotError;
 use super::files::Files;
 use super::{EndEffector, Gripper, JointLimits, Margin, Robot, ToolChanger, ToolLimits};
-use kinematics::{Model, urdf};
+use kinematics::{Inertia, Model, urdf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use std::ops::Range;
@@ -100,6 +100,7 @@ struct Effector {
     opening_s: Option<Spanned<f64>>,
     closing_s: Option<Spanned<f64>>,
     width_m: Option<Spanned<f64>>,
+    payload: Option<Payload>,
     workstation_from_holder: Option<Pose>,
 }
 
@@ -134,7 +135,11 @@ impl Files<'_> {
                 most: MOST_JOINTS,
             });
         }
-        let efforts = self.efforts(&model, document.limits.as_ref(), document.payload.as_ref())?;
+        let payload = document.payload.as_ref();
+        let payload = payload
+            .map(|payload| self.payload("payload", payload))
+            .transpose()?;
+        let efforts = self.efforts(&model, document.limits.as_ref(), payload)?;
         let margin = self.margin(document.joints.get_ref().margin.as_ref())?;
         let joints = self
             .joint_limits(&model, &document.joints)?
@@ -154,6 +159,7 @@ impl Files<'_> {
                 .unwrap_or_else(Isometry3::identity),
             home,
             efforts,
+            payload,
             arrival: self.arrival(document.arrival.as_ref())?,
             mounted: self.mounted(document.mounted.as_ref(), &end_effectors)?,
             end_effectors,
@@ -390,6 +396,7 @@ impl Files<'_> {
                 flange_from_tcp: self
                     .pose("end_effector.flange_from_tcp", &effector.flange_from_tcp)?,
                 gripper,
+                inertia: self.carried(effector, effectors)?,
                 workstation_from_holder: self.optional_pose(
                     "end_effector.workstation_from_holder",
                     effector.workstation_from_holder.as_ref(),
@@ -397,6 +404,18 @@ impl Files<'_> {
             });
         }
         Ok(read)
+    }
+
+    /// The masses of an end effector: all have them, or none.
+    fn carried(&self, one: &Effector, all: &[Effector]) -> Result<Option<Inertia>, RobotError> {
+        if let Some(payload) = &one.payload {
+            return self.payload("end_effector.payload", payload).map(Some);
+        }
+        if all.iter().any(|other| other.payload.is_some()) {
+            let expected = "a payload here too: every end effector has one, or none has";
+            return Err(self.value(one.name.span(), "end_effector", expected));
+        }
+        Ok(None)
     }
 
     fn mounted(

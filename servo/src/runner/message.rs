@@ -73,6 +73,7 @@ impl<const N: usize> Runner<N> {
             path_time: self.cycle.path_time(),
             time_scaling: self.cycle.time_scaling(),
             tools: self.tools,
+            payload: self.payload,
             ..Setpoint::default()
         };
         let published = &self.published;

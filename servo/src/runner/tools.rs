@@ -1,6 +1,6 @@
 //! Orders to gripper and tool changer: one at a time, at rest.
 
-use ipc::ToolStatus;
+use ipc::{Payload, ToolStatus};
 use realtime::Demand;
 
 use super::{Runner, Working};
@@ -53,6 +53,10 @@ impl<const N: usize> Runner<N> {
         match status {
             ToolStatus::Open | ToolStatus::Closed | ToolStatus::Reached if answered => {
                 self.tool = None;
+                if let Some(payload) = working.order.payload {
+                    let number = self.payload.number.wrapping_add(1).max(1);
+                    self.payload = Payload { number, ..payload };
+                }
                 let command = working.order.command;
                 self.report(Event::Finished {
                     command,
