@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::authority::Keys;
 use crate::commands::{All, Completions, Man, Notes, One, Override, Router, Send, Top};
@@ -18,7 +18,7 @@ use crate::one_thread;
 /// other commands show and command the arms. A stop over a network is no safety function.
 #[derive(Debug, Parser)]
 #[command(name = "canter-fleet", version)]
-pub(crate) struct Options {
+struct Options {
     #[command(subcommand)]
     command: Command,
 }
@@ -66,8 +66,8 @@ pub fn main() -> ExitCode {
         Command::Pause(all) => all.ask("pause"),
         Command::Resume(one) => one.resume(),
         Command::Override(share) => share.run(),
-        Command::Man(man) => man.run(),
-        Command::Completions(completions) => completions.run(),
+        Command::Man(man) => man.run(Options::command()),
+        Command::Completions(completions) => completions.run(Options::command()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

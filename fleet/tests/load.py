@@ -279,8 +279,8 @@ def disturb(began, seconds, counter, count, around):
 
 def measure(processes, cable, keys, port, router, cells):
     """Everything while all cells run."""
-    engines, stand, members, arms, seconds = cells
-    count = len(members)
+    engines, stand, members, arms, everyone, seconds = cells
+    count = len(everyone)
     counter = Counter()
     with Peer(keys / "viewer.eva", port) as peer:
         wait("all cells", lambda: len(peer.sees("canter/*/*/alive")) == count, 300)
@@ -295,7 +295,7 @@ def measure(processes, cable, keys, port, router, cells):
         before = {name: sum(map(seconds_of, some)) for name, some in kinds.items()}
         small = sum(map(memory, members))
         began = time.monotonic()
-        plant, questions = Plant(keys, port, arms), Questions(keys, port, arms)
+        plant, questions = Plant(keys, port, arms), Questions(keys, port, everyone)
         for thread in (plant, questions):
             thread.start()
         disturbed, router = disturb(began, seconds, counter, count, (cable, processes, keys, port, router))
@@ -351,7 +351,8 @@ def main():
             member = lambda cell: processes.cell(keys, [f"{cell}/arm"], port, domain=folder / cell)
             members = list(pool.map(member, cells[:-1]))
             arms = [f"{cell}/arm" for cell in moving]
-            measure(processes, cable, keys, port, router, (engines, stand, members, arms, seconds))
+            everyone = [f"{cell}/arm" for cell in cells[:-1]]
+            measure(processes, cable, keys, port, router, (engines, stand, members, arms, everyone, seconds))
     finally:
         cable.remove()
 

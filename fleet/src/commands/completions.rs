@@ -1,10 +1,8 @@
 use std::io::{self, Write};
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
 use crate::failure::Failure;
-use crate::options::Options;
 
 /// Print the completion script of a shell
 ///
@@ -16,15 +14,10 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    /// Prints the script.
-    pub(crate) fn run(&self) -> Result<(), Failure> {
+    /// Prints the script of a command line.
+    pub(crate) fn run(&self, mut command: clap::Command) -> Result<(), Failure> {
         let mut script = Vec::new();
-        clap_complete::generate(
-            self.shell,
-            &mut Options::command(),
-            "canter-fleet",
-            &mut script,
-        );
+        clap_complete::generate(self.shell, &mut command, "canter-fleet", &mut script);
         io::stdout()
             .lock()
             .write_all(&script)

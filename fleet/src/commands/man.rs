@@ -1,11 +1,9 @@
 use std::io;
 use std::path::PathBuf;
 
-use clap::CommandFactory;
 use clap_mangen::Man as Page;
 
 use crate::failure::Failure;
-use crate::options::Options;
 
 /// Print the manual page, or write the pages of all commands to a folder
 ///
@@ -18,9 +16,8 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    /// Prints the main page or writes them all.
-    pub(crate) fn run(&self) -> Result<(), Failure> {
-        let command = Options::command();
+    /// Prints the main page of a command line or writes them all.
+    pub(crate) fn run(&self, command: clap::Command) -> Result<(), Failure> {
         let Some(folder) = &self.folder else {
             return Page::new(command)
                 .render(&mut io::stdout().lock())
