@@ -1,5 +1,6 @@
 //! Why a command ends without what was asked.
 
+use std::io;
 use std::process::ExitCode;
 
 /// Why a command ends; the codes are those of `canter`.
@@ -40,6 +41,16 @@ impl Failure {
             Self::Aborted(_) => 6,
             Self::DriverFault(_) => 7,
         })
+    }
+
+    /// What writing to standard output came to; a reader that has closed it (`| head -1`) is no failure.
+    pub(crate) fn of_output(written: io::Result<()>) -> Result<(), Self> {
+        match written {
+            Err(cause) if cause.kind() != io::ErrorKind::BrokenPipe => {
+                Err(Self::Unreadable(format!("standard output: {cause}")))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The link says no.

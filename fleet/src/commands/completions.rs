@@ -18,9 +18,6 @@ impl Completions {
     pub(crate) fn run(&self, mut command: clap::Command) -> Result<(), Failure> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, "canter-fleet", &mut script);
-        io::stdout()
-            .lock()
-            .write_all(&script)
-            .map_err(|cause| Failure::Unreadable(format!("standard output: {cause}")))
+        Failure::of_output(io::stdout().lock().write_all(&script))
     }
 }

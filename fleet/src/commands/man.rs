@@ -19,9 +19,7 @@ impl Man {
     /// Prints the main page of a command line or writes them all.
     pub(crate) fn run(&self, command: clap::Command) -> Result<(), Failure> {
         let Some(folder) = &self.folder else {
-            return Page::new(command)
-                .render(&mut io::stdout().lock())
-                .map_err(|cause| Failure::Unreadable(format!("standard output: {cause}")));
+            return Failure::of_output(Page::new(command).render(&mut io::stdout().lock()));
         };
         std::fs::create_dir_all(folder)
             .and_then(|()| clap_mangen::generate_to(command, folder))
