@@ -133,14 +133,11 @@ impl Cell {
         }
         let ran = engine.wait_with_output().unwrap();
         let said = String::from_utf8_lossy(&ran.stderr).into_owned();
-        let mut last = said
+        let mut named = said
             .lines()
             .filter(|line| line.contains("error") || line.contains("fault"));
-        let last = last
-            .next_back()
-            .or(said.lines().last())
-            .unwrap_or("")
-            .to_owned();
+        let last = named.next_back().or(said.lines().next_back());
+        let last = last.unwrap_or_default();
         // Without the name of the recording, which differs.
         let last = last
             .split("; the last minute")
