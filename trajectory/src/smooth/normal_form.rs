@@ -8,17 +8,17 @@ use super::motion::Motion;
 use super::options::SmoothOptions;
 use crate::line::body_turn;
 
-/// Coordinates are multiples of this, in units of the list, or of less if the tolerance is small. So
-/// the rounding of a frame or a unit is not seen: it could lead a search elsewhere.
-const GRID: f64 = 1.0 / 8_589_934_592.0;
-/// The same of the four numbers of an orientation, and of that of the goal, which is not moved by
-/// more than rounding.
-const TURNS: f64 = 1.0 / 68_719_476_736.0;
+/// Coordinates are multiples of this, in units of the list, and so are the four numbers of an
+/// orientation, or of less if the tolerance is small. So the rounding of a frame or a unit is not
+/// seen: it could lead a search elsewhere.
+const GRID: f64 = 1.0 / 1_073_741_824.0;
+/// The finest grid: that of an orientation without a tolerance, and of the goal's, which is not moved
+/// by more than rounding.
 const LAST: f64 = 1.0 / 17_592_186_044_416.0;
 /// The grid as a share of the tolerance, at most.
 const SHARE: f64 = 1e-4;
-/// A goal that is nearer to the start than so many grid spacings is not moved to the grid.
-const NEAR: f64 = 1e6;
+/// The grid of a goal as a share of its distance from the start, at most.
+const NEAR: f64 = 1e-9;
 /// Distance of both ends of a list that is rounding, in units of the list.
 const ROUNDED: f64 = 1e-14;
 /// Relative difference of two lengths below which they tell no direction.
@@ -65,10 +65,10 @@ impl NormalForm {
         }
         let frame = poses[0];
         let least = options.tolerance.min(options.corridor()) / unit;
-        let grid = grid(least);
+        let (grid, turns) = (grid(least), grid(options.angular_tolerance()));
         let last = poses.len() - 1;
         for (i, pose) in poses.iter_mut().enumerate() {
-            let turns = if i == last { LAST } else { TURNS };
+            let turns = if i == last { LAST } else { turns };
             let turned = frame.inv_mul(pose);
             let place = (turned.translation.vector / unit).map(|x| on_grid(x, grid));
             let turn = turned.rotation.into_inner().coords;
@@ -79,16 +79,18 @@ impl NormalForm {
         }
         let goal = if backwards { given[0] } else { given[last] };
         let goal = frame.inv_mul(&goal).translation.vector / unit;
-        let mut missing = goal - poses[last].translation.vector;
-        if goal.norm() < NEAR * grid {
-            // A list that closes has the same place at both ends, but for rounding.
-            let apart = goal.norm() > ROUNDED;
-            poses[last].translation.vector = if apart { goal } else { Vector3::zeros() };
-            missing = Vector3::zeros();
+        // A list that closes has the same place at both ends, but for rounding.
+        let mut missing = Vector3::zeros();
+        let mut end = Vector3::zeros();
+        if goal.norm() > ROUNDED {
+            let grid = finer(grid, NEAR * goal.norm());
+            end = goal.map(|x| on_grid(x, grid));
+            missing = goal - end;
         }
+        poses[last].translation.vector = end;
         Self {
             poses,
-            options: in_units(options, unit, 2.0 * grid),
+            options: in_units(options, unit, [2.0 * grid, 2.0 * turns]),
             frame,
             backwards,
             unit,
@@ -133,8 +135,13 @@ fn unit(options: &SmoothOptions) -> f64 {
 
 /// Spacing of the grid for a tolerance in units of the list: a power of two.
 fn grid(tolerance: f64) -> f64 {
-    let mut grid = GRID;
-    while grid > SHARE * tolerance {
+    finer(GRID, SHARE * tolerance)
+}
+
+/// The spacing, or the largest power of two below it that is at most `most`, if there is one.
+fn finer(grid: f64, most: f64) -> f64 {
+    let mut grid = grid;
+    while grid > most && grid > LAST {
         grid *= 0.5;
     }
     grid
@@ -149,8 +156,9 @@ fn rounded(x: f64) -> f64 {
     f64::from_bits((x.to_bits() + (1 << 11)) & !0xfff)
 }
 
-/// The options in another unit of length (m), the tolerances smaller by `margin` (units).
-fn in_units(options: &SmoothOptions, unit: f64, margin: f64) -> SmoothOptions {
+/// The options in another unit of length (m), the tolerances smaller by `margins` (units, rad).
+fn in_units(options: &SmoothOptions, unit: f64, margins: [f64; 2]) -> SmoothOptions {
+    let [margin, turn] = margins;
     let mut scaled = options.clone();
     let limits = &mut scaled.limits;
     for (limit, none) in [
@@ -162,7 +170,7 @@ fn in_units(options: &SmoothOptions, unit: f64, margin: f64) -> SmoothOptions {
             *limit = rounded(*limit / unit);
         }
     }
-    scaled.angular_tolerance = Some(options.angular_tolerance());
+    scaled.angular_tolerance = Some(rounded((options.angular_tolerance() - turn).max(0.0)));
     scaled.corridor = Some(rounded(options.corridor() / unit - margin));
     scaled.tolerance = rounded(options.tolerance / unit - margin);
     scaled

@@ -9,22 +9,48 @@ use crate::sparse;
 
 /// Duration of the motion through a list.
 fn time(poses: &[Isometry3<f64>], tolerance: f64) -> f64 {
-    let options = SmoothOptions::new(tolerance, lists::limits());
+    time_within(poses, tolerance, lists::limits())
+}
+
+/// The same under other limits.
+fn time_within(poses: &[Isometry3<f64>], tolerance: f64, limits: ToolLimits) -> f64 {
+    let options = SmoothOptions::new(tolerance, limits);
     plan(poses, &options).unwrap().duration()
 }
 
-/// Lists, each with a name and a tolerance.
-fn all() -> Vec<(String, Vec<Isometry3<f64>>, f64)> {
+/// A list with a name, a tolerance and limits.
+struct List {
+    name: String,
+    poses: Vec<Isometry3<f64>>,
+    tolerance: f64,
+    limits: ToolLimits,
+}
+
+/// Both suites, and random lists without and with limits of rotation.
+fn all() -> Vec<List> {
+    let list = |name: &str, poses, tolerance| List {
+        name: name.to_owned(),
+        poses,
+        tolerance,
+        limits: lists::limits(),
+    };
     let mut all: Vec<_> = suite()
         .into_iter()
-        .map(|case| (case.name.to_owned(), case.poses, case.tolerance))
+        .map(|case| list(case.name, case.poses, case.tolerance))
         .collect();
     for (name, poses, tolerance, _) in sparse::cases() {
-        all.push((name.to_owned(), poses, tolerance));
+        all.push(list(name, poses, tolerance));
     }
     for seed in 0..20 {
         let (poses, tolerance) = lists::random(seed, 600.0);
-        all.push((format!("random {seed}"), poses, tolerance));
+        all.push(List {
+            limits: if seed % 2 == 0 {
+                lists::limits()
+            } else {
+                lists::turning_limits()
+            },
+            ..list(&format!("random {seed}"), poses, tolerance)
+        });
     }
     all
 }
@@ -35,42 +61,50 @@ const BOUND: f64 = 1e-6;
 #[test]
 fn rigid_motion_changes_nothing() {
     let mut random = Random::new(5);
-    for (name, poses, tolerance) in all() {
+    for list in all() {
         let frame = Isometry3::new(random.vector(1.0), random.vector(3.0));
-        let moved: Vec<_> = poses.iter().map(|pose| frame * pose).collect();
-        let ratio = time(&moved, tolerance) / time(&poses, tolerance);
-        assert!((ratio - 1.0).abs() < BOUND, "{name} {ratio}");
+        let moved: Vec<_> = list.poses.iter().map(|pose| frame * pose).collect();
+        let time = |poses: &[_]| time_within(poses, list.tolerance, list.limits);
+        let ratio = time(&moved) / time(&list.poses);
+        assert!((ratio - 1.0).abs() < BOUND, "{} {ratio}", list.name);
     }
 }
 
 #[test]
 fn reversal_changes_nothing() {
-    for (name, poses, tolerance) in all() {
-        let back: Vec<_> = poses.iter().rev().copied().collect();
-        let ratio = time(&back, tolerance) / time(&poses, tolerance);
-        assert!((ratio - 1.0).abs() < BOUND, "{name} {ratio}");
+    for list in all() {
+        let back: Vec<_> = list.poses.iter().rev().copied().collect();
+        let time = |poses: &[_]| time_within(poses, list.tolerance, list.limits);
+        let ratio = time(&back) / time(&list.poses);
+        assert!((ratio - 1.0).abs() < BOUND, "{} {ratio}", list.name);
     }
 }
 
 #[test]
 fn other_units_change_nothing() {
-    for (name, poses, tolerance) in all() {
+    for List {
+        name,
+        poses,
+        tolerance,
+        limits: own,
+    } in all()
+    {
         let scale = 25.4;
         let place = |pose: &Isometry3<f64>| pose.translation.vector * scale;
         let large: Vec<_> = poses
             .iter()
             .map(|pose| Isometry3::from_parts(place(pose).into(), pose.rotation))
             .collect();
-        let limits = lists::limits();
         let limits = ToolLimits {
-            speed: limits.speed * scale,
-            acceleration: limits.acceleration * scale,
-            jerk: limits.jerk * scale,
-            ..limits
+            speed: own.speed * scale,
+            acceleration: own.acceleration * scale,
+            jerk: own.jerk * scale,
+            ..own
         };
         let mut options = SmoothOptions::new(tolerance * scale, limits);
         options.angular_tolerance = Some(trajectory::smooth::angular_tolerance(tolerance));
-        let ratio = plan(&large, &options).unwrap().duration() / time(&poses, tolerance);
+        let ratio =
+            plan(&large, &options).unwrap().duration() / time_within(&poses, tolerance, own);
         assert!((ratio - 1.0).abs() < BOUND, "{name} {ratio}");
     }
 }

@@ -15,6 +15,16 @@ pub(crate) fn limits() -> ToolLimits {
     }
 }
 
+/// The same, and limits of rotation.
+pub(crate) fn turning_limits() -> ToolLimits {
+    ToolLimits {
+        angular_speed: 3.0,
+        angular_acceleration: 30.0,
+        angular_jerk: 600.0,
+        ..limits()
+    }
+}
+
 /// One list: tolerance in m, least time along the exact curve in s, found by an interior-point
 /// solver.
 pub(crate) struct Case {

@@ -1,19 +1,9 @@
 //! Random dense lists: closed and open curves, noise, uneven spacing, cusps, doubled poses, mixed
 //! density, changing orientation.
 
-use trajectory::ToolLimits;
 use trajectory::smooth::{RestCause, SmoothOptions, plan};
 
 use crate::lists;
-
-fn limits() -> ToolLimits {
-    ToolLimits {
-        angular_speed: 3.0,
-        angular_acceleration: 30.0,
-        angular_jerk: 600.0,
-        ..lists::limits()
-    }
-}
 
 /// Plans so many lists: each is certified and never slower than exact stops; the seeds of those that
 /// rest elsewhere than where the way turns back. The rests of these are named.
@@ -21,7 +11,11 @@ fn judged(seeds: std::ops::Range<u64>, most: f64) -> Vec<u64> {
     let mut fallbacks = Vec::new();
     for seed in seeds {
         let (poses, tolerance) = lists::random(seed, most);
-        let plan = plan(&poses, &SmoothOptions::new(tolerance, limits())).unwrap();
+        let plan = plan(
+            &poses,
+            &SmoothOptions::new(tolerance, lists::turning_limits()),
+        )
+        .unwrap();
         assert!(plan.certificate().holds(), "{seed}");
         assert!(
             plan.duration() <= plan.exact_stop() * (1.0 + 1e-12),
@@ -48,9 +42,13 @@ fn random_lists_are_certified() {
 /// shows every corner is planned as a spline, too; and one that turns back need not rest there.
 #[test]
 fn the_way_of_planning_suits_the_list() {
-    for (seed, most) in [(92, 1.95), (195, 1.6), (52, 1.05)] {
+    for (seed, most) in [(95, 2.9), (195, 1.6), (52, 1.05)] {
         let (poses, tolerance) = lists::random(seed, 400.0);
-        let plan = plan(&poses, &SmoothOptions::new(tolerance, limits())).unwrap();
+        let plan = plan(
+            &poses,
+            &SmoothOptions::new(tolerance, lists::turning_limits()),
+        )
+        .unwrap();
         assert!(plan.certificate().holds(), "{seed}");
         let causes: Vec<_> = plan.rests().iter().map(|rest| rest.cause).collect();
         assert!(
