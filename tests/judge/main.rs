@@ -21,7 +21,7 @@ use system_tests::arm::Arm;
 use tally::Tally;
 
 /// Number of programs per robot unless the environment sets another.
-const PROGRAMS: u64 = 3;
+const PROGRAMS: u64 = 2;
 
 fn number(variable: &str, otherwise: u64) -> u64 {
     let value = std::env::var(variable).ok();
