@@ -14,6 +14,11 @@ pub enum Control {
         /// As fast as the joints can.
         fast: bool,
     },
-    /// Stop on the path, then drop everything that was pushed.
+    /// Stop on the path, then drop everything that was pushed. A pause or stop that is in force is
+    /// over: what is pushed afterwards moves.
     Abort,
+    /// Stop on the path, then drop everything that was pushed; a pause or stop that is in force
+    /// stays. So ends a motion that ends by itself, for example a jog whose time is over: nobody
+    /// has asked then that the arm may move again.
+    Discard,
 }

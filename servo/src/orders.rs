@@ -209,11 +209,8 @@ impl Orders {
                 }
                 self.give(|word| word)
             }
-            Control::Abort => self.give(|word| {
-                let fast = if word & DEMAND == FAST { ABORT_FAST } else { 0 };
-                let aborts = word.wrapping_add(ABORT) & ABORTS;
-                (word & !(DEMAND | ABORTS | ABORT_FAST)) | fast | aborts
-            }),
+            Control::Abort => self.give(|word| aborted(word) & !DEMAND),
+            Control::Discard => self.give(aborted),
         }
     }
 
@@ -238,6 +235,12 @@ impl Orders {
             std::thread::yield_now();
         }
     }
+}
+
+/// The word with one more abort, which keeps the category of a stop in force.
+fn aborted(word: u64) -> u64 {
+    let fast = if word & DEMAND == FAST { ABORT_FAST } else { 0 };
+    (word & !(ABORTS | ABORT_FAST)) | fast | (word.wrapping_add(ABORT) & ABORTS)
 }
 
 /// A handle to control the motion, for an arm with any number of joints. Cheap to clone, usable
@@ -333,6 +336,10 @@ mod tests {
         hand.control(Control::Pause);
         let asked = hand.orders.asked();
         assert_eq!((asked.aborts(), asked.holds()), (1, true));
+        // What ends by itself does not end the stop.
+        hand.control(Control::Discard);
+        let asked = hand.orders.asked();
+        assert_eq!((asked.aborts(), asked.holds()), (2, true));
         hand.control(Control::Override(f64::NAN));
         hand.control(Control::Resume);
         assert_eq!(hand.orders.asked().demand(), Demand::Run(0.3));
