@@ -24,6 +24,7 @@ mod drivers;
 mod faults;
 mod follow;
 mod guards;
+mod jogs;
 mod killed_plans;
 mod kitting_end_to_end;
 mod operators;
