@@ -243,43 +243,51 @@ const REFUSED: [&str; 6] = [
 
 /// The recorded conversations: each command gets the kind of answer that NIST's simulator gave.
 pub(crate) fn recorded_conversations_get_the_same_kind_of_answer() {
-    for conversation in [
-        "auto_client2021_sim2017.conn1",
-        "joints_client2021_sim2017.conn1",
-        "programAll_client2017_sim2017.conn1",
-        "error_client2021_sim2021.conn1",
-    ] {
-        let read = |end: &str| {
-            let path = folder("wire").join(format!("{conversation}.{end}.bin"));
-            String::from_utf8(fs::read(path).unwrap()).unwrap()
-        };
-        let (said, sent) = (verdicts(&read("s2c")), commands(&read("c2s")));
-        let scene = Scene::new(&conversation.replace('.', "_"), &[]);
-        let mut client = scene.connect();
-        client.status();
-        let (mut same, mut refused) = (0, Vec::new());
-        for (kind, id, text) in sent {
-            client.send(&text);
-            let answer = client.wait(id);
-            let expected = said.get(&id).map(String::as_str);
-            if Some(answer.state()) == expected {
-                same += 1;
-                continue;
-            }
-            assert_eq!(answer.state(), "CRCL_Error", "{kind} {id}: {}", answer.0);
-            assert!(!answer.why().is_empty(), "{kind} {id}");
-            assert!(
-                REFUSED.contains(&kind.as_str()),
-                "{kind} {id}: {}",
-                answer.0
-            );
-            refused.push(format!("{kind}: {}", answer.why()));
-            // The recorded client went on; here an error stays until InitCanon.
-            client.done("InitCanon", id + 100_000, "");
+    // Each has an arm of its own, and waits for it most of the time.
+    std::thread::scope(|scope| {
+        for conversation in [
+            "auto_client2021_sim2017.conn1",
+            "joints_client2021_sim2017.conn1",
+            "programAll_client2017_sim2017.conn1",
+            "error_client2021_sim2021.conn1",
+        ] {
+            scope.spawn(move || hold_again(conversation));
         }
-        eprintln!("{conversation}: {same} the same; refused: {refused:#?}");
-        assert!(same >= 3, "{conversation}: {same}");
+    });
+}
+
+/// Sends what a recorded client sent, and compares the answers.
+fn hold_again(conversation: &str) {
+    let read = |end: &str| {
+        let path = folder("wire").join(format!("{conversation}.{end}.bin"));
+        String::from_utf8(fs::read(path).unwrap()).unwrap()
+    };
+    let (said, sent) = (verdicts(&read("s2c")), commands(&read("c2s")));
+    let scene = Scene::new(&conversation.replace('.', "_"), &[]);
+    let mut client = scene.connect();
+    client.status();
+    let (mut same, mut refused) = (0, Vec::new());
+    for (kind, id, text) in sent {
+        client.send(&text);
+        let answer = client.wait(id);
+        let expected = said.get(&id).map(String::as_str);
+        if Some(answer.state()) == expected {
+            same += 1;
+            continue;
+        }
+        assert_eq!(answer.state(), "CRCL_Error", "{kind} {id}: {}", answer.0);
+        assert!(!answer.why().is_empty(), "{kind} {id}");
+        assert!(
+            REFUSED.contains(&kind.as_str()),
+            "{kind} {id}: {}",
+            answer.0
+        );
+        refused.push(format!("{kind}: {}", answer.why()));
+        // The recorded client went on; here an error stays until InitCanon.
+        client.done("InitCanon", id + 100_000, "");
     }
+    eprintln!("{conversation}: {same} the same; refused: {refused:#?}");
+    assert!(same >= 3, "{conversation}: {same}");
 }
 
 /// The bytes of every recorded client, CRPI's among them, in the pieces they came in: as many

@@ -53,7 +53,9 @@ fn a_stop_outlives_the_jog() {
         assert!(session.status().held, "{case}");
         assert_eq!(session.jog(request), Err(JogError::Held), "{case}");
         session.control(Control::Resume);
-        wait(&session, "the arm is free", |session| !session.status().held);
+        wait(&session, "the arm is free", |session| {
+            !session.status().held
+        });
         assert!(session.status().idle, "{case}: the jog is over");
     }
     session.close();
