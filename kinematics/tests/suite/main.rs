@@ -7,5 +7,6 @@ mod follow;
 mod fuzz;
 mod hard;
 mod ik;
+mod no_alloc;
 mod strangers;
 mod urdf;

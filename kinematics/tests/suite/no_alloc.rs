@@ -1,5 +1,4 @@
-//! Kinematics does not use the heap; the allocator of this test counts the calls.
-#![allow(clippy::unwrap_used, reason = "a test may fail this way")]
+//! Kinematics does not use the heap; the allocator of these tests counts the calls of each thread.
 #![allow(unsafe_code, reason = "a counting allocator has to be one")]
 
 use kinematics::{Solver, urdf};
