@@ -63,7 +63,7 @@ fn main() {
         programs::sound_programs_have_no_findings
         programs::commands_with_errors
         repro::programs_that_broke_a_law_hold_now
-        repro::a_turn_at_the_end_is_planned_on_every_robot
+        repro::a_turn_at_the_end_is_planned
         repro::a_move_to_where_the_arm_stands_takes_no_time
         repro::tolerance_zero_is_not_slower_than_straight_moves
         repro::more_tolerance_is_not_slower

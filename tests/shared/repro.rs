@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crcl::{LengthUnit, Program, ReadOptions};
 use planner::dry_run::{Plan, PlanOptions, plan_program};
 use planner::recorded::{RecordedSample, verify_program};
-use planner::robot::{Robot, list, load};
+use planner::robot::{Robot, load};
 
 const FOLDER: &str = "data/repro";
 
@@ -78,15 +78,17 @@ pub(crate) fn programs_that_broke_a_law_hold_now() {
     }
 }
 
-/// Three legs and then a turn on the spot at the last point: planned or refused, never a panic.
-pub(crate) fn a_turn_at_the_end_is_planned_on_every_robot() {
+/// Three legs and then a turn on the spot at the last point: planned or refused, never a panic, on
+/// arms of each kind.
+pub(crate) fn a_turn_at_the_end_is_planned() {
     for name in ["panic_min", "panic_turn_at_end"] {
         let program = program(name);
-        let plans = list().into_iter().map(|robot| {
+        let plans = ["ur5e", "panda", "irb120", "gantry"].map(|robot| {
             let plan = planned(&load(robot).unwrap(), &program);
             usize::from(plan.refusals.is_empty())
         });
-        assert!(plans.sum::<usize>() > 0, "{name} is refused on every robot");
+        let count: usize = plans.into_iter().sum();
+        assert!(count > 0, "{name} is refused on every robot");
     }
 }
 
