@@ -352,6 +352,7 @@ pub(crate) fn the_driver_conforms() {
     let arm = arm();
     let _driver = Driver::start(&arm, controller.port);
     let ran = canter(["driver", "test", "--arm", &arm]);
+    println!("{}", ran.stdout);
     assert_eq!(ran.code, 0, "{}\n{}", ran.stdout, controller.log());
 }
 

@@ -207,9 +207,10 @@ impl ArmThread {
         loop {
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
+            let doubtful = core::mem::take(&mut sent.doubtful);
             if sent.taken.count() < FIRST {
                 self.resampler.begin(&state.q_d);
-            } else if sent.has_gone_on(&state, advance) {
+            } else if !doubtful && sent.has_gone_on(&state, advance) {
                 self.rejoin(&mut sent, &state);
             }
             while let Ok(row) = self.rows.pop() {
@@ -236,7 +237,7 @@ impl ArmThread {
                 control.write_once(&motion_finished(positions), None)?;
                 return Ok(!ends);
             }
-            if self.arrivals.as_ref().map_or(0.0, Arrivals::age) > LATE {
+            if doubtful || self.is_late() {
                 // The controller has dropped this cycle and gone on by itself; an answer that comes later
                 // would be taken for one to a cycle of its own.
                 sent.skipped = true;
@@ -244,7 +245,15 @@ impl ArmThread {
             }
             control.write_once(&positions, None)?;
             sent.taken.push(q);
+            // One that was held up while it was sent comes late. Whether the controller takes it shows in the
+            // state after the next one; what is answered to the next one could be a step for it.
+            sent.doubtful = self.is_late();
         }
+    }
+
+    /// Whether the last state came too long ago for an answer.
+    fn is_late(&self) -> bool {
+        self.arrivals.as_ref().map_or(0.0, Arrivals::age) > LATE
     }
 
     /// After lost commands the controller has gone on by itself: the next command starts there.
@@ -273,6 +282,8 @@ struct Sent {
     strange: u32,
     /// The last state was not answered.
     skipped: bool,
+    /// The answer to the last state may come too late.
+    doubtful: bool,
 }
 
 impl Sent {
