@@ -3,14 +3,14 @@
 use std::any::Any;
 
 use crcl::LengthUnit;
-use kinematics::Chain;
+use kinematics::{Chain, Inertia};
 use nalgebra::{Isometry3, SVector};
 use realtime::Sample;
 use trajectory::{JointLimits, ToolLimits};
 
 use crate::command_error::{CommandError, ErrorClass};
 use crate::modal::Modal;
-use crate::motion::{MotionError, MoveWindow, PlannedMove, Planner, WindowedMove};
+use crate::motion::{Efforts, MotionError, MoveWindow, PlannedMove, Planner, WindowedMove};
 use crate::robot::{Robot, RobotError, vector};
 use crate::task::{Move, Shape, Task};
 use crate::timed::TimedTrajectory;
@@ -78,6 +78,10 @@ pub struct Controller<const N: usize> {
     joint_names: Vec<String>,
     modal: Modal,
     planner: Planner<N>,
+    /// Limits of efforts of the arm with nothing at its flange.
+    bare_efforts: Option<Efforts<N>>,
+    /// What the planner counts with at the flange.
+    carried: Option<Inertia>,
     joints: SVector<f64, N>,
     rate_hz: f64,
     plans: u64,
@@ -92,6 +96,7 @@ impl<const N: usize> Controller<N> {
         let workstation_from_flange = robot.chain::<N>()?;
         let limits = robot.joint_limits::<N>();
         let tooling = robot.tooling();
+        let carried = tooling.carried();
         let planner = Planner::new(
             &workstation_from_flange,
             tooling.flange_from_tool(),
@@ -114,6 +119,8 @@ impl<const N: usize> Controller<N> {
             joint_names,
             modal,
             planner,
+            bare_efforts: robot.bare_efforts(),
+            carried,
             joints,
             rate_hz,
             plans: 0,
@@ -391,16 +398,20 @@ impl<const N: usize> Controller<N> {
     }
 
     fn change_tool(&mut self) {
-        let flange_from_tool = self.modal.tooling().flange_from_tool();
-        if flange_from_tool != *self.planner.flange_from_tool() {
-            self.planner = Planner::new(
-                &self.workstation_from_flange,
-                flange_from_tool,
-                self.limits,
-                self.joint_names.clone(),
-            )
-            .with_efforts(self.planner.efforts().cloned());
+        let tooling = self.modal.tooling();
+        let (flange_from_tool, carried) = (tooling.flange_from_tool(), tooling.carried());
+        if flange_from_tool == *self.planner.flange_from_tool() && carried == self.carried {
+            return;
         }
+        let bare = self.bare_efforts.clone();
+        self.planner = Planner::new(
+            &self.workstation_from_flange,
+            flange_from_tool,
+            self.limits,
+            self.joint_names.clone(),
+        )
+        .with_efforts(bare.map(|bare| bare.carrying(carried.as_ref())));
+        self.carried = carried;
     }
 }
 

@@ -309,16 +309,21 @@ impl Robot {
         }
     }
 
-    /// The limits of efforts with the masses of the arm and its payload; `None` if the robot does not
-    /// ask for them or does not have `N` joints.
+    /// The limits of efforts with the masses of the arm and of what it carries at the start; `None` if the
+    /// robot does not ask for them or does not have `N` joints.
     #[must_use]
     pub fn efforts<const N: usize>(&self) -> Option<Efforts<N>> {
+        let bare = self.bare_efforts()?;
+        Some(bare.carrying(self.tooling().carried().as_ref()))
+    }
+
+    /// The same with nothing at the flange.
+    #[must_use]
+    pub fn bare_efforts<const N: usize>(&self) -> Option<Efforts<N>> {
         let wanted = self.efforts.as_ref()?;
         let dynamics = self.model.dynamics::<N>()?;
         Some(Efforts {
-            dynamics: dynamics
-                .with_base(&self.workstation_from_base)
-                .with_payload(&wanted.payload),
+            dynamics: dynamics.with_base(&self.workstation_from_base),
             limits: vector(&wanted.limits),
         })
     }

@@ -1,7 +1,9 @@
 //! Limits of the efforts of the joints.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use nalgebra::{Isometry3, SVector};
+use kinematics::Inertia;
+use nalgebra::{Isometry3, SVector, vector};
+use planner::controller::Controller;
 use planner::motion::{PlannedMove, Planner};
 use planner::robot::{self, Robot};
 use planner::task::{Move, Shape};
@@ -133,4 +135,56 @@ fn what_is_missing_is_named() {
         refusal.contains("payload.mass_kg") && refusal.contains("-1.0"),
         "{refusal}"
     );
+}
+
+/// The efforts count the end effector that is mounted, and another one after a tool change: they are those of
+/// the bare arm with the weights as bodies at its flange.
+#[test]
+fn the_mounted_end_effector_counts() {
+    let shipped = robot::load("ur5e").unwrap();
+    let (mut toml, mut mass) = (String::new(), 0.0);
+    for line in shipped.toml.lines() {
+        toml.push_str(&format!("{line}\n"));
+        if line.starts_with("flange_from_tcp") {
+            mass += 1.0;
+            toml.push_str(&format!(
+                "payload = {{ mass_kg = {mass:?}, center_m = [0.0, 0.01, 0.1] }}\n"
+            ));
+        }
+    }
+    toml.push_str(
+        "[limits]\neffort = true\n[payload]\nmass_kg = 0.5\ncenter_m = [0.0, 0.0, 0.1]\n",
+    );
+    let robot = robot::parse("ur5e", &shipped.urdf, &toml).unwrap();
+    let body = |mass: f64, side: f64| Inertia {
+        mass,
+        centre: vector![0.0, side, 0.1],
+        ..Inertia::none()
+    };
+    let q = SVector::from([0.3, -0.9, 1.1, -0.7, 1.5, 0.4]);
+    let expected = |tool: f64| {
+        let carried = body(0.5, 0.0).with(&body(tool, 0.01));
+        let arm = robot.bare_efforts::<6>().unwrap();
+        arm.dynamics
+            .with_payload(&carried)
+            .effort(&q, &(q * 0.5), &(q * 2.0))
+    };
+    let text = std::fs::read_to_string("../examples/tool_change.canon").unwrap();
+    let program = crcl::text::read(&text, &crcl::ReadOptions::default()).program;
+    let mut controller = Controller::<6>::new(&robot, 1000.0, crcl::LengthUnit::default()).unwrap();
+    let mut found = Vec::new();
+    for command in program.iter() {
+        let efforts = controller.planner().efforts().unwrap();
+        let effort = efforts.dynamics.effort(&q, &(q * 0.5), &(q * 2.0));
+        let tool = [0.0, 1.0, 2.0, 3.0]
+            .into_iter()
+            .find(|tool| (expected(*tool) - effort).amax() < 1e-9)
+            .unwrap();
+        if found.last() != Some(&tool) {
+            found.push(tool);
+        }
+        controller.step(command).unwrap();
+    }
+    // The gripper, nothing, the vacuum tool, nothing.
+    assert_eq!(found, [1.0, 0.0, 3.0, 0.0]);
 }

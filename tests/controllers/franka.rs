@@ -331,12 +331,28 @@ pub(crate) fn the_controller_is_told_the_payload() {
     assert_eq!(controller.record().loads, [MASSES[0]]);
 }
 
+/// The simulated arm itself follows a small motion from the pose of its start: its joints 1 and 3 have one axis
+/// there, and its servo swung by itself between them, with all of its torque.
+pub(crate) fn the_simulated_servo_is_stable() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = system_tests::repository::root().join("drivers/franka/tests/servo.py");
+    let ran = Command::new(python())
+        .arg(script)
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&ran.stdout).into_owned();
+    let behind: f64 = said.trim().parse().unwrap_or(f64::NAN);
+    assert!(behind < 5e-4, "{behind} rad behind: {ran:?}");
+}
+
 /// `canter driver test` on it: nothing fails; what only a simulation can do is skipped.
 pub(crate) fn the_driver_conforms() {
     let controller = Controller::start();
     let arm = arm();
     let _driver = Driver::start(&arm, controller.port);
     let ran = canter(["driver", "test", "--arm", &arm]);
+    println!("{}", ran.stdout);
     assert_eq!(ran.code, 0, "{}\n{}", ran.stdout, controller.log());
 }
 

@@ -225,5 +225,6 @@ pub(crate) fn the_driver_conforms() {
     let _driver = Driver::start(&arm, port, robot);
     let _controller = Controller::start(port, &home());
     let ran = canter(["driver", "test", "--arm", &arm]);
+    println!("{}", ran.stdout);
     assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
 }

@@ -15,6 +15,7 @@ mod canter;
 mod cia402;
 mod drives;
 mod franka;
+mod franka_floor;
 mod franka_trials;
 mod kuka;
 mod payloads;
@@ -29,7 +30,11 @@ use libtest_mimic::{Arguments, Trial};
 type Test = (&'static str, fn());
 
 /// The driver of Franka arms.
-const FRANKA: [Test; 5] = [
+const FRANKA: [Test; 6] = [
+    (
+        "franka::the_simulated_servo_is_stable",
+        franka::the_simulated_servo_is_stable,
+    ),
     (
         "franka::a_smooth_path_of_a_hundred_poses",
         franka::a_smooth_path_of_a_hundred_poses,
@@ -44,7 +49,13 @@ const FRANKA: [Test; 5] = [
 ];
 
 /// The same with stalls and kills at random moments, as often as the environment asks for.
-const TRIALS: [Test; 1] = [("franka::stalls_and_kills", franka_trials::stalls_and_kills)];
+const TRIALS: [Test; 2] = [
+    ("franka::stalls_and_kills", franka_trials::stalls_and_kills),
+    (
+        "franka::cycles_that_any_client_misses",
+        franka_floor::cycles_that_any_client_misses,
+    ),
+];
 
 /// The driver of arms of Universal Robots, and the stand-in for their controller.
 const UNIVERSAL: [Test; 9] = [

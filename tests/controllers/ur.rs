@@ -318,6 +318,7 @@ pub(crate) fn the_controller_is_told_the_payload() {
 pub(crate) fn the_driver_conforms() {
     let cell = Cell::start("conforms", Setting::e_series(home()));
     let ran = canter(["driver", "test", "--arm", &cell.arm]);
+    println!("{}", ran.stdout);
     assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
 }
 

@@ -14,6 +14,9 @@ const KEPT: usize = 256;
 /// A joint moves that is faster (rad/s).
 const MOVES: f64 = 0.05;
 
+/// A success rate counts that is of so many cycles: those that a controller counts over.
+const CYCLES: u32 = 100;
+
 /// What was seen while the arm moved.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
@@ -62,6 +65,7 @@ fn watch(arm: &str, ends: &AtomicBool) -> Seen {
     let observer = ipc::Observer::open(&system_tests::domain::arm(arm)).unwrap();
     let (mut setpoints, mut states) = (VecDeque::new(), VecDeque::new());
     let (mut least, mut rates, mut rated) = (1.0_f64, 0.0, 0.0);
+    let mut rated_cycles = 0;
     let (mut behind, mut squares, mut count) = ([0.0; 2], 0.0, 0.0);
     while !ends.load(Ordering::Relaxed) {
         while let Some(setpoint) = observer.next_setpoint() {
@@ -80,11 +84,13 @@ fn watch(arm: &str, ends: &AtomicBool) -> Seen {
                 break;
             }
             states.pop_front();
+            // Zero is said where no motion of the controller's runs.
+            let rate = success_rate(&state).filter(|rate| *rate > 0.0);
+            rated_cycles = rate.map_or(0, |_| rated_cycles + 1);
             if !state.velocity.iter().any(|speed| speed.abs() > MOVES) {
                 continue;
             }
-            // Zero is said where no motion of the controller's runs.
-            if let Some(rate) = success_rate(&state).filter(|rate| *rate > 0.0) {
+            if let Some(rate) = rate.filter(|_| rated_cycles > CYCLES) {
                 least = least.min(rate);
                 rates += rate;
                 rated += 1.0;

@@ -172,8 +172,15 @@ fn measured_way(samples: &std::path::Path, program: &str, off_path: f64) {
                     .map(|(at, mm)| (at - mm * 1e-3).powi(2));
                 squares.sum::<f64>().sqrt()
             };
-            let found = rows.by_ref().any(|row| distance(&row.1) <= tolerance);
-            assert!(found, "command {index} does not pass pose {number}");
+            let mut least = f64::INFINITY;
+            let found = rows.by_ref().any(|row| {
+                least = least.min(distance(&row.1));
+                least <= tolerance
+            });
+            assert!(
+                found,
+                "command {index} passes pose {number} in {least} m, not in {tolerance} m"
+            );
             passed += 1;
         }
     }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use driver_cia402::EtherSocket;
+use driver_franka::host;
 use engine::doctor::{Check, Health};
 use scheduling::{RealTimeRequest, request_real_time};
 
@@ -67,14 +68,6 @@ fn check(name: &'static str, health: Health, seen: String, remedy: &str) -> Chec
         health,
         seen,
         remedy,
-    }
-}
-
-/// The host without a port.
-fn host(address: &str) -> &str {
-    match address.rsplit_once(':') {
-        Some((host, port)) if port.parse::<u16>().is_ok() => host,
-        _ => address,
     }
 }
 

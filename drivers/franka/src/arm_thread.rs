@@ -14,19 +14,14 @@ use ipc::{Payload, bytes_of};
 use rtrb::{Consumer, Producer};
 use scheduling::{RealTimeRequest, now_ns, request_real_time};
 
+use crate::arrivals::{Arrivals, Sockets};
 use crate::snapshot::{Phase, Snapshot, Wish};
+use crate::taken::Taken;
 use crate::{FrankaOptions, JOINTS};
 
 /// Time between two tries to connect, and the length of a look at whether the driver ends.
 const AGAIN: Duration = Duration::from_millis(500);
 const LOOK: Duration = Duration::from_millis(10);
-
-/// The controller commands something else than it was told from this difference on (rad): it lost
-/// commands and went on by itself. Its states are single precision.
-const ELSEWHERE: f64 = 3e-6;
-
-/// How many commands may be on their way: an older state of the controller is no other command.
-const ON_THE_WAY: usize = 12;
 
 /// The controller goes on by itself when the driver slept for longer than this (s), or when so many
 /// states in a row show a command that was not sent.
@@ -36,10 +31,8 @@ const STRANGE: u32 = 6;
 /// Period of the controller (s).
 const PERIOD: f64 = 1e-3;
 
-/// An answer is late that leaves when its state is older than this (s). A state was waited for if its read
-/// took longer than this (s).
+/// An answer is late that leaves when its state came longer ago than this (s).
 const LATE: f64 = 0.7e-3;
-const WAITED: f64 = 0.05e-3;
 
 /// For so many states at its beginning a motion holds what the controller commands.
 const FIRST: usize = 5;
@@ -57,6 +50,7 @@ pub(crate) struct ArmThread {
     pub(crate) snapshot: Snapshot,
     pub(crate) payload: Option<(Payload, u32)>,
     pub(crate) stop: Arc<AtomicBool>,
+    pub(crate) arrivals: Option<Arrivals>,
 }
 
 /// A motion that runs.
@@ -74,10 +68,16 @@ impl ArmThread {
         });
         while !self.ends() {
             let options = RobotOptions::new(RealtimeConfig::Ignore).with_log_size(0);
+            let before = Sockets::now();
             let lost = match Robot::with_options(&self.options.address, options) {
-                Ok(robot) => self.serve(&robot),
+                Ok(robot) => {
+                    // Of this robot's socket; without it no answer counts as late.
+                    self.arrivals = before.arrivals_of_new();
+                    self.serve(&robot)
+                }
                 Err(error) => error.to_string(),
             };
+            self.arrivals = None;
             self.lose(&lost);
             let mut waited = Duration::ZERO;
             while waited < AGAIN && !self.ends() {
@@ -205,14 +205,13 @@ impl ArmThread {
         let mut sent = Sent::default();
         let (mut ending, mut ends) = (0_u32, false);
         loop {
-            let asked_ns = now_ns();
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
-            sent.read(asked_ns, advance);
-            if sent.count < FIRST {
+            let doubtful = core::mem::take(&mut sent.doubtful);
+            if sent.taken.count() < FIRST {
                 self.resampler.begin(&state.q_d);
-            } else if sent.has_gone_on(&state, advance) {
-                self.rejoin(&state);
+            } else if !doubtful && sent.has_gone_on(&state, advance) {
+                self.rejoin(&mut sent, &state);
             }
             while let Ok(row) = self.rows.pop() {
                 self.resampler.push(row.at_ns, &row.joints);
@@ -238,19 +237,32 @@ impl ArmThread {
                 control.write_once(&motion_finished(positions), None)?;
                 return Ok(!ends);
             }
-            if sent.is_late() {
+            if doubtful || self.is_late() {
                 // The controller has dropped this cycle and gone on by itself; an answer that comes later
                 // would be taken for one to a cycle of its own.
                 sent.skipped = true;
                 continue;
             }
             control.write_once(&positions, None)?;
-            sent.push(q);
+            sent.taken.push(q);
+            // One that was held up while it was sent comes late. Whether the controller takes it shows in the
+            // state after the next one; what is answered to the next one could be a step for it.
+            sent.doubtful = self.is_late();
         }
     }
 
+    /// Whether the last state came too long ago for an answer.
+    fn is_late(&self) -> bool {
+        self.arrivals.as_ref().map_or(0.0, Arrivals::age) > LATE
+    }
+
     /// After lost commands the controller has gone on by itself: the next command starts there.
-    fn rejoin(&mut self, state: &RobotState) {
+    fn rejoin(&mut self, sent: &mut Sent, state: &RobotState) {
+        if let Some(there) = sent.taken.went_on(&state.q_d, PERIOD) {
+            self.resampler.rejoin(&there);
+            return;
+        }
+        // It did something else: as exact as its states are.
         let commanded: [Reference; JOINTS] = core::array::from_fn(|joint| Reference {
             position: state.q_d[joint],
             // The controller's velocity is the difference of its last two positions: that of half a
@@ -262,62 +274,23 @@ impl ArmThread {
     }
 }
 
-/// The last commands that were sent.
+/// The commands of a motion.
 #[derive(Default)]
 struct Sent {
-    commands: [[f64; JOINTS]; ON_THE_WAY],
-    count: usize,
+    taken: Taken,
+    /// States in a row that show a command that was not sent.
     strange: u32,
-    /// When the last state was read (ns of `CLOCK_MONOTONIC`), and how old it was then (s).
-    read_ns: u64,
-    age: f64,
     /// The last state was not answered.
     skipped: bool,
+    /// The answer to the last state may come too late.
+    doubtful: bool,
 }
 
 impl Sent {
-    /// A state was read, which was asked for at `asked_ns` and is `passed` after the last one by the arm's
-    /// time (s).
-    fn read(&mut self, asked_ns: u64, passed: f64) {
-        let now = now_ns();
-        let since = |time: u64| now.saturating_sub(time) as f64 * 1e-9;
-        // One that was waited for is as old as the wait was too long; one that was there already came so much
-        // later than the last one as the arm's time says.
-        let before = if self.read_ns == 0 || since(asked_ns) > WAITED {
-            0.0
-        } else {
-            self.age
-        };
-        self.age = if self.read_ns == 0 {
-            0.0
-        } else {
-            (before + since(self.read_ns) - passed).max(0.0)
-        };
-        self.read_ns = now;
-    }
-
-    /// Whether an answer that leaves now is late.
-    fn is_late(&self) -> bool {
-        let since = now_ns().saturating_sub(self.read_ns) as f64 * 1e-9;
-        self.age + since > LATE
-    }
-
-    fn push(&mut self, command: [f64; JOINTS]) {
-        self.commands[self.count % ON_THE_WAY] = command;
-        self.count += 1;
-    }
-
     /// Whether the controller commands something that was not sent, and not only for a moment;
     /// `passed` is the time since the last state (s).
     fn has_gone_on(&mut self, state: &RobotState, passed: f64) -> bool {
-        let far = |told: &[f64; JOINTS]| {
-            let pairs = state.q_d.iter().zip(told);
-            pairs
-                .map(|(is, told)| (is - told).abs())
-                .fold(0.0, f64::max)
-        };
-        let known = self.commands.iter().take(self.count);
-        let known = known.into_iter().any(|told| far(told) <= ELSEWHERE);
+        let known = self.taken.knows(&state.q_d);
         self.strange = if known { 0 } else { self.strange + 1 };
         if core::mem::take(&mut self.skipped) {
             self.strange = 0;

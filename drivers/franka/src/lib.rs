@@ -9,16 +9,20 @@
 //! This crate never plans, and moves nothing without a session.
 
 mod arm_thread;
+mod arrivals;
 mod gripper;
 mod options;
 mod robot;
 mod snapshot;
+mod taken;
 
 use std::sync::atomic::AtomicBool;
 
-pub use driver_kit::{About, DriverError, DriverReport, RunOptions};
+pub use arrivals::{Arrivals, Sockets};
+pub use driver_kit::{About, DriverError, DriverReport, RunOptions, host};
 pub use options::{Collision, FrankaOptions, GripperOptions};
 pub use robot::Franka;
+pub use taken::Taken;
 
 /// Joints of an arm.
 pub const JOINTS: usize = 7;

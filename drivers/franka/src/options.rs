@@ -67,7 +67,7 @@ impl FrankaOptions {
             address: address.to_owned(),
             about,
             delay: 0.004,
-            share: 0.95,
+            share: 0.9,
             collision: Some(Collision::default()),
             impedance: None,
             gripper: Some(GripperOptions::default()),

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use driver_kit::{
     About, Command, DriverError, Measured, Measurement, OwnThread, Readiness, Resampler,
-    ResamplerOptions, Robot, RobotFault, Sensors, TimedReferences, speed_share,
+    ResamplerOptions, Robot, RobotFault, Sensors, TimedReferences, host, speed_share,
 };
 use franka::RobotMode;
 use ipc::{GRIPPER, Payload, ToolCommand, ToolFeedback, ToolStatus, text_of};
@@ -81,6 +81,7 @@ impl Franka {
             snapshot: Snapshot::default(),
             payload: None,
             stop: Arc::clone(&stop),
+            arrivals: None,
         };
         let thread = OwnThread::start("franka", move || thread.run())?;
         Ok(Self {
@@ -122,14 +123,6 @@ impl Franka {
             }
             _ => None,
         }
-    }
-}
-
-/// The host of `host` or `host:port`: the gripper has a port of its own.
-fn host(address: &str) -> &str {
-    match address.rsplit_once(':') {
-        Some((host, port)) if port.parse::<u16>().is_ok() => host,
-        _ => address,
     }
 }
 

@@ -2,45 +2,23 @@
 
     python serve.py PORT FOLDER [GRIPPER_OBJECT_WIDTH]
 
-Makes the model for MuJoCo from the URDF inside the package, so nothing is downloaded; prints
-`ready` when the server listens, and a line of its record (record.py) for each line of standard input. The command of the
-package itself would bind to all networks.
+Prints `ready` when the server listens, and a line of its record (record.py) for each line of standard
+input. The command of the package itself would bind to all networks.
 """
 
 import ctypes
 import gc
 import os
-import re
 import sys
 import threading
 from pathlib import Path
-
-import mujoco
 
 PORT, FOLDER = int(sys.argv[1]), Path(sys.argv[2])
 WIDTH = float(sys.argv[3]) if len(sys.argv) > 3 else None
 
 import franka_sim  # noqa: E402
+from arm_model import write  # noqa: E402
 from record import Record  # noqa: E402
-
-# Damping (N m s/rad) and inertia of the motors (kg m2): what the URDF does not have.
-DAMPING, ARMATURE = 1.0, 0.1
-
-
-def model(folder):
-    """The arm without meshes, as a file for MuJoCo."""
-    text = (Path(franka_sim.__file__).parent / "models" / "fr3.urdf").read_text()
-    for element in ("visual", "collision"):
-        text = re.sub(rf"<{element}\b.*?</{element}>", "", text, flags=re.S)
-    option = '<mujoco><compiler fusestatic="false" balanceinertia="true" discardvisual="false"/></mujoco>'
-    text = re.sub(r"(<robot\b[^>]*>)", r"\1" + option, text, count=1)
-    spec = mujoco.MjSpec.from_string(text)
-    for joint in spec.joints:
-        joint.damping, joint.armature = DAMPING, ARMATURE
-    spec.compile()
-    file = folder / "fr3.xml"
-    file.write_text(spec.to_xml())
-    return file
 
 
 def keep_time():
@@ -54,7 +32,7 @@ def keep_time():
 
 
 def main():
-    os.environ["FR3_MJCF"] = str(model(FOLDER))
+    os.environ["FR3_MJCF"] = str(write(FOLDER))
     server = franka_sim.FrankaSimServer(
         host="127.0.0.1",
         port=PORT,

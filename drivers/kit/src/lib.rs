@@ -13,6 +13,7 @@
 //!
 //! This crate never plans, and knows no kinematics.
 
+mod address;
 mod command;
 mod driver;
 mod error;
@@ -29,6 +30,7 @@ mod report;
 mod resampler;
 mod robot;
 
+pub use address::host;
 pub use command::{Command, TimedReferences};
 pub use driver::Driver;
 pub use error::DriverError;

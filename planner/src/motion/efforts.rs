@@ -1,6 +1,6 @@
 //! Limits of the efforts of the joints, by choice of the robot.
 
-use kinematics::Dynamics;
+use kinematics::{Dynamics, Inertia};
 use nalgebra::SVector;
 use realtime::Piece;
 use trajectory::{JointLimits, MotionBounds, Trajectory};
@@ -11,10 +11,21 @@ use crate::task::Move;
 /// Masses of an arm, and the largest efforts of its joints.
 #[derive(Clone, Debug)]
 pub struct Efforts<const N: usize> {
-    /// The arm with its payload.
+    /// The arm with what it carries.
     pub dynamics: Dynamics<N>,
     /// Largest effort of each joint (Nm, N).
     pub limits: SVector<f64, N>,
+}
+
+impl<const N: usize> Efforts<N> {
+    /// The same arm with this at its flange, in the flange's frame.
+    #[must_use]
+    pub fn carrying(mut self, carried: Option<&Inertia>) -> Self {
+        if let Some(carried) = carried {
+            self.dynamics = self.dynamics.with_payload(carried);
+        }
+        self
+    }
 }
 
 /// Longest time between two looks at the efforts, s.

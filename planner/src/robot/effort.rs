@@ -30,13 +30,11 @@ pub(super) struct Payload {
     inertia_kg_m2: Option<Spanned<[f64; 3]>>,
 }
 
-/// Limits of the efforts of the joints, and what the flange carries.
+/// Limits of the efforts of the joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffortLimits {
     /// Largest effort of each joint, root first (Nm; N for sliding joints).
     pub limits: Vec<f64>,
-    /// What the flange carries, in its frame.
-    pub payload: Inertia,
 }
 
 impl Files<'_> {
@@ -45,7 +43,6 @@ impl Files<'_> {
         &self,
         model: &Model,
         limits: Option<&Limits>,
-        payload: Option<Inertia>,
     ) -> Result<Option<EffortLimits>, RobotError> {
         let Some(limits) = limits.filter(|limits| *limits.effort.get_ref()) else {
             return Ok(None);
@@ -66,10 +63,7 @@ impl Files<'_> {
             };
             efforts.push(effort);
         }
-        Ok(Some(EffortLimits {
-            limits: efforts,
-            payload: payload.unwrap_or_else(Inertia::none),
-        }))
+        Ok(Some(EffortLimits { limits: efforts }))
     }
 
     /// A body; `key` is where it stands in the file.

@@ -139,7 +139,7 @@ impl Files<'_> {
         let payload = payload
             .map(|payload| self.payload("payload", payload))
             .transpose()?;
-        let efforts = self.efforts(&model, document.limits.as_ref(), payload)?;
+        let efforts = self.efforts(&model, document.limits.as_ref())?;
         let margin = self.margin(document.joints.get_ref().margin.as_ref())?;
         let joints = self
             .joint_limits(&model, &document.joints)?

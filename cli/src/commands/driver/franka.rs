@@ -24,7 +24,7 @@ pub(super) struct Franka {
     #[arg(long, value_name = "MS", default_value_t = 4.0)]
     delay: f64,
     /// Share of the maker's limits that the commands keep
-    #[arg(long, value_name = "SHARE", default_value_t = 0.95)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
     share: f64,
     /// Torques at the joints from which the arm stops, N m, with commas
     #[arg(long, value_name = "TORQUES", value_delimiter = ',')]
