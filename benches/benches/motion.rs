@@ -7,6 +7,9 @@
 //! argument `moves` these alone, with one line for each move: how long it is, and how long it is
 //! planned.
 //!
+//! Then long lists of a UR5e, one millimetre from pose to pose: the processor time until the first of
+//! their windows may be executed. Budget: 100 ms for 10 000 poses. With the argument `windows` these alone.
+//!
 //! The reference is the minimum time found by IPOPT for piecewise constant
 //! jerk in a tube of the tolerance, same limits (500 mm/s, 5000 mm/s2,
 //! 1e5 mm/s3), computed once outside of this repository.
@@ -14,8 +17,10 @@
 
 use measure::RandomMoves;
 use measure::smooth::measure;
-use nalgebra::Isometry3;
-use planner::task::Shape;
+use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
+use planner::controller::Controller;
+use planner::motion::Planner;
+use planner::task::{Move, Shape};
 use trajectory::ToolLimits;
 use trajectory::smooth::{SmoothOptions, Windows};
 
@@ -32,8 +37,122 @@ fn main() {
         random_moves(&words);
         return;
     }
-    lists();
-    random_moves(&words);
+    if !words.iter().any(|word| word == "windows") {
+        lists();
+        random_moves(&words);
+    }
+    first_windows();
+}
+
+/// Processor time from a long list to its first window, and the most that a later window takes beside
+/// its own time.
+fn first_windows() {
+    let Ok(robot) = planner::robot::load("ur5e") else {
+        println!("the robot ur5e is missing");
+        return;
+    };
+    let Ok(controller) = Controller::<6>::new(&robot, 1000.0, Default::default()) else {
+        println!("the robot ur5e cannot be used");
+        return;
+    };
+    let planner = controller.planner();
+    let home = SVector::from_column_slice(&robot.home);
+    let start = planner.chain().forward(&home);
+    let mut lines = Vec::new();
+    for count in [1_000, 3_999, 10_000, 100_000] {
+        for turn in [0.0, 0.15] {
+            let motion = Move {
+                shape: Shape::Smooth,
+                poses: waves(&start, count, turn),
+                tolerance: 1e-4,
+                limits: robot.motion_limits(),
+            };
+            let row = Windowed::measure(planner, &motion, &home);
+            println!("{count} poses, turning by {turn} rad: {row}");
+            if turn > 0.0 {
+                lines.push(format!("ratio first-window-{count}-ms {:.1}", row.first));
+            }
+        }
+    }
+    println!("{}", lines.join("\n"));
+}
+
+/// How a long list was planned.
+struct Windowed {
+    /// Time until something may be executed, ms.
+    first: f64,
+    /// Windows, 1 where the list is planned as a whole.
+    windows: usize,
+    /// Largest planning time of a later window over its own time.
+    most: f64,
+    /// Time of the motion, s.
+    motion: f64,
+}
+
+impl Windowed {
+    fn measure(planner: &Planner<6>, motion: &Move, home: &SVector<f64, 6>) -> Self {
+        let clock = || scheduling::thread_time_ns() as f64 * 1e-6;
+        let begun = clock();
+        let mut row = Self {
+            first: f64::NAN,
+            windows: 1,
+            most: 0.0,
+            motion: f64::NAN,
+        };
+        let Some(mut windowed) = planner.windows(motion, home) else {
+            if let Ok(planned) = planner.plan(motion, home) {
+                row.motion = planned.trajectory.duration();
+            }
+            row.first = clock() - begun;
+            return row;
+        };
+        row.first = clock() - begun;
+        loop {
+            let begun = clock();
+            let Ok(window) = planner.window_of(&mut windowed) else {
+                return row;
+            };
+            let time: f64 = window.pieces.iter().map(|piece| piece.duration).sum();
+            row.most = row.most.max((clock() - begun) * 1e-3 / time);
+            row.motion = windowed.duration();
+            if window.last {
+                return row;
+            }
+            row.windows += 1;
+        }
+    }
+}
+
+impl std::fmt::Display for Windowed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            first,
+            windows,
+            most,
+            motion,
+        } = self;
+        write!(
+            f,
+            "{windows} windows, first after {first:.1} ms, later ones planned in at most {most:.3} of \
+             their time, motion {motion:.5} s"
+        )
+    }
+}
+
+/// Poses on waves from a pose, one millimetre apart, with a tool that turns to and fro.
+fn waves(start: &Isometry3<f64>, count: usize, turn: f64) -> Vec<Isometry3<f64>> {
+    let at = |i: usize| {
+        let a = std::f64::consts::TAU * i as f64 / 300.0;
+        let way = Vector3::new(
+            0.04 * (a.cos() - 1.0) + 0.03 * (0.37 * a).sin(),
+            0.06 * a.sin(),
+            0.02 * (0.21 * a).sin(),
+        );
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turn * (0.3 * a).sin());
+        let place = start.translation.vector + way;
+        Isometry3::from_parts(place.into(), start.rotation * turn)
+    };
+    (1..=count).map(at).collect()
 }
 
 /// Moves of each shape.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 use planner::controller::Controller;
-use planner::motion::{MotionError, Planner};
+use planner::motion::{MotionError, MoveCertificate, Planner};
 use planner::robot::load;
 use planner::task::{Move, Shape};
 use realtime::Sample;
@@ -112,6 +112,34 @@ fn the_windows_together_are_the_plan() {
         assert!((gap.translation.vector.norm() - pass.deviation_m).abs() < 1e-7);
         assert!(pass.deviation_m <= 1e-4);
     }
+}
+
+/// What was driven may be forgotten after each window: the motion is the same, and the certificate but for the
+/// passes and the active limits.
+#[test]
+fn what_is_driven_may_be_forgotten() {
+    let (planner, home, limits) = arm("ur5e");
+    let motion = waves(&planner.chain().forward(&home), 1e-3, 1e-4, limits);
+    let whole = planner.plan(&motion, &home).unwrap();
+    let mut windowed = planner.windows(&motion, &home).unwrap();
+    let mut pieces = Vec::new();
+    loop {
+        let window = planner.window_of(&mut windowed).unwrap();
+        pieces.extend(window.pieces);
+        windowed.forget();
+        assert!(windowed.certificate().unwrap().poses.is_empty());
+        if window.last {
+            break;
+        }
+    }
+    assert_eq!(pieces, whole.trajectory.pieces());
+    let certificate = windowed.certificate().unwrap().clone();
+    let kept = MoveCertificate {
+        poses: Vec::new(),
+        active: Vec::new(),
+        ..whole.certificate
+    };
+    assert_eq!(certificate, kept);
 }
 
 /// Random dense lists, wherever they lie before the arm: where the check of the way says yes, every

@@ -212,9 +212,10 @@ fn first_setpoint() {
         }
         println!(
             "{count} poses: first setpoint after {} ms, {slowed} slowed periods in {last:.1} s of \
-             motion, {:.1} MB more memory",
+             motion, at most {:.1} MB more memory, {:.1} MB at the end",
             first.unwrap(),
-            (most - memory) as f64 * 1e-6
+            (most - memory) as f64 * 1e-6,
+            resident() as f64 * 1e-6 - memory as f64 * 1e-6
         );
     }
 }

@@ -1,10 +1,10 @@
 //! The null-space motion of arms with more than six joints: chosen over the whole path.
 
-use super::FollowPoint;
 use super::error::FollowError;
-use super::null_space::NullSpace;
+use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::trace::Task;
+use super::{FollowOptions, FollowPoint};
 use nalgebra::{SMatrix, SVector};
 
 /// Distance from a limit, rad or m, from which a joint counts as well inside.
@@ -61,16 +61,7 @@ fn along<const N: usize>(
     start: &SVector<f64, N>,
     directions: &[SVector<f64, N>; 2],
 ) -> Attempt<N> {
-    let (from, to) = (task.grid[0], task.grid[task.grid.len() - 1]);
-    let polynomials = directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let still = NullSpace {
-        directions: *directions,
-        polynomials,
-        from,
-        span: to - from,
-        u: from,
-        still_ends: task.options.still_ends,
-    };
+    let still = resting(task, start, directions);
     let first = task.trace(start, &still);
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
@@ -93,6 +84,159 @@ fn along<const N: usize>(
         }
     }
     (best, answer)
+}
+
+/// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
+/// to another place at the end, there and back, and so with one and two more turns.
+const SHAPES: [NullSpacePolynomial; 4] = [
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 4.0, -4.0, 0.0, 0.0, 0.0],
+    [0.0, 10.4, -31.2, 20.8, 0.0, 0.0],
+    [0.0, 16.0, -80.0, 128.0, -64.0, 0.0],
+];
+/// Sizes that are tried of each shape, one after the other, rad.
+const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
+/// What is added to the coefficient of a joint in the measure, one after the other.
+const TILTS: [f64; 2] = [0.5, 0.2];
+/// Least share of the cost that a round of steps has to save for a round of smaller ones.
+const GAIN: f64 = 1e-3;
+/// How often one step is taken in one direction.
+const REPEATS: usize = 3;
+/// Fewest and most steps along the path in which a motion is judged, points of the path for each, and how far
+/// from the path these may be between two of them, m.
+const JUDGED: [usize; 2] = [24, 64];
+const EVERY: usize = 4;
+const COARSE: f64 = 1e-3;
+/// Least share of the cost that another motion has to save.
+const WORTH: f64 = 0.01;
+
+/// The null-space motion that costs least, from `start`, among those that stay as far from limits and
+/// singular poses as the first without one, if it saves something. It is searched in two steps, along
+/// one coordinate after the other: the function of the joints that stays constant, then how its value
+/// changes. The search may miss the best.
+pub(super) fn cheapest<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+    cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
+) -> Option<NullSpace<N>> {
+    let last = task.grid.len() - 1;
+    let steps = (last / EVERY).clamp(JUDGED[0], JUDGED[1]).min(last);
+    let grid: Vec<f64> = (0..=steps).map(|k| task.grid[k * last / steps]).collect();
+    let options = FollowOptions {
+        accuracy: COARSE,
+        ..*task.options
+    };
+    let coarse = Task {
+        grid: &grid,
+        options: &options,
+        ..*task
+    };
+    let (_, jacobian) = task.solver.chain().jacobian(start);
+    let still = resting(task, start, &null_space(&jacobian));
+    let first = coarse.trace(start, &still).ok()?;
+    let ease = quality(&coarse, &first).min(1.0);
+    let judge = |moving: &NullSpace<N>| {
+        let points = coarse.trace(start, moving).ok()?;
+        (quality(&coarse, &points) >= ease).then(|| cost(&points))
+    };
+    let none = cost(&first);
+    let begin = Search {
+        judge: &judge,
+        best: still,
+        least: none,
+    };
+    // The first step may lead away from what the second one finds alone.
+    let (mut alone, mut after) = (begin.clone(), begin);
+    alone.shape();
+    after.measure(start, task);
+    if after.least < none {
+        after.shape();
+    }
+    let found = if after.least < alone.least {
+        after
+    } else {
+        alone
+    };
+    (found.least < none * (1.0 - WORTH)).then_some(found.best)
+}
+
+/// A search of the null-space motion that costs least.
+#[derive(Clone)]
+struct Search<'a, const N: usize> {
+    /// The cost of a motion that is good enough.
+    judge: &'a dyn Fn(&NullSpace<N>) -> Option<f64>,
+    best: NullSpace<N>,
+    least: f64,
+}
+
+impl<const N: usize> Search<'_, N> {
+    /// Searches the function of the joints that is constant.
+    fn measure(&mut self, start: &SVector<f64, N>, task: &Task<'_, N>) {
+        for tilt in TILTS {
+            let before = self.least;
+            for joint in 0..N {
+                let unit = SVector::<f64, N>::from_fn(|j, _| if j == joint { tilt } else { 0.0 });
+                self.along(|from, sign| {
+                    let mut directions = from.directions;
+                    directions[0] = (directions[0] + unit * sign).normalize();
+                    resting(task, start, &directions)
+                });
+            }
+            if self.least >= before * (1.0 - GAIN) {
+                return;
+            }
+        }
+    }
+
+    /// Searches how its value changes.
+    fn shape(&mut self) {
+        for (round, size) in SIZES.into_iter().enumerate() {
+            let before = self.least;
+            for shape in SHAPES {
+                self.along(|from, sign| {
+                    let mut other = *from;
+                    for (c, s) in other.polynomials[0].iter_mut().zip(shape) {
+                        *c += sign * size * s;
+                    }
+                    other
+                });
+            }
+            if round > 0 && self.least >= before * (1.0 - GAIN) {
+                return;
+            }
+        }
+    }
+
+    /// Takes steps in one direction, or against it, while they save something.
+    fn along(&mut self, step: impl Fn(&NullSpace<N>, f64) -> NullSpace<N>) {
+        for sign in [1.0, -1.0] {
+            for taken in 0..REPEATS {
+                let other = step(&self.best, sign);
+                match (self.judge)(&other).filter(|cost| *cost < self.least) {
+                    Some(cost) => (self.best, self.least) = (other, cost),
+                    None if taken > 0 => return,
+                    None => break,
+                }
+            }
+        }
+    }
+}
+
+/// No null-space motion, measured along directions.
+fn resting<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+    directions: &[SVector<f64, N>; 2],
+) -> NullSpace<N> {
+    let (from, to) = (task.grid[0], task.grid[task.grid.len() - 1]);
+    NullSpace {
+        directions: *directions,
+        polynomials: directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]),
+        from,
+        span: to - from,
+        u: from,
+        still_ends: task.options.still_ends,
+    }
 }
 
 /// How well a path stays inside limits and away from singular poses: 1 is good, or no worse than at

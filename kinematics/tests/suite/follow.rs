@@ -2,7 +2,8 @@
 
 use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;
-use kinematics::{FollowCause, FollowOptions, Solver, TwistPoint, follow};
+use kinematics::follow::{cheaper, follow_with};
+use kinematics::{FollowCause, FollowOptions, FollowPoint, Solver, TwistPoint, follow};
 use nalgebra::{Isometry3, SVector, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Positions in which the shipped arms stand well.
@@ -87,6 +88,57 @@ fn follows<const N: usize>(name: &str) {
 fn joint_paths_are_exact_and_continuous() {
     SIX.iter().for_each(|name| follows::<6>(name));
     SEVEN.iter().for_each(|name| follows::<7>(name));
+}
+
+/// Between the places of a path, the sum of the fastest joint's ways (rad).
+fn fastest<const N: usize>(points: &[FollowPoint<N>]) -> f64 {
+    points
+        .windows(2)
+        .map(|pair| (pair[1].q[0] - pair[0].q[0]).amax())
+        .sum()
+}
+
+/// A null-space motion that costs less is found, costs less on the fine grid too, and is on the path, inside the
+/// ranges of the joints.
+#[test]
+fn the_spare_joint_takes_what_costs_less() {
+    let mut found = 0;
+    for name in SEVEN {
+        let solver = Solver::new(arms::chain::<7>(name));
+        let start = ready::<7>(name);
+        let tool = curve(&solver.chain().forward(&start), 1.0);
+        let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
+        let options = FollowOptions {
+            still_ends: true,
+            ..FollowOptions::default()
+        };
+        let at = (&grid[..], &start);
+        let Some(motion) = cheaper(&solver, &tool, at, &options, &fastest) else {
+            continue;
+        };
+        found += 1;
+        let ease = follow(&solver, &tool, &grid, &start, &options).unwrap();
+        let points = follow_with(&solver, &tool, at, &options, &motion).unwrap();
+        assert!(fastest(&points) < 0.995 * fastest(&ease), "{name}");
+        let chain = solver.chain();
+        for point in &points {
+            let (position, rotation) = error(&chain.forward(&point.q[0]), &tool(point.u).pose);
+            assert!(position < 1e-10 && rotation < 1e-9, "{name}");
+            let inside = |j: usize| (chain.lower()[j]..=chain.upper()[j]).contains(&point.q[0][j]);
+            assert!((0..7).all(inside), "{name}");
+        }
+    }
+    assert!(found >= 3, "{found}");
+}
+
+/// Six joints have no null-space motion to choose.
+#[test]
+fn six_joints_have_nothing_to_choose() {
+    let solver = Solver::new(arms::chain::<6>("ur5e"));
+    let start = ready::<6>("ur5e");
+    let tool = curve(&solver.chain().forward(&start), 1.0);
+    let at = (&[0.0, 0.5, 1.0][..], &start);
+    assert!(cheaper(&solver, &tool, at, &FollowOptions::default(), &fastest).is_none());
 }
 
 /// The answer does not depend on anything but the question.

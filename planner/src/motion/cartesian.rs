@@ -1,6 +1,6 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
-use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, TwistPoint};
+use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, NullMotion, TwistPoint};
 use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
@@ -21,6 +21,8 @@ const FIT: f64 = 5e-7;
 /// Fraction of the time by which a motion may be slowed down uniformly before another time law is
 /// computed.
 const ENOUGH: f64 = 1e-3;
+/// Time of the joints over that of the tool from which on the spare joint of an arm is asked to help.
+const HELPED: f64 = 1.01;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -48,7 +50,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<Draft<N>, MotionError> {
         let points = self
-            .followed(curve, false, start, &|_| 1)
+            .followed(&Way::along(curve), start)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let options = TimingOptions {
             start: Boundary::Rest,
@@ -70,18 +72,19 @@ impl<const N: usize> Planner<N> {
         Ok(self.slowed(draft, motion))
     }
 
-    /// The joints follow a smooth path from `start`, slowed down where a joint needs it.
+    /// The joints follow a smooth path from `start`, slowed down where a joint needs it: motions to be
+    /// certified, the fastest first.
     pub(super) fn follow_smooth(
         &self,
         path: &SmoothPath,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Result<Draft<N>, MotionError> {
+    ) -> Result<Vec<Draft<N>>, MotionError> {
         let plan = &path.plan;
         let crossings: Vec<f64> = plan.crossings().iter().map(|pass| pass.time).collect();
         if path.still || plan.duration() <= 0.0 {
             let at_once = vec![0.0; crossings.len()];
-            return Ok(passing(Trajectory::new(Vec::new()), at_once));
+            return Ok(vec![passing(Trajectory::new(Vec::new()), at_once)]);
         }
         let towards = |u: f64| {
             1 + plan
@@ -90,20 +93,87 @@ impl<const N: usize> Planner<N> {
                 .take_while(|pass| pass.time <= u)
                 .count()
         };
+        let mut way = Way {
+            still_ends: true,
+            towards: &towards,
+            ..Way::along(plan)
+        };
         let points = self
-            .followed(plan, true, start, &towards)
+            .followed(&way, start)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
-        let direct = Trajectory::new(pieces(&points));
+        let first = self.fastest_along(plan, &points, (&crossings, motion))?;
+        if first.trajectory.duration() <= plan.duration() * HELPED {
+            return Ok(vec![first]);
+        }
+        // The joints rule: the spare one may help them.
+        let spare = self.helping(&way, &points, start);
+        way.spare = spare.as_ref();
+        let other = way.spare.and_then(|_| {
+            let points = self.followed(&way, start).ok()?;
+            let draft = self
+                .fastest_along(plan, &points, (&crossings, motion))
+                .ok()?;
+            (draft.trajectory.duration() < first.trajectory.duration()).then_some(draft)
+        });
+        Ok(other.into_iter().chain([first]).collect())
+    }
+
+    /// The fastest motion of the joints along a smooth motion of the tool, that is never faster.
+    fn fastest_along(
+        &self,
+        plan: &smooth::SmoothPlan,
+        points: &[FollowPoint<N>],
+        (crossings, motion): (&[f64], &Move),
+    ) -> Result<Draft<N>, MotionError> {
+        let direct = Trajectory::new(pieces(points));
         let free = direct.duration();
-        let direct = self.slowed(passing(direct, crossings.clone()), motion);
+        let direct = self.slowed(passing(direct, crossings.to_vec()), motion);
         if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
             return Ok(direct);
         }
-        let path = joint_path(plan, &points)?;
-        match self.retimed(&path, &crossings, motion) {
+        let path = joint_path(plan, points)?;
+        match self.retimed(&path, crossings, motion) {
             Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => Ok(timed),
             _ => Ok(direct),
         }
+    }
+
+    /// A null-space motion with which the joints need about less time for a curve whose parameter is time.
+    fn helping(
+        &self,
+        way: &Way<'_, N>,
+        points: &[FollowPoint<N>],
+        start: &SVector<f64, N>,
+    ) -> Option<NullMotion<N>> {
+        if N <= 6 {
+            return None;
+        }
+        let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
+        let options = follow::FollowOptions {
+            still_ends: way.still_ends,
+            ..Default::default()
+        };
+        let cost = |points: &[FollowPoint<N>]| self.about_time(points);
+        follow::cheaper(&self.solver, &way.tool(), (&grid, start), &options, &cost)
+    }
+
+    /// About the time that the joints need along points whose parameter is the time of the tool: at each point
+    /// the factor by which it must be stretched.
+    fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
+        let limits = &self.limits;
+        let factor = |point: &FollowPoint<N>| {
+            let [_, velocity, acceleration, jerk] = &point.q;
+            (0..N).fold(1.0_f64, |most, j| {
+                most.max(velocity[j].abs() / limits.velocity[j])
+                    .max((acceleration[j].abs() / limits.acceleration[j]).sqrt())
+                    .max((jerk[j].abs() / limits.jerk[j]).cbrt())
+            })
+        };
+        let parts = points.windows(2).map(|pair| {
+            let mean = 0.5 * (factor(&pair[0]) + factor(&pair[1]));
+            mean * (pair[1].u - pair[0].u)
+        });
+        parts.sum()
     }
 
     /// The smooth motion of the tool through the poses of a move that starts at `start`; `fit` says
@@ -147,51 +217,36 @@ impl<const N: usize> Planner<N> {
     /// enough that a quintic between its points stays on the curve.
     pub(super) fn followed(
         &self,
-        curve: &dyn ToolCurve,
-        still_ends: bool,
+        way: &Way<'_, N>,
         start: &SVector<f64, N>,
-        towards: &dyn Fn(f64) -> usize,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let way = Way {
-            curve,
-            still_ends,
-            towards,
-        };
-        let mut points = self.solved(&way, &first_grid(curve), start)?;
+        let mut points = self.solved(way, &first_grid(way.curve), start)?;
         for _ in 0..REFINEMENTS {
-            let finer = refined(self.chain(), &points, curve);
+            let finer = refined(self.chain(), &points, way.curve);
             if finer.len() == points.len() || finer.len() > MOST_POINTS {
                 break;
             }
-            points = self.solved(&way, &finer, start)?;
+            points = self.solved(way, &finer, start)?;
         }
         Ok(points)
     }
 
     fn solved(
         &self,
-        way: &Way<'_>,
+        way: &Way<'_, N>,
         grid: &[f64],
         start: &SVector<f64, N>,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let tool = |u: f64| {
-            let ToolPoint {
-                pose,
-                linear,
-                angular,
-            } = way.curve.at(u);
-            TwistPoint {
-                pose,
-                linear,
-                angular,
-            }
-        };
+        let tool = way.tool();
         let options = follow::FollowOptions {
             still_ends: way.still_ends,
             ..Default::default()
         };
-        follow::follow(&self.solver, &tool, grid, start, &options)
-            .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
+        let points = match way.spare {
+            Some(spare) => follow::follow_with(&self.solver, &tool, (grid, start), &options, spare),
+            None => follow::follow(&self.solver, &tool, grid, start, &options),
+        };
+        points.map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
     /// Why the path is blocked. If the pose ahead is out of reach by more than the tolerance, that
@@ -315,12 +370,41 @@ pub(super) fn moment(law: &Trajectory<1>, u: f64) -> f64 {
     law.times()[next.saturating_sub(1)] + high
 }
 
-/// A curve of the tool, whether it is at rest at both ends in its own parameter, and the next pose
-/// of the command after a parameter.
-struct Way<'a> {
-    curve: &'a dyn ToolCurve,
-    still_ends: bool,
-    towards: &'a dyn Fn(f64) -> usize,
+/// A curve of the tool, whether it is at rest at both ends in its own parameter, the next pose of the
+/// command after a parameter, and the null-space motion if it is not to be searched.
+pub(super) struct Way<'a, const N: usize> {
+    pub curve: &'a dyn ToolCurve,
+    pub still_ends: bool,
+    pub towards: &'a dyn Fn(f64) -> usize,
+    pub spare: Option<&'a NullMotion<N>>,
+}
+
+impl<'a, const N: usize> Way<'a, N> {
+    /// A curve whose parameter has no time in it, to the one pose of its command.
+    pub(super) fn along(curve: &'a dyn ToolCurve) -> Self {
+        Self {
+            curve,
+            still_ends: false,
+            towards: &|_| 1,
+            spare: None,
+        }
+    }
+
+    /// The motion of the tool.
+    fn tool(&self) -> impl Fn(f64) -> TwistPoint {
+        |u| {
+            let ToolPoint {
+                pose,
+                linear,
+                angular,
+            } = self.curve.at(u);
+            TwistPoint {
+                pose,
+                linear,
+                angular,
+            }
+        }
+    }
 }
 
 fn sample<const N: usize>(point: &FollowPoint<N>) -> Sample<N> {

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use trajectory::bounds::Held;
 use trajectory::{Boundary, MotionBounds, PacedPath, TimingOptions, Trajectory, smooth, time_path};
 
-use super::cartesian::{is_still, joint_path, moment};
+use super::cartesian::{Way, is_still, joint_path, moment};
 use super::certificate::Arm;
 use super::draft::Draft;
 use super::{Blend, MotionError, PlannedMove, Planner};
@@ -65,8 +65,13 @@ impl<const N: usize> Planner<N> {
             fallbacks: plan.fallbacks(),
         };
         let towards = |u: f64| 1 + at.iter().take_while(|time| **time <= u).count();
+        let way = Way {
+            still_ends: true,
+            towards: &towards,
+            ..Way::along(&plan)
+        };
         let points = self
-            .followed(&plan, true, start, &towards)
+            .followed(&way, start)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let path = PacedPath::new(
             joint_path(&plan, &points)?,

@@ -6,7 +6,7 @@ use trajectory::otg::{self, Otg};
 use trajectory::timing::Limit;
 use trajectory::{Line, MotionBounds, ToolCurve, ToolLimits, ToolPoint, Trajectory};
 
-use super::cartesian::pieces;
+use super::cartesian::{Way, pieces};
 use super::{ARRIVED, Draft, JUMP, MotionError, PlannedMove, Planner, ROUNDING, STRAIGHT};
 use crate::task::{Move, Shape};
 
@@ -134,7 +134,7 @@ impl<const N: usize> Planner<N> {
         for share in SHARES {
             let law = law(&line, &pace, &motion.limits, share)?;
             let curve = PacedLine::new(line.clone(), law)?;
-            let points = self.followed(&curve, false, &start.position, &|_| 1)?;
+            let points = self.followed(&Way::along(&curve), &start.position)?;
             let along = points.first().map(|point| point.q[1]);
             if along.is_none_or(|along| (along - start.velocity).amax() > ASTRAY) {
                 return Err(MotionError::FromMotion("it leads another way"));

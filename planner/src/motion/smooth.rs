@@ -98,11 +98,16 @@ impl<const N: usize> Planner<N> {
             ..motion.clone()
         };
         let along = |path: &SmoothPath| -> Result<_, MotionError> {
-            let draft = self.follow_smooth(path, &tighter, start)?;
-            let planned = self.certify(motion, start, draft)?;
+            let mut planned = Err(MotionError::NoWay);
+            for draft in self.follow_smooth(path, &tighter, start)? {
+                planned = self.certify(motion, start, draft);
+                if planned.is_ok() {
+                    break;
+                }
+            }
             Ok(PlannedMove {
                 blend: Some(path.blend(tolerance)),
-                ..planned
+                ..planned?
             })
         };
         let path = self.smooth_path(&tighter, start, true)?;

@@ -65,6 +65,8 @@ impl<const N: usize> Worker<'_, N> {
             flight.planned_s = streaming.windowed.duration();
         }
         if !window.last {
+            // Nobody asks for what is behind, and a list may be long.
+            streaming.windowed.forget();
             self.streaming = Some(streaming);
         }
     }

@@ -101,6 +101,22 @@ impl<const N: usize> WindowedMove<N> {
         self.rests
     }
 
+    /// Frees what only the parts so far needed: how each pose of them was passed and when which limit was
+    /// active, and the joints along them. The certificate is complete in everything else.
+    pub fn forget(&mut self) {
+        if let Some(certificate) = &mut self.certificate {
+            certificate.poses = Vec::new();
+            certificate.active = Vec::new();
+        }
+        self.path.forget(self.from);
+        let passed = self.least.partition_point(|[u, _]| *u <= self.from);
+        let before = passed.saturating_sub(1);
+        if 2 * before > self.least.len() {
+            self.least.drain(..before);
+            self.least.shrink_to_fit();
+        }
+    }
+
     fn is_done(&self) -> bool {
         self.from >= self.path.last()
     }

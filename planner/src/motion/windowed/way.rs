@@ -39,10 +39,13 @@ impl<const N: usize> Planner<N> {
         }
         self.check_reach(motion, start).ok()?;
         let origin = self.chain().forward(start);
-        let mut poses = vec![origin];
-        poses.extend_from_slice(&motion.poses);
         let options = SmoothOptions::new(motion.tolerance, motion.limits);
-        let curve = FittedCurve::new(&poses, &options)?;
+        let curve = {
+            let mut poses = Vec::with_capacity(motion.poses.len() + 1);
+            poses.push(origin);
+            poses.extend_from_slice(&motion.poses);
+            FittedCurve::new(&poses, &options)?
+        };
         let points = self.joints_along(&curve, start)?;
         if !points.windows(2).all(|pair| self.stays_inside(pair)) {
             return None;
