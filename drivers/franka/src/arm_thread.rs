@@ -207,7 +207,7 @@ impl ArmThread {
         loop {
             let (state, passed) = control.read_once()?;
             let advance = passed.as_secs_f64();
-            let doubtful = core::mem::take(&mut sent.doubtful);
+            let doubtful = core::mem::take(&mut sent.doubtful) || sent.misses_one(&state);
             if sent.taken.count() < FIRST {
                 self.resampler.begin(&state.q_d);
             } else if !doubtful && sent.has_gone_on(&state, advance) {
@@ -287,6 +287,12 @@ struct Sent {
 }
 
 impl Sent {
+    /// Whether an answer is missing that the driver believes to have given: it may still come.
+    fn misses_one(&self, state: &RobotState) -> bool {
+        let began = self.taken.count() >= FIRST;
+        began && !self.skipped && self.taken.misses(&state.q_d, PERIOD)
+    }
+
     /// Whether the controller commands something that was not sent, and not only for a moment;
     /// `passed` is the time since the last state (s).
     fn has_gone_on(&mut self, state: &RobotState, passed: f64) -> bool {

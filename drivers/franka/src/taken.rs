@@ -49,6 +49,15 @@ impl Taken {
             .any(|told| apart(told, commanded) <= ELSEWHERE)
     }
 
+    /// Whether it commands what it made by itself of a command (rad), and nothing that it was told: an answer is missing.
+    pub fn misses(&self, commanded: &[f64; JOINTS], period: f64) -> bool {
+        let known = self.commands.iter().take(self.count);
+        let told = known
+            .into_iter()
+            .any(|told| rounding(told, commanded) <= 1.0);
+        !told && self.clone().went_on(commanded, period).is_some()
+    }
+
     /// Where the controller went by itself, `period` (s) a cycle, when it says that it commands `commanded` (rad): from the
     /// newest command from which it comes there. Positions are exact: the single precision of a state alone
     /// would be a step of 0.1 rad/s² in the next command. Nothing if no command leads there.

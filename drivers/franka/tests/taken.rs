@@ -90,3 +90,26 @@ fn another_place_is_not_found() {
     assert!(taken.went_on(&elsewhere, PERIOD).is_none());
     assert!(!taken.knows(&elsewhere) && taken.knows(&at(19)));
 }
+
+/// An answer that is missing is seen in the next state, where single precision shows it; an older state is no missing
+/// answer.
+#[test]
+fn a_missing_answer_is_seen() {
+    // A swing with 1350 rad/s3.
+    let quick = |cycle: usize| -> [f64; JOINTS] {
+        core::array::from_fn(|joint| {
+            let (place, t) = (joint as f64, cycle as f64 * PERIOD);
+            1.0 + 0.05 * (30.0 * t + place).sin()
+        })
+    };
+    for start in (20..2000).step_by(7) {
+        let mut taken = Taken::default();
+        (0..=start + 1).for_each(|cycle| taken.push(quick(cycle)));
+        let [older, last, now] = [2, 1, 0].map(|back| quick(start - back));
+        let missing = core::array::from_fn(|joint| 3.0 * (now[joint] - last[joint]) + older[joint]);
+        assert!(taken.misses(&shown(missing), PERIOD), "{start}");
+        for cycle in start - 3..=start + 1 {
+            assert!(!taken.misses(&shown(quick(cycle)), PERIOD), "{cycle}");
+        }
+    }
+}

@@ -22,6 +22,10 @@ const ROUNDING: f64 = 1e-3;
 const SMALL: f64 = 1e-9;
 const AT_END: f64 = 1e-6;
 
+/// Tolerance for rounding of moments of the jerk, as a share, and of positions (rad).
+const TINY: f64 = 1e-6;
+const ROUNDED: f64 = 1e-13;
+
 /// Fraction of the jerk limit, and least fraction of the acceleration limit, used to approach the
 /// target; the rest is for the motion of the target itself.
 const CLOSING: [f64; 2] = [0.3, 0.2];
@@ -122,23 +126,46 @@ impl Limiter {
     /// limits can still be kept.
     fn follows(&self, from: &Reference, next: &Reference, period: f64) -> bool {
         let room = 1.0 + ROUNDING;
-        let jerk = self.jerk * room;
-        let (rate, speed) = (
-            from.acceleration + next.acceleration,
-            from.velocity + next.velocity,
-        );
-        let gained = next.velocity - from.velocity - rate * period / 2.0;
-        let moved = next.position - from.position - speed * period / 2.0;
-        let change = (next.acceleration - from.acceleration).abs();
         next.velocity.abs() <= self.velocity * room
             && next.acceleration.abs() <= self.acceleration * room
-            && change <= jerk * period + SMALL
-            // Largest error of the trapezoidal rule when the jerk keeps its limit.
-            && gained.abs() <= jerk * period * period / 4.0 + SMALL
-            && moved.abs() <= jerk * period * period * period / 12.0 + SMALL
+            && self.keeps_jerk(from, next, period)
             && self.keeps_acceleration(from, next, period)
             && self.stays_below(next, AT_END)
             && self.stays_above(next, AT_END)
+    }
+
+    /// Whether a motion within the jerk limit leads from one to the other in a period (s): then differences of positions
+    /// keep it too. `u` is the share of the jerk between its limits over the time of the period, both from 0 to 1; its
+    /// moments are those that the change of acceleration, velocity and position ask for.
+    ///
+    /// # Source
+    /// Moments of a density between 0 and 1 (A. A. Markov): M. G. Krein, A. A. Nudelman, "The Markov moment problem and
+    /// extremal problems", 1977; with the first two given, the third is least for an interval and largest for
+    /// the rest of one.
+    fn keeps_jerk(&self, from: &Reference, next: &Reference, period: f64) -> bool {
+        let jerk = self.jerk * (1.0 + ROUNDING);
+        let gained = next.acceleration - from.acceleration;
+        let sped = next.velocity - from.velocity - from.acceleration * period;
+        let halfway = from.velocity + from.acceleration * period / 2.0;
+        let moved = next.position - from.position - halfway * period;
+        let per_period = jerk * period;
+        let zeroth = (gained / per_period + 1.0) / 2.0;
+        let first = zeroth - (sped / (per_period * period) + 0.5) / 2.0;
+        let last = moved / (per_period * period * period) + 1.0 / 6.0;
+        let second = last - zeroth + 2.0 * first;
+        // An interval of that length and centre, if it fits into the period.
+        let least = |zeroth: f64, first: f64| {
+            let wide = zeroth.clamp(0.0, 1.0);
+            let centre = if wide > TINY { first / wide } else { 0.5 };
+            let fits = (centre - 0.5).abs() <= (1.0 - wide) / 2.0 + TINY;
+            fits.then_some(wide * (centre * centre + wide * wide / 12.0))
+        };
+        let most = least(1.0 - zeroth, 0.5 - first).map(|rest| 1.0 / 3.0 - rest);
+        let room = TINY + ROUNDED / (per_period * period * period);
+        let inside = -room <= zeroth && zeroth <= 1.0 + room;
+        inside
+            && least(zeroth, first).is_some_and(|least| second >= least - room)
+            && most.is_some_and(|most| second <= most + room)
     }
 
     /// Whether the acceleration limit holds within the period too, so that differences of positions keep

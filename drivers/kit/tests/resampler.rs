@@ -186,6 +186,33 @@ fn clocks_that_differ_by_a_hundredth() {
     }
 }
 
+/// References near the jerk limit whose positions waver a little, as those at a changing pace do, are not passed on as
+/// they are: the third differences of the commands keep the limit.
+#[test]
+fn references_that_waver_keep_the_jerk() {
+    const LEAST: f64 = 1000.0;
+    // A swing with 0.9 of it.
+    let (size, speed) = (9e-4, 100.0_f64);
+    let mut resampler = resampler_with([SPEED, ACCELERATION, LEAST]);
+    resampler.begin(&[0.0]);
+    let (mut peak, mut p) = (0.0_f64, [0.0; 4]);
+    for period in 0..6_000_u64 {
+        let (sin, cos) = (speed * period as f64 * PERIOD).sin_cos();
+        let sign = if period % 2 == 0 { 1.0 } else { -1.0 };
+        let reference = Reference {
+            position: size * sin + sign * LEAST * PERIOD.powi(3) / 26.0,
+            velocity: size * speed * cos,
+            acceleration: -size * speed * speed * sin,
+        };
+        resampler.push(period * 1_000_000, &[reference]);
+        p = [p[1], p[2], p[3], resampler.next(PERIOD)[0].position];
+        let jerk = (p[3] - p[0] + 3.0 * (p[1] - p[2])) / PERIOD.powi(3);
+        peak = peak.max(jerk.abs() / LEAST);
+    }
+    println!("{peak:.4} of the jerk");
+    assert!(peak > 0.9 && peak < 1.002, "{peak}");
+}
+
 /// The million periods of the acceptance: every trouble at once.
 #[test]
 fn a_million_periods_of_every_trouble() {
@@ -240,6 +267,11 @@ fn resampler() -> Resampler {
 
 /// With a share of the maker's limits.
 fn resampler_of(share: f64) -> Resampler {
+    resampler_with([SPEED, ACCELERATION, JERK].map(|limit| limit * share))
+}
+
+/// With these limits of speed, acceleration and jerk.
+fn resampler_with([speed, acceleration, jerk]: [f64; 3]) -> Resampler {
     let about = About {
         lower: vec![-1.5],
         upper: vec![1.5],
@@ -251,9 +283,9 @@ fn resampler_of(share: f64) -> Resampler {
     let options = ResamplerOptions {
         delay: DELAY,
         period: PERIOD,
-        velocity: vec![SPEED * share],
-        acceleration: vec![ACCELERATION * share],
-        jerk: vec![JERK * share],
+        velocity: vec![speed],
+        acceleration: vec![acceleration],
+        jerk: vec![jerk],
     };
     Resampler::new(&about, options).unwrap()
 }
