@@ -118,7 +118,10 @@ const FENCES: [(&str, &[&str]); 20] = [
             "driver-cia402",
         ],
     ),
-    ("libc", &["ipc", "scheduling", "driver-cia402"]),
+    (
+        "libc",
+        &["ipc", "scheduling", "driver-cia402", "driver-franka"],
+    ),
     ("ethercrab", &["driver-cia402"]),
 ];
 
