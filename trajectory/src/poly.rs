@@ -28,15 +28,7 @@ pub(crate) fn bernstein<T, const M: usize>(power: &[T; M], from: f64, to: f64) -
 where
     T: Copy + Add<Output = T> + Mul<f64, Output = T>,
 {
-    let mut shifted = *power;
-    // Taylor shift to `from` by repeated synthetic division.
-    if from != 0.0 {
-        for low in 0..M.saturating_sub(1) {
-            for k in (low..M - 1).rev() {
-                shifted[k] = shifted[k] + shifted[k + 1] * from;
-            }
-        }
-    }
+    let mut shifted = shifted(power, from);
     let (mut scale, degree) = (1.0, M - 1);
     for (k, value) in shifted.iter_mut().enumerate() {
         *value = *value * (scale / CHOOSE[degree][k]);
@@ -50,6 +42,22 @@ where
         }
     }
     result
+}
+
+/// Power form of the polynomial at `from + t`: Taylor shift by repeated synthetic division.
+pub(crate) fn shifted<T, const M: usize>(power: &[T; M], from: f64) -> [T; M]
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let mut shifted = *power;
+    if from != 0.0 {
+        for low in 0..M.saturating_sub(1) {
+            for k in (low..M - 1).rev() {
+                shifted[k] = shifted[k] + shifted[k + 1] * from;
+            }
+        }
+    }
+    shifted
 }
 
 /// Power form of the polynomial at `end - t`.

@@ -11,6 +11,7 @@ use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
+use crate::ToolPoint;
 
 /// Effort of one spline: a time within 0.1 % of the optimum.
 const EFFORT: Effort = Effort {
@@ -49,6 +50,8 @@ pub(crate) struct Window<'a> {
     pub(crate) options: &'a SmoothOptions,
     /// State at the start; `None` at rest in the first pose.
     pub(crate) moving: Option<&'a Moving>,
+    /// State at the end, before the last pose; `None` at rest in the last pose.
+    pub(crate) finish: Option<&'a ToolPoint>,
     /// What comes after it.
     pub(crate) then: Then,
 }
@@ -119,6 +122,7 @@ impl<'a> Window<'a> {
             poses,
             options,
             moving: None,
+            finish: None,
             then,
         }
     }
@@ -158,6 +162,7 @@ impl Attempts<'_> {
             poses,
             options,
             moving,
+            finish,
             then,
         } = self.window;
         for attempt in 0..5_usize {
@@ -166,6 +171,7 @@ impl Attempts<'_> {
                 poses,
                 options: &narrowed,
                 moving,
+                finish,
                 effort: self.effort,
                 coupled: false,
                 known: self.known,

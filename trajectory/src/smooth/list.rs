@@ -9,8 +9,9 @@ use super::motion::Motion;
 use super::normal_form::NormalForm;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
+use super::rest::RestCause;
 use super::windows::Windows;
-use super::{dense, exact_stop};
+use super::{bridge, dense, exact_stop};
 
 /// Plans a motion from the first pose to the last that passes those between in
 /// order, each within tolerance: the fastest motion that is certified.
@@ -94,7 +95,7 @@ impl<'a> List<'a> {
     fn fitted(&self, form: &NormalForm) -> Option<Fit> {
         let fit = |form: &NormalForm| {
             let motion = dense::plan(&form.poses, &form.options)?;
-            let eased = motion.eased;
+            let eased = motion.eased || !motion.rests.is_empty();
             let plan = self.certified(form, motion)?;
             Some(Fit { plan, eased })
         };
@@ -106,7 +107,9 @@ impl<'a> List<'a> {
         match (first, other) {
             (Some(first), Some(other)) => {
                 let better = other.plan.duration() < first.plan.duration();
-                Some(if better { other } else { first })
+                let eased = if better { other.eased } else { first.eased };
+                let plan = faster(Some(first.plan), Some(other.plan))?;
+                Some(Fit { plan, eased })
             }
             (first, other) => first.or(other),
         }
@@ -149,7 +152,12 @@ impl<'a> List<'a> {
         }
         let mut half = form.options.clone();
         half.tolerance *= 0.5;
-        faster(Some(plan), self.by_windows(form, &half))
+        let before = plan.before;
+        let mut best = faster(Some(plan), self.by_windows(form, &half))?;
+        if before.1 {
+            best.before = before;
+        }
+        Some(best)
     }
 
     /// The same under options of the form, once.
@@ -158,8 +166,26 @@ impl<'a> List<'a> {
         self.certified(form, windows.motion())
     }
 
-    /// A motion through the normal form as a plan for the list, if its certificate holds.
+    /// A motion through the normal form as a plan for the list, past its rests as far as one is found that is
+    /// certified, if its certificate holds.
     fn certified(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
+        let mut rests = motion.rests.iter();
+        let divided = rests.any(|rest| rest.cause != RestCause::TurnsBack);
+        let before = (motion.duration(), divided);
+        let bridged = if motion.rests.is_empty() {
+            None
+        } else {
+            bridge::bridged(&motion, &form.poses, &form.options)
+        };
+        let mut plan = bridged
+            .and_then(|motion| self.placed(form, motion))
+            .or_else(|| self.placed(form, motion))?;
+        plan.before = before;
+        Some(plan)
+    }
+
+    /// A motion through the normal form, laid back, if its certificate holds.
+    fn placed(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
         let motion = form.place(motion);
         let whole = certify(&motion.spans, self.poses, self.options);
         let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
@@ -195,11 +221,18 @@ fn within(options: &SmoothOptions, share: f64) -> SmoothOptions {
 
 /// The faster of two plans, the first if they are equal.
 fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<SmoothPlan> {
-    match (first, second) {
-        (Some(first), Some(second)) if second.duration() < first.duration() => Some(second),
-        (Some(first), _) => Some(first),
-        (None, second) => second,
-    }
+    let (mut first, mut second) = match (first, second) {
+        (Some(first), Some(second)) => (first, second),
+        (first, second) => return first.or(second),
+    };
+    let later = second.before.0 < first.before.0;
+    let before = if later { second.before } else { first.before };
+    (first.before, second.before) = (before, before);
+    Some(if second.duration() < first.duration() {
+        second
+    } else {
+        first
+    })
 }
 
 /// Shares of the tolerance within which a list is planned that rests within all of it.
@@ -214,7 +247,6 @@ const SPANS_PER_POSE: usize = 24;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smooth::RestCause;
     use crate::{ToolCurve, ToolLimits};
     use nalgebra::{UnitQuaternion, Vector3};
 

@@ -12,6 +12,7 @@
 //! timing stretches time, which does not change the geometry.
 
 mod approach;
+mod bridge;
 mod certificate;
 mod choose;
 mod crossing;

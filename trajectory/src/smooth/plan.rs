@@ -6,7 +6,7 @@ use super::certificate::Certificate;
 use super::crossing::Crossing;
 use super::method::Method;
 use super::motion::Motion;
-use super::rest::{Rest, RestCause};
+use super::rest::Rest;
 use super::span::Span;
 use crate::{ToolCurve, ToolPoint};
 
@@ -25,6 +25,9 @@ pub struct SmoothPlan {
     pub(super) parts: Vec<(Method, usize)>,
     rests: Vec<Rest>,
     exact_stop: f64,
+    /// Of the fastest of the motions that were tried, before their rests were bridged: its time (s), and
+    /// whether it rested elsewhere than where the way turns back.
+    pub(super) before: (f64, bool),
 }
 
 impl SmoothPlan {
@@ -46,6 +49,7 @@ impl SmoothPlan {
             parts: motion.parts,
             rests: motion.rests,
             exact_stop,
+            before: (0.0, false),
         }
     }
 
@@ -95,10 +99,10 @@ impl SmoothPlan {
         self.rests.len()
     }
 
-    /// Whether it rests elsewhere than where the way turns back.
+    /// Whether it rests elsewhere than where the way turns back, or did before its rests were bridged: then
+    /// another way of planning may be faster.
     pub(super) fn is_divided(&self) -> bool {
-        let mut rests = self.rests.iter();
-        rests.any(|rest| rest.cause != RestCause::TurnsBack)
+        self.before.1
     }
 
     /// Time the motion would take with a stop at each pose, s.

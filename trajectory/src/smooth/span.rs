@@ -46,6 +46,23 @@ impl Span {
         self.base = frame.rotation * self.base;
     }
 
+    /// The part from one time of the motion to another (s), both inside; it starts at the time 0.
+    pub(crate) fn part(&self, from: f64, to: f64) -> Self {
+        let (from, to) = (from.max(self.start), to.min(self.end()));
+        let local = from - self.start;
+        let turns = self.turns.iter().map(|turn| Turn {
+            axis: turn.axis,
+            angle: poly::shifted(&turn.angle, local),
+        });
+        Self {
+            start: 0.0,
+            duration: to - from,
+            point: poly::shifted(&self.point, local),
+            base: self.base,
+            turns: turns.collect(),
+        }
+    }
+
     /// The same way from its end to its start, in a motion of `total` (s).
     pub(crate) fn reversed(&self, total: f64) -> Self {
         let turns = self.turns.iter().map(|turn| Turn {
@@ -190,6 +207,25 @@ mod tests {
             frame * span.at(0.7).pose,
             epsilon = 1e-12
         );
+    }
+
+    /// A part of a span is the same motion, from the time 0 on.
+    #[test]
+    fn part_is_the_same_motion() {
+        let span = span();
+        let part = span.part(1.5, 2.2);
+        assert_relative_eq!(part.duration, 0.7, epsilon = 1e-15);
+        assert_eq!(part.start, 0.0);
+        for t in [0.0, 0.3, 0.7] {
+            let (here, there) = (part.at(t), span.at(0.5 + t));
+            assert_relative_eq!(here.pose, there.pose, epsilon = 1e-12);
+            for k in 0..3 {
+                assert_relative_eq!(here.linear[k], there.linear[k], epsilon = 1e-12);
+                assert_relative_eq!(here.angular[k], there.angular[k], epsilon = 1e-12);
+            }
+        }
+        // Not beyond its ends.
+        assert_relative_eq!(span.part(0.0, 9.0).duration, 2.0, epsilon = 1e-15);
     }
 
     /// The control forms interpolate the motion at the ends of any interval.

@@ -221,6 +221,7 @@ impl Windows {
             poses: &self.poses[self.passed..=end],
             options,
             moving: moving.as_ref(),
+            finish: None,
             then,
         };
         let most = self.tail.duration() + corners(more, options).duration();

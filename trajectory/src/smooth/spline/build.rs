@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::basis::{self, START};
+use super::basis;
+use super::ends::{correct, rolled, rotations};
 use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
 use super::solve::{Effort, solve};
@@ -21,6 +22,12 @@ const CORRIDOR: f64 = 0.98;
 /// Fraction of the angular limits that is used; the rest is for rotations about changing axes.
 const ANGULAR: f64 = 0.985;
 
+/// Bound of an angular rate at an end in motion over its value there.
+const AT_END: f64 = 1.0 + 1e-5;
+
+/// Control points over which the difference of an orientation in motion fades out.
+const FADE: f64 = 12.0;
+
 /// A start in motion: state and knot spacing of the motion it continues.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moving {
@@ -36,6 +43,9 @@ pub(crate) struct Request<'a> {
     pub(crate) options: &'a SmoothOptions,
     /// State at the start; `None` at rest in the first pose.
     pub(crate) moving: Option<&'a Moving>,
+    /// State at the end, between the last pose but one and the last; `None` at rest in the last pose. Only
+    /// with a start in motion and a motion that is known.
+    pub(crate) finish: Option<&'a ToolPoint>,
     pub(crate) effort: Effort,
     /// True: the orientation is part of the optimum. False: it follows the
     /// progress of the controlled point, which is faster to plan.
@@ -144,8 +154,9 @@ impl Task<'_> {
             limits.angular_acceleration.min(bound * limits.acceleration),
             limits.angular_jerk.min(bound * limits.jerk),
         ];
+        let shares = self.angular_shares();
         let turn = Group {
-            caps: caps.map(|c| c * ANGULAR),
+            caps: [0, 1, 2].map(|k| caps[k] * shares[k]),
             radius: INSIDE * turn,
             width: turn,
         };
@@ -154,6 +165,25 @@ impl Task<'_> {
         } else {
             [turn, place]
         }
+    }
+
+    /// Fractions of angular speed, acceleration and jerk in use: not less than both ends in motion have.
+    fn angular_shares(&self) -> [f64; 3] {
+        let (limits, mut shares) = (&self.options.limits, [ANGULAR; 3]);
+        let caps = [
+            limits.angular_speed,
+            limits.angular_acceleration,
+            limits.angular_jerk,
+        ];
+        let Some((moving, finish)) = self.moving.zip(self.request.finish) else {
+            return shares;
+        };
+        for state in [&moving.state, finish] {
+            for (share, (rate, cap)) in shares.iter_mut().zip(state.angular.iter().zip(caps)) {
+                *share = share.max(AT_END * rate.norm() / cap).min(1.0);
+            }
+        }
+        shares
     }
 
     /// Rotation per distance (rad/m) that no part of the motion needs to exceed by much: keeps the
@@ -177,7 +207,7 @@ impl Task<'_> {
             .collect();
         let mut begin = [vertices[0], [0.0; D], [0.0; D], [0.0; D]];
         if let Some(moving) = self.moving {
-            let virtual_turn = virtual_start(moving, moving.spacing);
+            let virtual_turn = rolled(&moving.state, moving.spacing);
             let offset = body_turn(&self.poses[0].rotation, &moving.state.pose.rotation);
             let state = &moving.state;
             begin[0] = self.pack(
@@ -189,7 +219,9 @@ impl Task<'_> {
                 begin[k + 1] = self.pack(used, &state.linear[k], &virtual_turn[k + 1]);
             }
         }
+        let finish = self.request.finish;
         let mut problem = Problem {
+            finish: None,
             groups: self.groups(used),
             ways: ways(&vertices),
             vertices,
@@ -197,6 +229,10 @@ impl Task<'_> {
             scale: 1.0,
             anchor: None,
         };
+        if let Some(moving) = self.moving {
+            let spacing = moving.spacing;
+            problem.finish = finish.map(|finish| self.end(used, finish, spacing));
+        }
         let mut effort = self.request.effort;
         let mut point = match self.request.known {
             Some(spans) => {
@@ -220,11 +256,14 @@ impl Task<'_> {
         used: [bool; 2],
     ) -> Point<D> {
         let known = Known::new(spans, self.poses, &self.vectors, self.options);
-        problem.scale = match self.moving {
-            Some(moving) => moving.spacing,
-            None => known.spacing(problem),
+        let finish = self.request.finish;
+        problem.scale = match (self.moving, finish) {
+            (Some(moving), Some(_)) => known.even(moving.spacing),
+            (Some(moving), None) => moving.spacing,
+            (None, _) => known.spacing(problem),
         };
-        let (control, crossings) = known.control(problem.scale, self.moving.is_some());
+        let ends = [self.moving.is_some(), finish.is_some()];
+        let (control, crossings) = known.control(problem.scale, ends);
         let control = control.iter().map(|[p, r]| self.pack(used, p, r));
         let mut point = Point {
             control: control.collect(),
@@ -302,7 +341,7 @@ impl Task<'_> {
             Vector3::new(c[first], c[first + 1], c[first + 2])
         };
         let mut result = match self.moving {
-            Some(moving) => start_rotations(moving, h),
+            Some(moving) => rotations(&moving.state, h),
             None => [self.poses[0].rotation; 4],
         }
         .to_vec();
@@ -313,18 +352,20 @@ impl Task<'_> {
         let mut from = 3;
         let mut anchors = anchors(problem, point);
         anchors.push((knots - 4, self.poses.len() - 1));
+        let end = match self.request.finish {
+            Some(finish) => rotations(finish, h),
+            None => [self.poses[self.poses.len() - 1].rotation; 4],
+        };
         for (to, leg) in anchors {
             let target = if to == knots - 4 {
-                self.poses[self.poses.len() - 1].rotation
+                end[0]
             } else {
                 self.on_leg(&vector(to), leg)
             };
             correct(&mut result, from, to, &target);
             from = to;
         }
-        for rotation in result.iter_mut().skip(knots - 4) {
-            *rotation = self.poses[self.poses.len() - 1].rotation;
-        }
+        result[knots - 4..].copy_from_slice(&end);
         result
     }
 
@@ -350,15 +391,41 @@ impl Task<'_> {
             return result;
         };
         // The orientations of the start differ only slightly: the difference fades out.
-        let begin = start_rotations(moving, h);
+        let begin = rotations(&moving.state, h);
         let drift = body_turn(&result[3], &begin[3]);
         for (k, rotation) in result.iter_mut().enumerate() {
-            let x = (k.max(3) - 3) as f64 / 12.0_f64.min(point.control.len() as f64 - 8.0).max(1.0);
+            let x = (k.max(3) - 3) as f64 / FADE.min(point.control.len() as f64 - 8.0).max(1.0);
             let left = (1.0 - x).max(0.0).powi(3);
             *rotation *= UnitQuaternion::from_scaled_axis(drift * left);
         }
         result[..4].copy_from_slice(&begin);
+        if let Some(finish) = self.request.finish {
+            let end = rotations(finish, h);
+            let last = result.len() - 4;
+            let drift = body_turn(&result[last], &end[0]);
+            for (k, rotation) in result.iter_mut().enumerate().take(last) {
+                let x = (last - k) as f64 / FADE.min(last as f64 - 4.0).max(1.0);
+                let left = (1.0 - x).max(0.0).powi(3);
+                *rotation *= UnitQuaternion::from_scaled_axis(drift * left);
+            }
+            result[last..].copy_from_slice(&end);
+        }
         result
+    }
+
+    /// Position, velocity, acceleration and jerk of an end in motion, at knot spacing `h`.
+    fn end<const D: usize>(&self, used: [bool; 2], state: &ToolPoint, h: f64) -> [[f64; D]; 4] {
+        // The pose that is passed last.
+        let last = self.poses.len() - 2;
+        let offset = body_turn(&self.poses[last].rotation, &state.pose.rotation);
+        let turn = rolled(state, h);
+        let place = &state.pose.translation.vector;
+        let mut end = [[0.0; D]; 4];
+        end[0] = self.pack(used, place, &(self.vectors[last] + offset + turn[0]));
+        for k in 0..3 {
+            end[k + 1] = self.pack(used, &state.linear[k], &turn[k + 1]);
+        }
+        end
     }
 
     /// Orientation of a rotation vector near a leg.
@@ -402,28 +469,6 @@ fn anchors<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Vec<(usize
     result
 }
 
-/// Turns the control orientations after `from` so that the one at `to` becomes
-/// `target`, smoothly; those after `to` follow.
-fn correct(
-    rotations: &mut [UnitQuaternion<f64>],
-    from: usize,
-    to: usize,
-    target: &UnitQuaternion<f64>,
-) {
-    let drift = body_turn(&rotations[to], target);
-    let was = rotations[to];
-    for k in from + 1..=to {
-        let x = (k - from) as f64 / (to - from) as f64;
-        let share = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
-        rotations[k] *= UnitQuaternion::from_scaled_axis(drift * share);
-    }
-    let follow = rotations[to] * was.inverse();
-    for rotation in rotations.iter_mut().skip(to + 1) {
-        // Products of many unit quaternions drift in length.
-        *rotation = UnitQuaternion::new_normalize((follow * *rotation).into_inner());
-    }
-}
-
 /// The four factors of a span of five control orientations: the cumulative form of the basis.
 ///
 /// # Source
@@ -439,61 +484,6 @@ pub(crate) fn turns(control: &[UnitQuaternion<f64>], h: f64) -> Vec<Turn> {
             axis,
             angle: basis::power(&sums, h),
         });
-    }
-    result
-}
-
-/// Position, velocity, acceleration and jerk of the rolled-out rotation vector
-/// (axes of the tool) whose spline starts with exactly the given motion.
-///
-/// Products of turns are not sums of vectors; the difference is of second
-/// order in the turn over one knot, so correcting it repeatedly converges.
-fn virtual_start(moving: &Moving, h: f64) -> [Vector3<f64>; 4] {
-    let state = &moving.state;
-    let back = state.pose.rotation.inverse();
-    let [w, a, j] = state.angular.map(|x| back * x);
-    let mut result = [Vector3::zeros(), w, a, j - w.cross(&a)];
-    if w.norm() + a.norm() + j.norm() < 1e-15 {
-        return result;
-    }
-    for _ in 0..40 {
-        let control = roll(&state.pose.rotation, &result, h);
-        let span = Span {
-            start: 0.0,
-            duration: h,
-            point: [Vector3::zeros(); 5],
-            base: control[0],
-            turns: turns(
-                &[control[0], control[1], control[2], control[3], control[3]],
-                h,
-            ),
-        };
-        let got = span.at(0.0);
-        result[0] += body_turn(&got.pose.rotation, &state.pose.rotation);
-        for k in 0..3 {
-            result[k + 1] += back * (state.angular[k] - got.angular[k]);
-        }
-    }
-    result
-}
-
-/// The four control orientations of a start in motion at knot spacing `h`.
-fn start_rotations(moving: &Moving, h: f64) -> [UnitQuaternion<f64>; 4] {
-    roll(&moving.state.pose.rotation, &virtual_start(moving, h), h)
-}
-
-/// Control orientations of a rolled-out motion.
-fn roll(
-    base: &UnitQuaternion<f64>,
-    motion: &[Vector3<f64>; 4],
-    h: f64,
-) -> [UnitQuaternion<f64>; 4] {
-    let vector = START.map(|w| {
-        motion[0] + (motion[1] * w[0] + (motion[2] * w[1] + motion[3] * (w[2] * h)) * h) * h
-    });
-    let mut result = [*base * UnitQuaternion::from_scaled_axis(vector[0]); 4];
-    for k in 1..4 {
-        result[k] = result[k - 1] * UnitQuaternion::from_scaled_axis(vector[k] - vector[k - 1]);
     }
     result
 }

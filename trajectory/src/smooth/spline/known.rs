@@ -27,6 +27,17 @@ const FALL: f64 = 0.3;
 /// free acts.
 const LEAD: f64 = 1.5;
 
+/// Control points from either end over which that of an end in motion passes into the places.
+const FADE: f64 = 16.0;
+
+/// Around a corner that is left at rest with jerk J the average over w is `J w^3 / 96` away at most: a factor of
+/// 38 is 0.4 of the tolerance.
+const EASE: f64 = 38.0;
+/// Share of the greatest speed that counts as a rest.
+const STILL: f64 = 1e-6;
+/// Samples of an average.
+const PARTS: u32 = 8;
+
 /// A known motion, sampled for the control points of a spline.
 #[derive(Clone, Debug)]
 pub(super) struct Known<'a> {
@@ -36,6 +47,10 @@ pub(super) struct Known<'a> {
     vectors: &'a [Vector3<f64>],
     /// Time at which it passes each inner pose, s.
     times: Vec<f64>,
+    /// Width of the average around a rest, s.
+    ease: f64,
+    /// Times at which it rests, s.
+    rests: Vec<f64>,
 }
 
 impl<'a> Known<'a> {
@@ -47,7 +62,22 @@ impl<'a> Known<'a> {
         options: &SmoothOptions,
     ) -> Self {
         let passes = crossings(spans, poses, options);
+        let limits = &options.limits;
+        let place = options.tolerance.min(options.corridor()) / limits.jerk;
+        let turn = options.angular_tolerance() / limits.angular_jerk;
+        let slow = |span: &&Span| {
+            let state = span.at(0.0);
+            let turning = state.angular[0].norm() > STILL * limits.angular_speed;
+            state.linear[0].norm() <= STILL * limits.speed && !turning
+        };
         Self {
+            rests: spans
+                .iter()
+                .skip(1)
+                .filter(slow)
+                .map(|span| span.start)
+                .collect(),
+            ease: (EASE * place.min(turn)).cbrt(),
             spans,
             poses,
             vectors,
@@ -73,11 +103,23 @@ impl<'a> Known<'a> {
 
     /// Position and unrolled rotation vector of each control point at a knot spacing (s), and when
     /// each inner pose is passed, in knots.
-    pub(super) fn control(&self, spacing: f64, moving: bool) -> (Vec<[Vector3<f64>; 2]>, Vec<f64>) {
+    pub(super) fn control(
+        &self,
+        spacing: f64,
+        [moving, onwards]: [bool; 2],
+    ) -> (Vec<[Vector3<f64>; 2]>, Vec<f64>) {
         let lead = if moving { 0.0 } else { LEAD };
-        let follow = |time: f64| if moving { self.slower(time) } else { time };
+        let follow = |time: f64| match [moving, onwards] {
+            [true, true] => self.between(time),
+            [true, false] => self.slower(time),
+            _ => time,
+        };
         let total = self.after(self.duration(), &follow);
-        let knots = (total / spacing + lead + LEAD).ceil().max(FEWEST) as usize + 4;
+        let knots = if onwards {
+            (self.slowest() / spacing).round() as usize + 4
+        } else {
+            (total / spacing + lead + LEAD).ceil().max(FEWEST) as usize + 4
+        };
         let mut leg = 0;
         let mut control = Vec::with_capacity(knots);
         for k in 0..knots {
@@ -85,9 +127,11 @@ impl<'a> Known<'a> {
             while leg < self.times.len() && self.times[leg] <= time {
                 leg += 1;
             }
-            let (point, rotation) = self.at(time);
-            let turn = body_turn(&self.poses[leg].rotation, &rotation);
-            control.push([point, self.vectors[leg] + turn]);
+            let width = if onwards { self.width(time) } else { 0.0 };
+            control.push(self.mean(time, width, leg));
+        }
+        if onwards {
+            join(&mut control);
         }
         let end = (knots - 4) as f64;
         let pass = |time: &f64| (self.after(*time, &follow) / spacing + lead).min(end);
@@ -101,6 +145,28 @@ impl<'a> Known<'a> {
         // The integral of the smooth step 3 x^2 - 2 x^3.
         let slow = fall * x * x * x * (1.0 - 0.5 * x) + (time - fall).max(0.0);
         time - (1.0 - RATE) * slow
+    }
+
+    /// Time that a motion takes which starts and ends in motion, s: the rate falls and rises again.
+    fn slowest(&self) -> f64 {
+        let total = self.duration();
+        (total - (1.0 - RATE) * FALL * total) / RATE
+    }
+
+    /// Knot spacing, s, near the one that is wanted, of a spline that starts and ends in motion.
+    pub(super) fn even(&self, wanted: f64) -> f64 {
+        let total = self.slowest();
+        total / (total / wanted).ceil().clamp(FEWEST, MOST)
+    }
+
+    /// Time of the motion that is followed after a time, from motion to motion.
+    fn between(&self, time: f64) -> f64 {
+        let whole = self.slowest();
+        if time < 0.5 * whole {
+            self.slower(time)
+        } else {
+            self.duration() - self.slower(whole - time)
+        }
     }
 
     /// When a time of the motion is reached.
@@ -117,6 +183,30 @@ impl<'a> Known<'a> {
         high
     }
 
+    /// Place and rotation vector on leg `leg + 1`, averaged over `width` (s) around a time.
+    fn mean(&self, time: f64, width: f64, leg: usize) -> [Vector3<f64>; 2] {
+        let parts = if width > 0.0 { PARTS } else { 1 };
+        let share = 1.0 / f64::from(parts);
+        let mut sum = [Vector3::zeros(); 2];
+        for part in 0..parts {
+            let off = width * ((f64::from(part) + 0.5) * share - 0.5);
+            let (point, rotation) = self.at(time + off);
+            let turn = body_turn(&self.poses[leg].rotation, &rotation);
+            sum[0] += point * share;
+            sum[1] += (self.vectors[leg] + turn) * share;
+        }
+        sum
+    }
+
+    /// Width of the average at a time, s: what rests would pass a pose at no speed, and a search there does
+    /// not know when it is passed. So around a rest the motion is averaged over as much of it as the
+    /// tolerance allows.
+    fn width(&self, time: f64) -> f64 {
+        let near = self.rests.iter().map(|rest| (rest - time).abs());
+        let off = near.fold(f64::INFINITY, f64::min);
+        (self.ease - 0.5 * off).max(0.0)
+    }
+
     /// Place and orientation at a time; those of the ends before and after.
     fn at(&self, time: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
         let next = self.spans.partition_point(|span| span.start <= time);
@@ -125,5 +215,21 @@ impl<'a> Known<'a> {
         };
         let local = (time - span.start).clamp(0.0, span.duration);
         (span.motion(local)[0], span.rotation(local))
+    }
+}
+
+/// Moves the places near both ends to where control points are that reproduce cubics, as those are that the
+/// ends fix: away from a place by 5/24 of its second difference.
+fn join(control: &mut [[Vector3<f64>; 2]]) {
+    let last = control.len() - 1;
+    let fade = FADE.min(last as f64 / 3.0);
+    let places = control.to_vec();
+    for k in 1..last {
+        let x = ((k.min(last - k) as f64 - 4.0) / fade).clamp(0.0, 1.0);
+        let share = 1.0 - x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
+        for (g, place) in control[k].iter_mut().enumerate() {
+            let bend = places[k - 1][g] - places[k][g] * 2.0 + places[k + 1][g];
+            *place -= bend * (5.0 / 24.0 * share);
+        }
     }
 }

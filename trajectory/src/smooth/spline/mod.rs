@@ -9,6 +9,7 @@
 mod band;
 mod basis;
 mod build;
+mod ends;
 mod known;
 mod newton;
 mod problem;
@@ -20,3 +21,4 @@ pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
 pub(crate) use build::{Moving, Request, plan, turns};
 pub(crate) use solve::Effort;
+pub(crate) use start::KNOTS_PER_RAMP;

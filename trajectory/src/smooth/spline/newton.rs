@@ -25,7 +25,7 @@ pub(crate) struct Step {
 
 /// Fraction of each slack that a step must leave: an iterate too close to a constraint then moves
 /// only slowly along it, since norms are curved.
-const KEEP: f64 = 0.02;
+pub(crate) const KEEP: f64 = 0.02;
 
 /// Product of slacks, as shares of their bounds, with rare logarithms.
 struct Slacks<'a> {
@@ -33,6 +33,8 @@ struct Slacks<'a> {
     sum: f64,
     /// Slacks before the step; none when empty.
     before: &'a [f64],
+    /// Share of each that has to be left.
+    keep: f64,
     seen: &'a mut Vec<f64>,
 }
 
@@ -40,7 +42,10 @@ impl Slacks<'_> {
     /// Adds the slack of `square <= bound`; false if too little is left.
     fn take(&mut self, square: f64, bound: f64) -> bool {
         let slack = 1.0 - square / bound;
-        let least = self.before.get(self.seen.len()).map_or(0.0, |s| KEEP * s);
+        let least = self
+            .before
+            .get(self.seen.len())
+            .map_or(0.0, |s| self.keep * s);
         if slack <= least || slack.is_nan() {
             return false;
         }
@@ -60,6 +65,8 @@ pub(crate) struct Barrier<'a, const D: usize> {
     pub(crate) problem: &'a Problem<D>,
     pub(crate) room: &'a Room,
     pub(crate) weight: f64,
+    /// Share of each slack that a step must leave.
+    pub(crate) keep: f64,
 }
 
 impl<const D: usize> Barrier<'_, D> {
@@ -76,6 +83,7 @@ impl<const D: usize> Barrier<'_, D> {
             product: 1.0,
             sum: 0.0,
             before,
+            keep: self.keep,
             seen,
         };
         let mut bounds = 0.0;
@@ -151,16 +159,17 @@ impl<const D: usize, const B: usize> System<D, B> {
             point,
             room,
             pinned: problem.pinned(point.z),
+            slides: problem.slides(point),
         };
         Build::detect().run(Norms {
             system: self,
             at: &at,
         });
-        self.balls(problem, point, room);
-        self.solve()
+        self.balls(&at);
+        self.solve(&at.slides)
     }
 
-    fn solve(&mut self) -> Option<Step> {
+    fn solve(&mut self, slides: &[[f64; D]]) -> Option<Step> {
         if !self.band.factor() {
             return None;
         }
@@ -186,6 +195,9 @@ impl<const D: usize, const B: usize> System<D, B> {
             let step = -along - border * z;
             slope += side[0] * step;
             control.push(step);
+        }
+        for (step, slide) in control.iter_mut().zip(slides.iter().skip(4).flatten()) {
+            *step += slide * z;
         }
         (slope < 0.0 && slope.is_finite()).then_some(Step {
             control,
@@ -228,14 +240,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         let mut border = y.map(|x| x * cross);
         self.gradient_z -= 2.0 * r * r1 * slack;
         self.hessian_z += -2.0 * (r1 * r1 + r * r2) * slack + (2.0 * r * r1 * slack).powi(2);
-        if first < 4 {
-            // The pinned control points move with z.
-            let mut slide = [0.0; 3];
-            for (weight, pin) in w.iter().zip(&at.pinned[first..]) {
-                for d in 0..3 {
-                    slide[d] += weight * pin[1][3 * g + d];
-                }
-            }
+        if let Some(slide) = at.slide(sum) {
             for d in 0..3 {
                 let bent: f64 = (0..3).map(|e| hessian[d][e] * slide[e]).sum();
                 self.gradient_z += gradient[d] * slide[d];
@@ -264,7 +269,17 @@ impl<const D: usize, const B: usize> System<D, B> {
             }
             let (first, w) = sample_weights(k);
             let sum = Sum::new(first, w, g);
-            self.add(simd, &sum, [&gradient, &[0.0; 3]], &hessian);
+            let mut border = [0.0; 3];
+            if !at.slides.is_empty()
+                && let Some(slide) = at.slide(&sum)
+            {
+                for d in 0..3 {
+                    border[d] = (0..3).map(|e| hessian[d][e] * slide[e]).sum();
+                    self.gradient_z += gradient[d] * slide[d];
+                    self.hessian_z += slide[d] * border[d];
+                }
+            }
+            self.add(simd, &sum, [&gradient, &border], &hessian);
         }
     }
 
@@ -310,7 +325,8 @@ impl<const D: usize, const B: usize> System<D, B> {
 
     /// Balls, each at its closest approach: the passing time is eliminated, so there is no
     /// curvature in the direction of motion.
-    fn balls(&mut self, problem: &Problem<D>, point: &Point<D>, room: &Room) {
+    fn balls(&mut self, at: &Iterate<'_, D>) {
+        let (problem, point, room) = (at.problem, at.point, at.room);
         for (i, goal) in problem.inner().iter().enumerate() {
             let (span, share) = point.locate(point.crossings[i]);
             let w = weights(share);
@@ -339,7 +355,21 @@ impl<const D: usize, const B: usize> System<D, B> {
                     }
                 }
             }
-            self.add_ball(span, &w[0], &gradient, &hessian);
+            let mut border = [0.0; D];
+            if !at.slides.is_empty() {
+                let mut slide = [0.0; D];
+                for (weight, change) in w[0].iter().zip(&at.slides[span..]) {
+                    for d in 0..D {
+                        slide[d] += weight * change[d];
+                    }
+                }
+                for d in 0..D {
+                    border[d] = (0..D).map(|e| hessian[d][e] * slide[e]).sum();
+                    self.gradient_z += gradient[d] * slide[d];
+                    self.hessian_z += slide[d] * border[d];
+                }
+            }
+            self.add_ball(span, &w[0], [&gradient, &border], &hessian);
         }
     }
 
@@ -348,7 +378,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         &mut self,
         first: usize,
         w: &[f64; 5],
-        gradient: &[f64; D],
+        [gradient, border]: [&[f64; D]; 2],
         hessian: &[[f64; D]; D],
     ) {
         let free = self.sides.len() / D;
@@ -359,6 +389,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             let row = (first + i - 4) * D;
             for d in 0..D {
                 self.sides[row + d][0] += w[i] * gradient[d];
+                self.sides[row + d][1] += w[i] * border[d];
             }
             for j in 0..=i {
                 if first + j < 4 {
@@ -383,6 +414,34 @@ struct Iterate<'a, const D: usize> {
     room: &'a Room,
     /// The control points that the start fixes, and their derivatives to `z`.
     pinned: [[[f64; D]; 2]; 4],
+    /// How each control point moves with `z` if the end is in motion; empty if it rests.
+    slides: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Iterate<'_, D> {
+    /// How a sum of control points moves with `z`, if some of them are pinned.
+    #[inline(always)]
+    fn slide<const M: usize>(&self, sum: &Sum<'_, M>) -> Option<[f64; 3]> {
+        let Sum { first, w, g } = *sum;
+        let mut slide = [0.0; 3];
+        let mut add = |weight: f64, change: &[f64; D]| {
+            for d in 0..3 {
+                slide[d] += weight * change[3 * g + d];
+            }
+        };
+        if !self.slides.is_empty() {
+            for (weight, change) in w.iter().zip(&self.slides[first..]) {
+                add(*weight, change);
+            }
+        } else if first < 4 {
+            for (weight, pin) in w.iter().zip(&self.pinned[first..]) {
+                add(*weight, &pin[1]);
+            }
+        } else {
+            return None;
+        }
+        Some(slide)
+    }
 }
 
 /// A weighted sum of consecutive control points, of the coordinates of one group.

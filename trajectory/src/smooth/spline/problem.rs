@@ -30,6 +30,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) ways: [Vec<Way>; 2],
     /// Position, velocity, acceleration and jerk at the start.
     pub(crate) start: [[f64; D]; 4],
+    /// The same at the end; `None`: at rest in the last corner.
+    pub(crate) finish: Option<[[f64; D]; 4]>,
     /// Knot spacing at `z = 1`, s.
     pub(crate) scale: f64,
     /// While a first iterate from a start in motion breaks limits, its first control points stay
@@ -64,9 +66,10 @@ impl<const D: usize> Problem<D> {
     /// Number of groups.
     pub(crate) const GROUPS: usize = D / 3;
 
-    /// Whether the start is in motion.
+    /// Whether the start or the end is in motion.
     pub(crate) fn moving(&self) -> bool {
-        self.start[1..].iter().flatten().any(|x| *x != 0.0)
+        let start = self.start[1..].iter().flatten();
+        self.finish.is_some() || start.copied().any(|x| x != 0.0)
     }
 
     /// Knot spacing, s.
@@ -83,13 +86,42 @@ impl<const D: usize> Problem<D> {
 
     /// The first four control points at `z`, and their derivatives to `z`.
     pub(crate) fn pinned(&self, z: f64) -> [[[f64; D]; 2]; 4] {
+        self.around(&self.start, z)
+    }
+
+    /// The same of the last four, of an end in motion.
+    pub(crate) fn pinned_last(&self, z: f64) -> Option<[[[f64; D]; 2]; 4]> {
+        Some(self.around(self.finish.as_ref()?, z))
+    }
+
+    /// How each control point moves with `z` if the end is in motion: those that are fixed as they must, the
+    /// others so that no third difference changes by much. Empty if the end rests.
+    pub(crate) fn slides(&self, point: &Point<D>) -> Vec<[f64; D]> {
+        let Some(last) = self.pinned_last(point.z) else {
+            return Vec::new();
+        };
+        let first = self.pinned(point.z);
+        let count = point.control.len();
+        let spread = |pins: &[[[f64; D]; 2]; 4]| -> [f64; D] {
+            std::array::from_fn(|d| pins[2][1][d] - pins[1][1][d])
+        };
+        let mut slides = spreading([spread(&first), spread(&last)], count);
+        for k in 0..4 {
+            slides[k] = first[k][1];
+            slides[count - 4 + k] = last[k][1];
+        }
+        slides
+    }
+
+    /// The four control points around a state at `z`, and their derivatives to `z`.
+    fn around(&self, state: &[[f64; D]; 4], z: f64) -> [[[f64; D]; 2]; 4] {
         let h = self.spacing(self.anchor.unwrap_or(z));
         let slope = if self.anchor.is_some() {
             0.0
         } else {
             h / (3.0 * z)
         };
-        let [p, v, a, j] = &self.start;
+        let [p, v, a, j] = state;
         START.map(|w| {
             let (mut value, mut change) = ([0.0; D], [0.0; D]);
             for d in 0..D {
@@ -105,6 +137,10 @@ impl<const D: usize> Problem<D> {
     pub(crate) fn pin(&self, point: &mut Point<D>) {
         for (control, pinned) in point.control.iter_mut().zip(self.pinned(point.z)) {
             *control = pinned[0];
+        }
+        let first = point.control.len().saturating_sub(4);
+        for (k, pinned) in self.pinned_last(point.z).into_iter().flatten().enumerate() {
+            point.control[first + k] = pinned[0];
         }
     }
 
@@ -223,6 +259,18 @@ impl<const D: usize> Point<D> {
     pub(crate) fn samples(&self) -> usize {
         2 * self.spans()
     }
+}
+
+/// Changes of `count` control points that spread by `ends` from one to the next near either end.
+pub(crate) fn spreading<const D: usize>(ends: [[f64; D]; 2], count: usize) -> Vec<[f64; D]> {
+    let last = count - 1;
+    let change = |k: usize| {
+        let x = ((k as f64 - 3.0) / (last as f64 - 6.0)).clamp(0.0, 1.0);
+        let share = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
+        let (start, end) = (k as f64 - 1.5, 1.5 - (last - k) as f64);
+        std::array::from_fn(|d| ends[0][d] * start * (1.0 - share) + ends[1][d] * end * share)
+    };
+    (0..count).map(change).collect()
 }
 
 /// First control point and weights of corridor sample `k`.

@@ -15,9 +15,10 @@ const CLEAR: f64 = 0.99;
 const BESIDE: f64 = 1.0 - 1e-6;
 const FIRST_SPANS: f64 = 8.0;
 
-/// The fraction at a time in knots.
-fn clear(moving: bool, time: f64) -> f64 {
-    if moving && time < FIRST_SPANS {
+/// The fraction at a time in knots: that beside an end of the motion which moves, or the usual one.
+fn clear<const D: usize>(problem: &Problem<D>, point: &Point<D>, time: f64) -> f64 {
+    let last = problem.finish.is_some() && time > point.spans() as f64 - FIRST_SPANS;
+    if last || (problem.moving() && time < FIRST_SPANS) {
         BESIDE
     } else {
         CLEAR
@@ -125,9 +126,12 @@ const PINNED: usize = 4;
 fn ratios_of<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[[f64; 2]; 3]; 2] {
     let mut worst = [[[0.0_f64; 2]; 3]; 2];
     let (count, h) = (point.control.len(), problem.spacing(point.z));
+    let pinned = problem.finish.map_or(0, |_| PINNED);
+    let end = if pinned > 0 { count - pinned } else { count };
     for (g, worst) in worst.iter_mut().enumerate().take(Problem::<D>::GROUPS) {
         let mut raise = |order: usize, first: usize, value: f64| {
-            let slot = &mut worst[order - 1][usize::from(first + order >= PINNED)];
+            let fixed = first + order < PINNED || first >= end;
+            let slot = &mut worst[order - 1][usize::from(!fixed)];
             *slot = slot.max(value);
         };
         for k in 0..count - 1 {
@@ -181,7 +185,7 @@ impl Room {
                     self.balls[g][i],
                     far,
                     radius,
-                    clear(problem.moving(), point.crossings[i]),
+                    clear(problem, point, point.crossings[i]),
                 );
                 tight &= self.balls[g][i] <= radius;
             }
@@ -232,14 +236,15 @@ impl Room {
             }
             for g in 0..Problem::<D>::GROUPS {
                 let far = away(problem, point, k, g, self.legs[k]);
-                let eased = if k < EASED && problem.moving() {
+                let last = problem.finish.is_some() && k + EASED >= point.samples();
+                let eased = if last || (k < EASED && problem.moving()) {
                     EASE
                 } else {
                     1.0
                 };
                 let width = eased * problem.groups[g].width;
                 self.widths[g][k] =
-                    narrowed(self.widths[g][k], far, width, clear(problem.moving(), time));
+                    narrowed(self.widths[g][k], far, width, clear(problem, point, time));
                 tight &= self.widths[g][k] <= width;
             }
         }

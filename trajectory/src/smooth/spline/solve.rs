@@ -1,8 +1,8 @@
 //! The interior point iteration. It may stop at any time: every iterate after the first feasible
 //! one is a valid motion.
 
-use super::newton::{Barrier, Step, System};
-use super::problem::{Point, Problem, Room};
+use super::newton::{Barrier, KEEP, Step, System};
+use super::problem::{Point, Problem, Room, spreading};
 use super::project::project;
 
 /// How far and how long the iteration goes.
@@ -44,6 +44,50 @@ const ANCHORED: usize = 40;
 /// Square of the Newton decrement that is near enough to a centre on the way to a first valid motion.
 const ROUGHLY: f64 = 30.0;
 
+/// How the iteration is led.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    /// Most Newton steps.
+    steps: usize,
+    /// Growth of the weight on `z` at each centre, and the square of the Newton decrement at one.
+    growth: f64,
+    centre: f64,
+    /// Square of the decrement from which short steps are normal.
+    low: f64,
+    /// Share of each slack that a step must leave.
+    keep: f64,
+    /// Rounds in which a trial looks for the passes.
+    rounds: usize,
+}
+
+impl Pace {
+    fn new<const D: usize>(problem: &Problem<D>, effort: Effort) -> Self {
+        if problem.finish.is_none() {
+            return Self {
+                steps: effort.steps,
+                growth: GROWTH,
+                centre: 3.0,
+                low: LOW,
+                keep: KEEP,
+                rounds: 3,
+            };
+        }
+        // Between two ends in motion the passes of a sharp corner wander, and an iterate that comes close
+        // to a bound there does not leave it again: small changes of the weight, well centred.
+        Self {
+            steps: BETWEEN,
+            growth: 2.5,
+            centre: 1.0,
+            low: f64::INFINITY,
+            keep: 0.2,
+            rounds: 12,
+        }
+    }
+}
+
+/// Most Newton steps between two ends in motion.
+const BETWEEN: usize = 200;
+
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
 
@@ -58,6 +102,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     point: &mut Point<D>,
     effort: Effort,
 ) -> Option<usize> {
+    let pace = Pace::new(problem, effort);
     let mut system = System::<D, B>::new(point.control.len());
     begin(problem, point, effort);
     let mut room = Room::new(problem, point);
@@ -66,7 +111,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let (mut short, mut freed) = (0, false);
     let more = usize::from(problem.anchor.is_some()) * ANCHORED;
-    for count in 0..effort.steps + more {
+    for count in 0..pace.steps + more {
         since += 1;
         if tight || since > PATIENCE {
             tight = room.tighten(problem, point);
@@ -74,6 +119,9 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
         if tight && problem.anchor.is_some_and(|z| point.z < z) {
             point.z = problem.anchor.take().unwrap_or(point.z);
+            if problem.finish.is_some() {
+                weight = parameter / (2.0 * point.z);
+            }
         }
         let done = tight && problem.anchor.is_none();
         // An iterate that is inside goes on until it is as fast as its start.
@@ -83,9 +131,15 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return done.then_some(count);
         };
-        let share = search(problem, point, &room, weight, &step);
+        let barrier = Barrier {
+            problem,
+            room: &room,
+            weight,
+            keep: pace.keep,
+        };
+        let share = search(&barrier, point, &step, pace.rounds);
         let moved = share > 0.0;
-        short = if tight && share < SHORT && step.decrement < LOW {
+        short = if tight && share < SHORT && step.decrement < pace.low {
             short + 1
         } else {
             0
@@ -93,7 +147,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         if short == STUCK && !freed {
             (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
         }
-        let centred = step.decrement < if done { 3.0 } else { ROUGHLY };
+        let centred = step.decrement < if done { pace.centre } else { ROUGHLY };
         if !moved || centred {
             let least = (point.z - parameter / weight).max(0.0);
             if done && point.spans() as f64 * problem.spacing(least) > effort.most {
@@ -110,17 +164,17 @@ pub(crate) fn solve<const D: usize, const B: usize>(
                     since = PATIENCE;
                 }
             } else {
-                weight *= GROWTH;
+                weight *= pace.growth;
                 weight = weight.min(1.01 * parameter / (effort.gap * point.z));
             }
         }
     }
-    (tight && problem.anchor.is_none()).then_some(effort.steps + more)
+    (tight && problem.anchor.is_none()).then_some(pace.steps + more)
 }
 
 /// Moves a first iterate to a point from which the descent can begin.
 fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort: Effort) {
-    if effort.spread.is_some() && problem.moving() {
+    if (effort.spread.is_some() && problem.moving()) || problem.finish.is_some() {
         problem.anchor = Some(point.z);
     }
     problem.pin(point);
@@ -146,17 +200,12 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
 /// Moves the iterate along the step as far as the barrier falls; returns the fraction of the step,
 /// 0 if it does not fall at all.
 fn search<const D: usize>(
-    problem: &Problem<D>,
+    barrier: &Barrier<'_, D>,
     point: &mut Point<D>,
-    room: &Room,
-    weight: f64,
     step: &Step,
+    rounds: usize,
 ) -> f64 {
-    let barrier = Barrier {
-        problem,
-        room,
-        weight,
-    };
+    let problem = barrier.problem;
     let (mut slacks, mut seen) = (Vec::new(), Vec::new());
     let Some(here) = barrier.value(point, &[], &mut slacks) else {
         return 0.0;
@@ -175,9 +224,10 @@ fn search<const D: usize>(
                 to[d] = from[d] + share * delta[d];
             }
         }
+        follow(problem, &mut trial, point.z);
         problem.pin(&mut trial);
         trial.crossings.copy_from_slice(&point.crossings);
-        project(problem, &mut trial, Some(room), 3);
+        project(problem, &mut trial, Some(barrier.room), rounds);
         if let Some(there) = barrier.value(&trial, &slacks, &mut seen)
             && there < here - 0.01 * share * step.decrement
         {
@@ -187,4 +237,31 @@ fn search<const D: usize>(
         share *= BACK;
     }
     0.0
+}
+
+/// Lets the free control points follow those that two ends in motion fix, which do not move evenly with `z`:
+/// to second order they spread like the knots, and the others with them.
+fn follow<const D: usize>(problem: &Problem<D>, trial: &mut Point<D>, from: f64) {
+    let Some((before, after)) = problem
+        .pinned_last(from)
+        .zip(problem.pinned_last(trial.z))
+        .filter(|_| problem.anchor.is_none())
+    else {
+        return;
+    };
+    let change = trial.z - from;
+    let spread = |before: &[[[f64; D]; 2]; 4], after: &[[[f64; D]; 2]; 4]| -> [f64; D] {
+        std::array::from_fn(|d| {
+            let off = |k: usize| after[k][0][d] - before[k][0][d] - before[k][1][d] * change;
+            off(2) - off(1)
+        })
+    };
+    let first = spread(&problem.pinned(from), &problem.pinned(trial.z));
+    let ends = [first, spread(&before, &after)];
+    let changes = spreading(ends, trial.control.len());
+    for (control, change) in trial.control.iter_mut().zip(changes) {
+        for d in 0..D {
+            control[d] += change[d];
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::problem::{Point, Problem, square};
 const SHARE: f64 = 0.6;
 
 /// Knot intervals in one time `A / J`.
-pub(super) const KNOTS_PER_RAMP: f64 = 6.0;
+pub(crate) const KNOTS_PER_RAMP: f64 = 6.0;
 
 /// Control points over which the offset of a start in motion fades out.
 const FADE: f64 = 16.0;

@@ -1,0 +1,220 @@
+//! Motion in place of a rest: from a moment before it to one after it, both in motion, the time-optimal
+//! spline passes the poses between them.
+//!
+//! A list is divided where no motion was found through a pose, and at the division the motion rests. What
+//! is left of the list does not matter there: a spline over twice the way of braking, with knots as
+//! close together as the corner asks for, is found where one through the whole list is not.
+
+use nalgebra::Isometry3;
+
+use super::choose::{Then, Window, stretch};
+use super::crossing::crossings;
+use super::method::Method;
+use super::motion::Motion;
+use super::options::SmoothOptions;
+use super::rest::Rest;
+use super::span::Span;
+use super::spline::{KNOTS_PER_RAMP, Moving};
+use crate::ToolPoint;
+
+/// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
+const REACHES: [f64; 3] = [1.25, 0.6, 0.3];
+/// Knots in the time of the corner that the tolerance allows.
+const KNOTS_PER_CORNER: f64 = 6.0;
+/// Factor on the time of a motion before its rests are bridged: a state at a limit leaves a search no room.
+const ROOM: f64 = 1.0 + 2e-6;
+/// Share of its time that a bridge has to save at least.
+const GAIN: f64 = 1e-4;
+
+/// A motion with its rests, and when it passes each pose between the ends.
+#[derive(Clone, Debug)]
+struct Bridges<'a> {
+    poses: &'a [Isometry3<f64>],
+    options: &'a SmoothOptions,
+    spans: Vec<Span>,
+    /// How each span was made.
+    methods: Vec<Method>,
+    rests: Vec<Rest>,
+    /// Times of the passes, s.
+    passes: Vec<f64>,
+}
+
+/// The motion through `poses` without those of its rests for which a faster way past is found; `None` if
+/// there is none.
+pub(super) fn bridged(
+    motion: &Motion,
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> Option<Motion> {
+    let mut spans = motion.spans.clone();
+    stretch(&mut spans, ROOM);
+    let made = motion.parts.iter();
+    let mut bridges = Bridges {
+        poses,
+        options,
+        passes: crossings(&spans, poses, options)
+            .iter()
+            .map(|pass| pass.time)
+            .collect(),
+        methods: made
+            .flat_map(|(method, count)| std::iter::repeat_n(*method, *count))
+            .collect(),
+        spans,
+        rests: motion
+            .rests
+            .iter()
+            .map(|rest| Rest {
+                time: rest.time * ROOM,
+                ..*rest
+            })
+            .collect(),
+    };
+    let mut k = 0;
+    while k < bridges.rests.len() {
+        let passed = REACHES
+            .iter()
+            .any(|reach| bridges.pass(k, *reach).is_some());
+        k += usize::from(!passed);
+    }
+    (bridges.rests.len() < motion.rests.len()).then(|| bridges.motion())
+}
+
+impl Bridges<'_> {
+    /// Puts a spline in the place of the rest with the number `k`, if that is faster.
+    fn pass(&mut self, k: usize, reach: f64) -> Option<()> {
+        let [from, to] = self.reach(k, reach);
+        let ends = [self.state(from)?, self.state(to)?];
+        let moving = Moving {
+            state: ends[0],
+            spacing: self.spacing(),
+        };
+        let first = self.passes.partition_point(|time| *time <= from);
+        let after = self.passes.partition_point(|time| *time < to);
+        let known = self.part(from, to);
+        let window = Window {
+            poses: &self.poses[first..after + 2],
+            options: self.options,
+            moving: Some(&moving),
+            finish: Some(&ends[1]),
+            then: Then::Stop,
+        };
+        let most = (to - from) * (1.0 - GAIN);
+        let bridge = window.spline(Some(&known), most)?;
+        let times = crossings(&bridge.spans, window.poses, self.options);
+        for (time, pass) in self.passes[first..after].iter_mut().zip(times) {
+            *time = from + pass.time;
+        }
+        self.replace(k, [from, to], bridge.spans);
+        Some(())
+    }
+
+    /// When the bridge over a rest begins and ends, s.
+    fn reach(&self, k: usize, reach: f64) -> [f64; 2] {
+        let limits = &self.options.limits;
+        let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
+        let time = self.rests[k].time;
+        let before = k.checked_sub(1).map_or(0.0, |k| self.rests[k].time);
+        let end = self.spans.last().map_or(0.0, Span::end);
+        let after = self.rests.get(k + 1).map_or(end, |rest| rest.time);
+        [
+            (time - reach * brake).max(0.5 * (before + time)),
+            (time + reach * brake).min(0.5 * (time + after)),
+        ]
+    }
+
+    /// Knot spacing of a bridge, s: as in other splines, and finer if the tolerance shows corners.
+    fn spacing(&self) -> f64 {
+        let (limits, options) = (&self.options.limits, self.options);
+        let tolerance = options.tolerance.min(options.corridor());
+        // The time in which a jerk turns the motion at a corner.
+        let corner = (96.0 * tolerance / limits.jerk).cbrt();
+        let ramp = limits.acceleration / limits.jerk;
+        (ramp / KNOTS_PER_RAMP).min(corner / KNOTS_PER_CORNER)
+    }
+
+    /// The span at a time.
+    fn at(&self, time: f64) -> usize {
+        self.spans
+            .partition_point(|span| span.start <= time)
+            .saturating_sub(1)
+    }
+
+    /// State at a time.
+    fn state(&self, time: f64) -> Option<ToolPoint> {
+        let span = self.spans.get(self.at(time))?;
+        Some(span.at((time - span.start).clamp(0.0, span.duration)))
+    }
+
+    /// The spans between two times, the first from the time 0 on.
+    fn part(&self, from: f64, to: f64) -> Vec<Span> {
+        let (first, last) = (self.at(from), self.at(to));
+        let parts = self.spans[first..=last].iter().map(|span| {
+            let start = span.start.max(from) - from;
+            Span {
+                start,
+                ..span.part(from, to)
+            }
+        });
+        parts.filter(|span| span.duration > 0.0).collect()
+    }
+
+    /// Puts spans in the place of those between two times, and of the rest with the number `k`.
+    fn replace(&mut self, k: usize, [from, to]: [f64; 2], bridge: Vec<Span>) {
+        let end = self.spans.last().map_or(0.0, Span::end);
+        let (first, last) = (self.at(from), self.at(to));
+        let change = bridge.last().map_or(0.0, Span::end) - (to - from);
+        let mut spans = self.spans[..first].to_vec();
+        let mut methods = self.methods[..first].to_vec();
+        let mut add = |offset: f64, method: Method, span: Span| {
+            if span.duration > 0.0 {
+                spans.push(Span {
+                    start: span.start + offset,
+                    ..span
+                });
+                methods.push(method);
+            }
+        };
+        let before = &self.spans[first];
+        add(
+            before.start,
+            self.methods[first],
+            before.part(before.start, from),
+        );
+        for span in bridge {
+            add(from, Method::Spline, span);
+        }
+        add(
+            to + change,
+            self.methods[last],
+            self.spans[last].part(to, end),
+        );
+        for (span, method) in self.spans.iter().zip(&self.methods).skip(last + 1) {
+            add(change, *method, span.clone());
+        }
+        (self.spans, self.methods) = (spans, methods);
+        self.rests.remove(k);
+        for rest in &mut self.rests[k..] {
+            rest.time += change;
+        }
+        for time in self.passes.iter_mut().filter(|time| **time >= to) {
+            *time += change;
+        }
+    }
+
+    /// The motion as it is now.
+    fn motion(self) -> Motion {
+        let mut parts: Vec<(Method, usize)> = Vec::new();
+        for method in &self.methods {
+            match parts.last_mut() {
+                Some((last, count)) if last == method => *count += 1,
+                _ => parts.push((*method, 1)),
+            }
+        }
+        Motion {
+            spans: self.spans,
+            parts,
+            rests: self.rests,
+            eased: true,
+        }
+    }
+}
