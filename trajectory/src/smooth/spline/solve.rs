@@ -109,7 +109,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
-    let (mut short, mut freed) = (0, false);
+    let mut slow = Slow::default();
     let more = usize::from(problem.anchor.is_some()) * ANCHORED;
     for count in 0..pace.steps + more {
         since += 1;
@@ -117,11 +117,8 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             tight = room.tighten(problem, point);
             since = 0;
         }
-        if tight && problem.anchor.is_some_and(|z| point.z < z) {
-            point.z = problem.anchor.take().unwrap_or(point.z);
-            if problem.finish.is_some() {
-                weight = parameter / (2.0 * point.z);
-            }
+        if tight && is_let_go(problem, point) && problem.finish.is_some() {
+            weight = parameter / (2.0 * point.z);
         }
         let done = tight && problem.anchor.is_none();
         // An iterate that is inside goes on until it is as fast as its start.
@@ -131,45 +128,65 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return done.then_some(count);
         };
+        let keep = pace.keep;
         let barrier = Barrier {
             problem,
             room: &room,
             weight,
-            keep: pace.keep,
+            keep,
         };
         let share = search(&barrier, point, &step, pace.rounds);
         let moved = share > 0.0;
-        short = if tight && share < SHORT && step.decrement < pace.low {
-            short + 1
-        } else {
-            0
-        };
-        if short == STUCK && !freed {
-            (freed, weight) = (true, weight.min(parameter / (2.0 * point.z)));
+        if slow.is_new(tight && share < SHORT && step.decrement < pace.low) {
+            weight = weight.min(parameter / (2.0 * point.z));
         }
         let centred = step.decrement < if done { pace.centre } else { ROUGHLY };
-        if !moved || centred {
-            let least = (point.z - parameter / weight).max(0.0);
-            if done && point.spans() as f64 * problem.spacing(least) > effort.most {
-                return None;
-            }
-            if tight && parameter / weight <= effort.gap * point.z {
-                return done.then_some(count);
-            }
-            if !tight {
-                if since == 0 && !moved {
-                    return None; // Stuck.
-                }
-                if step.decrement < 0.1 || !moved {
-                    since = PATIENCE;
-                }
-            } else {
-                weight *= pace.growth;
-                weight = weight.min(1.01 * parameter / (effort.gap * point.z));
-            }
+        if moved && !centred {
+            continue;
+        }
+        let least = (point.z - parameter / weight).max(0.0);
+        if done && point.spans() as f64 * problem.spacing(least) > effort.most {
+            return None;
+        }
+        if tight && parameter / weight <= effort.gap * point.z {
+            return done.then_some(count);
+        }
+        if tight {
+            weight = (weight * pace.growth).min(1.01 * parameter / (effort.gap * point.z));
+        } else if since == 0 && !moved {
+            return None; // Stuck.
+        } else if step.decrement < 0.1 || !moved {
+            since = PATIENCE;
         }
     }
     (tight && problem.anchor.is_none()).then_some(pace.steps + more)
+}
+
+/// Whether the iterate has become faster than its start, which then holds it no longer.
+fn is_let_go<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>) -> bool {
+    let Some(z) = problem.anchor.filter(|z| point.z < *z) else {
+        return false;
+    };
+    problem.anchor = None;
+    point.z = z;
+    true
+}
+
+/// Counts short steps one after another.
+#[derive(Default)]
+struct Slow {
+    steps: usize,
+    told: bool,
+}
+
+impl Slow {
+    /// Whether the descent has become slow, told once.
+    fn is_new(&mut self, short: bool) -> bool {
+        self.steps = if short { self.steps + 1 } else { 0 };
+        let new = self.steps == STUCK && !self.told;
+        self.told |= new;
+        new
+    }
 }
 
 /// Moves a first iterate to a point from which the descent can begin.
