@@ -8,10 +8,11 @@ use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
 use super::solve::{Effort, solve};
 use super::start;
+use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
 use crate::smooth::options::SmoothOptions;
-use crate::smooth::span::{Span, Turn};
+use crate::smooth::span::Span;
 
 /// The inner tolerance: a little smaller, so that rounding in sampling does not exceed it.
 const INSIDE: f64 = 0.9999;
@@ -465,25 +466,6 @@ fn anchors<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Vec<(usize
             result.push((middle, leg));
             last = middle;
         }
-    }
-    result
-}
-
-/// The four factors of a span of five control orientations: the cumulative form of the basis.
-///
-/// # Source
-/// M.-J. Kim, M.-S. Kim, S. Y. Shin, "A general construction scheme for unit
-/// quaternion curves with simple high order derivatives", SIGGRAPH 1995.
-pub(crate) fn turns(control: &[UnitQuaternion<f64>], h: f64) -> Vec<Turn> {
-    let mut result = Vec::with_capacity(4);
-    for j in 1..5 {
-        let axis = body_turn(&control[j - 1], &control[j]);
-        let mut sums = [0.0; 5];
-        sums[j..].fill(1.0);
-        result.push(Turn {
-            axis,
-            angle: basis::power(&sums, h),
-        });
     }
     result
 }

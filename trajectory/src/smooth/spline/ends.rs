@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::basis::START;
-use super::build::turns;
+use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
 use crate::smooth::span::Span;

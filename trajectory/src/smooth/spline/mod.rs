@@ -16,9 +16,11 @@ mod problem;
 mod project;
 mod solve;
 mod start;
+mod turns;
 
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
-pub(crate) use build::{Moving, Request, plan, turns};
+pub(crate) use build::{Moving, Request, plan};
 pub(crate) use solve::Effort;
 pub(crate) use start::KNOTS_PER_RAMP;
+pub(crate) use turns::turns;
