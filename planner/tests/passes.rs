@@ -152,3 +152,33 @@ fn smooth_moves_are_never_slower_than_straight_ones() {
     let both = compared::<6>("ur5e", 11) + compared::<7>("panda", 12);
     assert!(both >= 24, "{both} of 36 planned");
 }
+
+/// Where a move rests on its way the certificate names the pose and the cause; a pose that is passed in motion
+/// has none.
+#[test]
+fn rests_are_named_in_the_certificate() {
+    let robot = load("ur5e").unwrap();
+    let home: SVector<f64, 6> = vector(&robot.home);
+    let planner = Planner::new(
+        &robot.chain::<6>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<6>(),
+        robot.joint_names(),
+    );
+    let start = planner.chain().forward(&home);
+    let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0) * start;
+    let rests = |tolerance: f64, poses: Vec<_>| -> Vec<Option<&'static str>> {
+        let motion = Move {
+            shape: Shape::Smooth,
+            poses,
+            tolerance,
+            limits: robot.motion_limits(),
+        };
+        let found = planner.plan(&motion, &home).unwrap();
+        let passes = found.certificate.poses.iter();
+        passes.map(|pass| pass.rests).collect()
+    };
+    let corner = || vec![at(0.05, 0.0), at(0.05, 0.05)];
+    assert_eq!(rests(0.0, corner()), [Some("exact stop")]);
+    assert_eq!(rests(1e-3, corner()), [None]);
+}

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use planner::dry_run::{FailurePolicy, Plan as Planned, PlannedCommand};
+use planner::motion::MoveCertificate;
 use view::Source;
 
 use crate::exit::Exit;
@@ -160,7 +161,23 @@ fn proved(command: &PlannedCommand) -> String {
             pass.tolerance_m * 1e3
         );
     }
-    text
+    text + &rests(certificate)
+}
+
+/// At which poses a move rests, and why: the first few.
+fn rests(certificate: &MoveCertificate) -> String {
+    let poses = certificate.poses.iter();
+    let mut rests = poses.filter_map(|pass| Some(format!("{} ({})", pass.index, pass.rests?)));
+    let first: Vec<_> = rests.by_ref().take(3).collect();
+    let text = match first.as_slice() {
+        [] => return String::new(),
+        [one] => format!(", rests at pose {one}"),
+        some => format!(", rests at poses {}", some.join(", ")),
+    };
+    match rests.count() {
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
 }
 
 fn unwritable(path: &std::path::Path) -> String {

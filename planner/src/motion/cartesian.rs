@@ -9,7 +9,7 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{Blend, BlockedCause, Draft, MotionError, Planner};
+use super::{Blend, BlockedCause, Draft, MotionError, MoveCertificate, Planner};
 use crate::task::Move;
 
 /// Longest distance of the tool between two solved points, m.
@@ -320,6 +320,11 @@ impl SmoothPath {
     /// Whether it is along a curve fitted through a dense list.
     pub(super) fn is_fitted(&self) -> bool {
         self.plan.method() == smooth::Method::Fit
+    }
+
+    /// Says in a certificate at which poses it rests, and why.
+    pub(super) fn name_rests(&self, certificate: &mut MoveCertificate) {
+        certificate.name_rests(self.plan.rests());
     }
 
     /// What it promises, planned with this tolerance (m).

@@ -6,7 +6,7 @@ use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
 use serde::Serialize;
 use trajectory::bounds::{JointsToTool, Leg};
-use trajectory::smooth::angular_tolerance;
+use trajectory::smooth::{Rest, angular_tolerance};
 use trajectory::timing::Limit;
 use trajectory::{JointPoint, MotionBounds, ToolPoint, Trajectory};
 
@@ -29,6 +29,9 @@ pub struct CrossingReport {
     pub angular_tolerance_rad: f64,
     /// Time of the pass after the start of the move, s.
     pub time_s: f64,
+    /// Why the motion rests at the pose, if it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rests: Option<&'static str>,
 }
 
 /// Peak of each limited quantity, divided by its limit: bounds for all times, at most one percent
@@ -140,6 +143,22 @@ pub struct MoveCertificate {
     pub end_angle_rad: f64,
     /// Least distance of any joint from a position limit, rad or m; negative beyond it.
     pub joint_margin: f64,
+}
+
+impl MoveCertificate {
+    /// Says at which poses the motion rests, and why.
+    pub(super) fn name_rests(&mut self, rests: &[Rest]) {
+        for rest in rests {
+            // The start of the list is pose 0.
+            let pass = rest
+                .pose
+                .checked_sub(1)
+                .and_then(|at| self.poses.get_mut(at));
+            if let Some(pass) = pass {
+                pass.rests = Some(rest.cause.as_str());
+            }
+        }
+    }
 }
 
 /// The kinematics of an arm, for bounds of its tool's motion.
@@ -264,6 +283,7 @@ fn crossings<const N: usize>(
             angle_rad,
             angular_tolerance_rad,
             time_s,
+            rests: None,
         };
         in_order &= holds(&pass, since);
         reports.push(pass);

@@ -250,7 +250,11 @@ impl<const N: usize> Planner<N> {
             crossings: poses.map(|pass| pass.time_s).collect(),
             ..Draft::of(planned.trajectory)
         };
-        let certified = self.certify(motion, start, draft)?;
+        let mut certified = self.certify(motion, start, draft)?;
+        let passes = certified.certificate.poses.iter_mut();
+        for (pass, before) in passes.zip(&planned.certificate.poses) {
+            pass.rests = before.rests;
+        }
         Ok(PlannedMove {
             blend: planned.blend,
             ..certified

@@ -91,7 +91,8 @@ impl<const N: usize> Planner<N> {
             ..Draft::of(timed.trajectory)
         };
         let draft = self.within_legs(self.slowed(draft, motion), legs);
-        let planned = self.certify(motion, start, draft)?;
+        let mut planned = self.certify(motion, start, draft)?;
+        planned.certificate.name_rests(plan.rests());
         Ok(PlannedMove {
             blend: Some(blend),
             ..planned

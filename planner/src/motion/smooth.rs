@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, SVector};
 use trajectory::Trajectory;
-use trajectory::smooth::{SmoothOptions, least_time};
+use trajectory::smooth::{RestCause, SmoothOptions, least_time};
 
 use super::cartesian::SmoothPath;
 use super::draft::Draft;
@@ -105,9 +105,11 @@ impl<const N: usize> Planner<N> {
                     break;
                 }
             }
+            let mut planned = planned?;
+            path.name_rests(&mut planned.certificate);
             Ok(PlannedMove {
                 blend: Some(path.blend(tolerance)),
-                ..planned?
+                ..planned
             })
         };
         let path = self.smooth_path(&tighter, start, true)?;
@@ -144,6 +146,10 @@ impl<const N: usize> Planner<N> {
             crossings,
             ..Draft::of(Trajectory::new(pieces))
         };
-        self.certify(motion, start, draft)
+        let mut planned = self.certify(motion, start, draft)?;
+        for pass in &mut planned.certificate.poses {
+            pass.rests = Some(RestCause::Stop.as_str());
+        }
+        Ok(planned)
     }
 }

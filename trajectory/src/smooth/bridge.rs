@@ -7,6 +7,7 @@
 
 use nalgebra::Isometry3;
 
+use super::certificate::certify;
 use super::choose::{Then, Window, stretch};
 use super::crossing::crossings;
 use super::method::Method;
@@ -18,7 +19,11 @@ use super::spline::{KNOTS_PER_RAMP, Moving};
 use crate::ToolPoint;
 
 /// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
-const REACHES: [f64; 3] = [1.25, 0.6, 0.3];
+const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
+/// Most rests of a motion that are tried: one that stops at thousands of poses is not worth thousands of splines.
+const MOST: usize = 64;
+/// Rounds over all rests: where a rest beside another is gone, a bridge may reach farther.
+const ROUNDS: usize = 2;
 /// Knots in the time of the corner that the tolerance allows.
 const KNOTS_PER_CORNER: f64 = 6.0;
 /// Factor on the time of a motion before its rests are bridged: a state at a limit leaves a search no room.
@@ -69,17 +74,38 @@ pub(super) fn bridged(
             })
             .collect(),
     };
-    let mut k = 0;
-    while k < bridges.rests.len() {
-        let passed = REACHES
-            .iter()
-            .any(|reach| bridges.pass(k, *reach).is_some());
-        k += usize::from(!passed);
+    for _ in 0..ROUNDS {
+        let (before, mut k) = (bridges.rests.len(), 0);
+        for _ in 0..before.min(MOST) {
+            let passed = REACHES.iter().find_map(|reach| bridges.passed(k, *reach));
+            match passed {
+                Some(passed) => bridges = passed,
+                None => k += 1,
+            }
+        }
+        if bridges.rests.len() == before {
+            break;
+        }
     }
     (bridges.rests.len() < motion.rests.len()).then(|| bridges.motion())
 }
 
 impl Bridges<'_> {
+    /// The motion past the rest with the number `k`, if all of it is certified then.
+    fn passed(&self, k: usize, reach: f64) -> Option<Self> {
+        let mut next = self.clone();
+        next.pass(k, reach)?;
+        // A pass beside the bridge may be another one now, so the bridge by itself does not tell.
+        let whole = certify(&next.spans, self.poses, self.options);
+        whole.0.holds().then_some(next)
+    }
+
+    /// Braking time from full speed, s.
+    fn brake(&self) -> f64 {
+        let limits = &self.options.limits;
+        limits.speed / limits.acceleration + limits.acceleration / limits.jerk
+    }
+
     /// Puts a spline in the place of the rest with the number `k`, if that is faster.
     fn pass(&mut self, k: usize, reach: f64) -> Option<()> {
         let [from, to] = self.reach(k, reach);
@@ -110,8 +136,7 @@ impl Bridges<'_> {
 
     /// When the bridge over a rest begins and ends, s.
     fn reach(&self, k: usize, reach: f64) -> [f64; 2] {
-        let limits = &self.options.limits;
-        let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
+        let brake = self.brake();
         let time = self.rests[k].time;
         let before = k.checked_sub(1).map_or(0.0, |k| self.rests[k].time);
         let end = self.spans.last().map_or(0.0, Span::end);
@@ -215,6 +240,7 @@ impl Bridges<'_> {
             parts,
             rests: self.rests,
             eased: true,
+            retried: false,
         }
     }
 }

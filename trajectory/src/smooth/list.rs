@@ -10,7 +10,7 @@ use super::normal_form::NormalForm;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::rest::RestCause;
-use super::windows::Windows;
+use super::windows::{self, Windows};
 use super::{bridge, dense, exact_stop};
 
 /// Plans a motion from the first pose to the last that passes those between in
@@ -81,54 +81,77 @@ impl<'a> List<'a> {
                 Some(fit.plan)
             }
             fitted => {
-                let best = faster(fitted.map(|fit| fit.plan), self.by_spline(form));
+                let mut best = faster(fitted.map(|fit| fit.plan), self.by_spline(form));
+                if best.as_ref().is_some_and(|plan| self.is_slow(plan)) {
+                    best = self.again(form, best, dense);
+                }
                 match best {
-                    Some(plan) if plan.is_divided() => self.without_rests(form, plan, dense),
+                    Some(plan) if plan.is_divided() => self.without_rests(form, plan),
                     other => other,
                 }
             }
         }
     }
 
-    /// The motion along a fitted curve: the faster one from both ends if that from the first is
-    /// slower than it might be.
-    fn fitted(&self, form: &NormalForm) -> Option<Fit> {
-        let fit = |form: &NormalForm| {
-            let motion = dense::plan(&form.poses, &form.options)?;
-            let eased = motion.eased || !motion.rests.is_empty();
-            let plan = self.certified(form, motion)?;
-            Some(Fit { plan, eased })
-        };
-        let first = fit(form);
-        if first.as_ref().is_some_and(Fit::suffices) {
-            return first;
-        }
-        let other = fit(&form.turned(self.poses, self.options));
-        match (first, other) {
-            (Some(first), Some(other)) => {
-                let better = other.plan.duration() < first.plan.duration();
-                let eased = if better { other.eased } else { first.eased };
-                let plan = faster(Some(first.plan), Some(other.plan))?;
-                Some(Fit { plan, eased })
-            }
-            (first, other) => first.or(other),
-        }
+    /// Whether a motion may be much slower than another: it rests on its way, or is far above the bound.
+    fn is_slow(&self, plan: &SmoothPlan) -> bool {
+        plan.is_divided() || plan.duration() > SLOW * lower_bound(self.poses, self.options)
     }
 
-    /// The fastest motion of a plan with rests that the way does not ask for, of a fitted curve if
-    /// none was tried, of the splines from the other end, and of those within less of the tolerance:
-    /// what holds there holds here, and a search in wide balls may fail where one in narrow ones does
-    /// not.
-    fn without_rests(
+    /// The fastest motion of one that may be slow, of a fitted curve if none was tried, and of those within
+    /// less of the tolerance.
+    fn again(
         &self,
         form: &NormalForm,
-        plan: SmoothPlan,
+        mut best: Option<SmoothPlan>,
         fitted: bool,
     ) -> Option<SmoothPlan> {
-        let mut best = Some(plan);
         if self.options.fit && !fitted && dense::may_be_fitted(&form.poses, &form.options) {
             best = faster(best, self.fitted(form).map(|fit| fit.plan));
         }
+        best
+    }
+
+    /// The motion along a fitted curve: the faster one from both ends if that from the first is
+    /// slower than it might be.
+    fn fitted(&self, form: &NormalForm) -> Option<Fit> {
+        let first = self.fitted_from(form);
+        if first.as_ref().is_some_and(Fit::suffices) {
+            return first;
+        }
+        let other = self.fitted_from(&form.turned(self.poses, self.options));
+        Fit::faster(first, other)
+    }
+
+    /// The same from one end. A curve that was found only at a second attempt is compared with one within
+    /// half of the tolerance.
+    fn fitted_from(&self, form: &NormalForm) -> Option<Fit> {
+        let first = self.fit(form, &form.options);
+        if !first.as_ref().is_some_and(|fit| fit.retried) {
+            return first;
+        }
+        let half = self.fit(form, &within(&form.options, 0.5));
+        Fit::faster(first, half)
+    }
+
+    /// The same under options of the form, once.
+    fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Fit> {
+        let motion = dense::plan(&form.poses, options)?;
+        let eased = motion.eased || !motion.rests.is_empty();
+        let retried = motion.retried;
+        let plan = self.certified(form, motion)?;
+        Some(Fit {
+            plan,
+            eased,
+            retried,
+        })
+    }
+
+    /// The fastest motion of a plan with rests that the way does not ask for, of the splines from the
+    /// other end, and of those within less of the tolerance: what holds there holds here, and a search in
+    /// wide balls may fail where one in narrow ones does not.
+    fn without_rests(&self, form: &NormalForm, plan: SmoothPlan) -> Option<SmoothPlan> {
+        let mut best = Some(plan);
         if best.as_ref().is_some_and(SmoothPlan::is_divided) {
             let other = form.turned(self.poses, self.options);
             best = faster(best, self.by_spline(&other));
@@ -162,8 +185,8 @@ impl<'a> List<'a> {
 
     /// The same under options of the form, once.
     fn by_windows(&self, form: &NormalForm, options: &SmoothOptions) -> Option<SmoothPlan> {
-        let windows = Windows::new(&form.poses, options).ok()?;
-        self.certified(form, windows.motion())
+        let motion = windows::motion(&form.poses, options)?;
+        self.certified(form, motion)
     }
 
     /// A motion through the normal form as a plan for the list, past its rests as far as one is found that is
@@ -199,9 +222,26 @@ struct Fit {
     plan: SmoothPlan,
     /// Whether another way of planning may be faster.
     eased: bool,
+    /// Whether a curve within less of the tolerance may be faster.
+    retried: bool,
 }
 
 impl Fit {
+    /// The faster of two, the first if they are equal.
+    fn faster(first: Option<Self>, second: Option<Self>) -> Option<Self> {
+        let (first, second) = match (first, second) {
+            (Some(first), Some(second)) => (first, second),
+            (first, second) => return first.or(second),
+        };
+        let better = second.plan.duration() < first.plan.duration();
+        let eased = if better { second.eased } else { first.eased };
+        Some(Self {
+            plan: faster(Some(first.plan), Some(second.plan))?,
+            eased,
+            retried: false,
+        })
+    }
+
     /// Whether no other way of planning is faster by much: it is not slower than it might be, and
     /// rests nowhere. A motion that turns back without a rest saves up to the time of a ramp.
     fn suffices(&self) -> bool {
@@ -237,6 +277,9 @@ fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<Smoot
 
 /// Shares of the tolerance within which a list is planned that rests within all of it.
 const SHARES: [f64; 3] = [0.7, 0.5, 0.35];
+
+/// A motion that takes so many times the lower bound may be slow: three in four splines take less.
+const SLOW: f64 = 1.4;
 
 /// Lists up to this length are planned once.
 const SHORT: usize = 5;
@@ -396,7 +439,7 @@ mod tests {
         let stops = check(&corner, 0.0);
         assert_eq!(stops.fallbacks(), 1);
         let rest = stops.rests()[0];
-        assert_eq!(rest.cause, RestCause::Stop);
+        assert_eq!((rest.cause, rest.pose), (RestCause::Stop, 1));
         assert!((rest.time - stops.crossings()[0].time).abs() < 1e-6);
         assert!(check(&corner, 1e-3).rests().is_empty());
         // There and back on the same way, dense: it rests where it turns back at most.
@@ -408,6 +451,7 @@ mod tests {
         assert!(back.rests().len() <= 1, "{:?}", back.rests());
         for rest in back.rests() {
             assert_eq!(rest.cause, RestCause::TurnsBack);
+            assert!((195..=205).contains(&rest.pose), "{rest:?}");
             let speed = back.at(rest.time).linear[0].norm();
             assert!(speed < 1e-9, "{speed}");
         }

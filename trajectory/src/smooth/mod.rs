@@ -29,6 +29,7 @@ mod ramp;
 mod rest;
 mod span;
 mod spline;
+mod turning_back;
 mod windows;
 
 use crate::poly;

@@ -14,6 +14,9 @@ pub(crate) struct Motion {
     pub(crate) rests: Vec<Rest>,
     /// Whether a part is slower than its way of planning usually is: another way may be faster.
     pub(crate) eased: bool,
+    /// Whether a curve was found only with smaller balls or more knots: within less of the tolerance there may
+    /// be a faster one.
+    pub(crate) retried: bool,
 }
 
 impl Motion {
@@ -29,16 +32,14 @@ impl Motion {
             parts,
             rests: Vec::new(),
             eased: false,
+            retried: false,
         }
     }
 
     /// Straight legs with a stop at the end of each.
     pub(crate) fn stops(spans: Vec<Span>) -> Self {
         let starts = spans.iter().skip(1).filter(|span| span.starts_at_rest());
-        let rests = starts.map(|span| Rest {
-            time: span.start,
-            cause: RestCause::Stop,
-        });
+        let rests = starts.map(|span| Rest::new(span.start, RestCause::Stop));
         Self {
             rests: rests.collect(),
             ..Self::new(spans, Method::ExactStop)
@@ -67,6 +68,7 @@ impl Motion {
             parts: self.parts.iter().rev().copied().collect(),
             rests: rests.collect(),
             eased: self.eased,
+            retried: self.retried,
         }
     }
 
@@ -83,6 +85,7 @@ impl Motion {
         }));
         self.parts.extend(other.parts);
         self.eased |= other.eased;
+        self.retried |= other.retried;
     }
 
     /// Adds a motion that starts at rest where this one ends at rest.
@@ -96,8 +99,7 @@ impl Motion {
     /// Records that the motion, which goes on, rests at its present end.
     pub(crate) fn rest(&mut self, cause: RestCause) {
         if !self.spans.is_empty() {
-            let time = self.duration();
-            self.rests.push(Rest { time, cause });
+            self.rests.push(Rest::new(self.duration(), cause));
         }
     }
 }

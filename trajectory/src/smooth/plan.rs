@@ -6,8 +6,9 @@ use super::certificate::Certificate;
 use super::crossing::Crossing;
 use super::method::Method;
 use super::motion::Motion;
-use super::rest::Rest;
+use super::rest::{Rest, RestCause};
 use super::span::Span;
+use super::turning_back::turns_back;
 use crate::{ToolCurve, ToolPoint};
 
 /// A certified motion through a list of poses, as a curve of time.
@@ -44,10 +45,10 @@ impl SmoothPlan {
             start,
             goal,
             spans: motion.spans,
+            rests: named(motion.rests, poses, &crossings),
             crossings,
             certificate,
             parts: motion.parts,
-            rests: motion.rests,
             exact_stop,
             before: (0.0, false),
         }
@@ -86,8 +87,8 @@ impl SmoothPlan {
         }
     }
 
-    /// The rests between the start and the end, in the order of time: where the way turns back,
-    /// at exact stops, and where a list was divided.
+    /// The rests between the start and the end, in the order of time, each with its pose: where the way
+    /// turns back, at exact stops, and where a list was divided.
     #[must_use]
     pub fn rests(&self) -> &[Rest] {
         &self.rests
@@ -117,6 +118,24 @@ impl SmoothPlan {
         let span = self.spans.get(next.saturating_sub(1))?;
         Some((span, (time - span.start).clamp(0.0, span.duration)))
     }
+}
+
+/// The rests with the poses at which they are, and those where the way turns back said to be there.
+fn named(mut rests: Vec<Rest>, poses: &[Isometry3<f64>], crossings: &[Crossing]) -> Vec<Rest> {
+    for rest in &mut rests {
+        let after = crossings.partition_point(|pass| pass.time < rest.time);
+        let off = |pass: &&Crossing| (pass.time - rest.time).abs();
+        let near = &crossings[after.saturating_sub(1)..(after + 1).min(crossings.len())];
+        let Some(pass) = near.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+            continue;
+        };
+        rest.pose = pass.index;
+        let tolerances = [pass.tolerance, pass.angular_tolerance];
+        if rest.cause != RestCause::TurnsBack && turns_back(poses, pass.index, tolerances) {
+            rest.cause = RestCause::TurnsBack;
+        }
+    }
+    rests
 }
 
 impl ToolCurve for SmoothPlan {

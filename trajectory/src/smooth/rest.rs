@@ -8,15 +8,28 @@ use std::fmt;
 pub struct Rest {
     /// Time of the rest, s.
     pub time: f64,
+    /// Index in the list of the pose at which it rests: of those passed, the one nearest in time.
+    pub pose: usize,
     /// Why the motion rests.
     pub cause: RestCause,
+}
+
+impl Rest {
+    /// A rest of a motion that does not know its list yet.
+    pub(crate) fn new(time: f64, cause: RestCause) -> Self {
+        Self {
+            time,
+            pose: 0,
+            cause,
+        }
+    }
 }
 
 /// Why a smooth motion rests on its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RestCause {
-    /// The way turns back on itself.
+    /// The way turns back on itself, by more than 135 degrees as seen at a few tolerances from the pose.
     TurnsBack,
     /// A straight leg ends there: the tolerance is zero, or no faster motion past the pose was
     /// certified.
@@ -25,12 +38,20 @@ pub enum RestCause {
     Division,
 }
 
-impl fmt::Display for RestCause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl RestCause {
+    /// The cause in words.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
             Self::TurnsBack => "the way turns back",
             Self::Stop => "exact stop",
             Self::Division => "planned in parts",
-        })
+        }
+    }
+}
+
+impl fmt::Display for RestCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
     }
 }

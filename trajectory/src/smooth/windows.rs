@@ -33,6 +33,29 @@ const AGAIN_BRAKES: f64 = 2.0;
 /// Most poses of one window.
 const MOST_POSES: usize = 400;
 
+/// Times that a list is divided where its windows miss a pose.
+const DIVISIONS: usize = 3;
+
+/// The motion through a list by windows, uncertified; where it misses a pose the list is divided, so that
+/// one pose does not cost the whole motion.
+pub(super) fn motion(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
+    in_parts(poses, options, DIVISIONS)
+}
+
+/// The same, divided at most so many times.
+fn in_parts(poses: &[Isometry3<f64>], options: &SmoothOptions, divisions: usize) -> Option<Motion> {
+    let motion = Windows::new(poses, options).ok()?.motion();
+    let passes = crossings(&motion.spans, poses, options);
+    let missed = passes.iter().find(|pass| !pass.holds());
+    let Some(missed) = missed.filter(|_| divisions > 0) else {
+        return Some(motion);
+    };
+    let mut first = in_parts(&poses[..=missed.index], options, divisions - 1)?;
+    let second = in_parts(&poses[missed.index..], options, divisions - 1)?;
+    first.append(second, RestCause::Division);
+    Some(first)
+}
+
 /// Plans a list of poses window by window, with look-ahead.
 ///
 /// Each window ends at rest, so the planned part can always be started safely. Most of a window is

@@ -1,49 +1,109 @@
 //! Random dense lists: closed and open curves, noise, uneven spacing, cusps, doubled poses, mixed
 //! density, changing orientation.
 
-use trajectory::smooth::{RestCause, SmoothOptions, plan};
+use nalgebra::{Isometry3, Vector3};
+use trajectory::ToolCurve;
+use trajectory::smooth::{Rest, SmoothOptions, SmoothPlan, plan};
 
 use crate::lists;
 
-/// Plans so many lists: each is certified and never slower than exact stops; the seeds of those that
-/// rest elsewhere than where the way turns back. The rests of these are named.
+/// Distance from a rest at which the way to it and from it are compared, in tolerances.
+const AWAY: f64 = 4.0;
+
+/// Whether a rest is needed: the way of the list turns back there, by more than 135 degrees as seen at a few
+/// tolerances from the rest. No arc inside ball and corridor that is wider than 0.6 of the tolerance passes there.
+/// The cause that the plan names is not asked.
+fn needed(plan: &SmoothPlan, poses: &[Isometry3<f64>], rest: &Rest, tolerance: f64) -> bool {
+    let place = plan.at(rest.time).pose.translation.vector;
+    let passes = plan.crossings();
+    let after = 1 + passes.partition_point(|pass| pass.time <= rest.time);
+    let offset = |pose: &Isometry3<f64>| pose.translation.vector - place;
+    let to = leaves(poses[..after].iter().rev().map(offset), AWAY * tolerance);
+    let from = leaves(poses[after..].iter().map(offset), AWAY * tolerance);
+    let cosine = -to.dot(&from) / (to.norm() * from.norm());
+    cosine < -0.7
+}
+
+/// Where the way through places leaves a ball around the origin; the last place if it does not.
+fn leaves(places: impl Iterator<Item = Vector3<f64>>, radius: f64) -> Vector3<f64> {
+    let mut from = Vector3::zeros();
+    for to in places {
+        if to.norm() < radius {
+            from = to;
+            continue;
+        }
+        let (mut inside, mut outside) = (0.0, 1.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (inside + outside);
+            if from.lerp(&to, middle).norm() < radius {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        return from.lerp(&to, outside);
+    }
+    from
+}
+
+/// Whether a rest is where it is said to be: nothing moves, and its pose is passed there.
+fn is_named(plan: &SmoothPlan, rest: &Rest) -> bool {
+    let still = plan.at(rest.time).linear[0].norm() < 1e-6;
+    let off = |time: f64| (time - rest.time).abs();
+    let pass = plan.crossings().get(rest.pose.wrapping_sub(1));
+    let least = plan.crossings().iter().map(|pass| off(pass.time));
+    let least = least.fold(f64::INFINITY, f64::min);
+    still && pass.is_some_and(|pass| pass.index == rest.pose && off(pass.time) <= least)
+}
+
+/// Plans so many lists: each is certified and never slower than exact stops, and each rest is named; the
+/// seeds of those that rest without need.
 fn judged(seeds: std::ops::Range<u64>, most: f64) -> Vec<u64> {
-    let mut fallbacks = Vec::new();
+    let mut needless = Vec::new();
     for seed in seeds {
         let (poses, tolerance) = lists::random(seed, most);
-        let plan = plan(
-            &poses,
-            &SmoothOptions::new(tolerance, lists::turning_limits()),
-        )
-        .unwrap();
+        let options = SmoothOptions::new(tolerance, lists::turning_limits());
+        let plan = plan(&poses, &options).unwrap();
         assert!(plan.certificate().holds(), "{seed}");
-        assert!(
-            plan.duration() <= plan.exact_stop() * (1.0 + 1e-12),
-            "{seed}"
-        );
-        let rests = plan.rests().iter();
-        let causes: Vec<_> = rests.map(|rest| rest.cause).collect();
-        if causes.iter().any(|cause| *cause != RestCause::TurnsBack) {
-            println!("list {seed}: {causes:?}");
-            fallbacks.push(seed);
+        let stops = plan.exact_stop() * (1.0 + 1e-12);
+        assert!(plan.duration() <= stops, "{seed}");
+        for rest in plan.rests() {
+            assert!(is_named(&plan, rest), "{seed} {rest:?}");
+            if !needed(&plan, &poses, rest, tolerance) {
+                println!(
+                    "list {seed}: pose {} at {:.3} s, {}",
+                    rest.pose, rest.time, rest.cause
+                );
+                needless.push(seed);
+            }
         }
     }
-    fallbacks
+    needless.dedup();
+    needless
 }
 
 #[test]
 fn random_lists_are_certified() {
-    // A sharp corner between long legs in a dense list may need a stop.
-    assert!(judged(0..24, 400.0).len() <= 1);
+    let needless = judged(0..24, 400.0);
+    assert!(needless.is_empty(), "{needless:?}");
 }
 
 /// Lists that were slow or rested on their way, with the time that they may take (s): a list that is
 /// not quite dense, whose windows of splines do not join, is fitted all the same; one whose tolerance
-/// shows every corner is planned as a spline, too; one that turns back need not rest there; and sharp corners
-/// between sparse and dense parts are passed in motion.
+/// shows every corner is planned as a spline, too; one that turns back need not rest there; sharp corners
+/// between sparse and dense parts are passed in motion; and a spline far above the bound is compared with a
+/// fitted curve.
 #[test]
 fn the_way_of_planning_suits_the_list() {
-    for (seed, most) in [(95, 2.9), (195, 1.6), (52, 1.05), (48, 1.92)] {
+    for (seed, most) in [
+        (95, 2.9),
+        (195, 1.6),
+        (52, 1.05),
+        (48, 1.92),
+        (201, 1.6),
+        (37, 1.87),
+        (92, 1.95),
+    ] {
         let (poses, tolerance) = lists::random(seed, 400.0);
         let plan = plan(
             &poses,
@@ -60,11 +120,17 @@ fn the_way_of_planning_suits_the_list() {
     }
 }
 
-/// As above, 10 000 lists: `cargo test --release -p trajectory --test dense -- --ignored`. The goal
-/// is one such list in a thousand; one in twenty is asked here.
+/// As above, 10 000 lists, or those that `CANTER_RANDOM_LISTS` says (`2000..4000`):
+/// `cargo test --release -p trajectory --test dense -- --ignored --nocapture`.
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes hours of processor time"]
 fn ten_thousand_random_lists_are_certified() {
-    let fallbacks = judged(0..10_000, 1500.0);
-    assert!(fallbacks.len() <= 600, "{fallbacks:?}");
+    let text = std::env::var("CANTER_RANDOM_LISTS").unwrap_or("0..10000".to_owned());
+    let (from, to) = text.split_once("..").unwrap();
+    let seeds = from.parse().unwrap()..to.parse().unwrap();
+    // The goal is one in a thousand, reached are 56 of 5450: most of them turn the tool.
+    let most = 1 + 15 * (seeds.end - seeds.start) / 1000;
+    let needless = judged(seeds, 400.0);
+    println!("{} lists rest without need: {needless:?}", needless.len());
+    assert!(needless.len() as u64 <= most, "{needless:?}");
 }

@@ -152,11 +152,12 @@ impl<'a, const D: usize> Section<'a, D> {
         let (mut limits, mut eased) = (self.limits(), false);
         let mut best = self.first(&scaled(parameters, density), density, &balls)?;
         let mut failure = Failure::Missed(self.poses.len() / 2);
-        for _ in 0..ATTEMPTS {
+        for attempt in 0..ATTEMPTS {
             let (spans, certificate, crossings) = self.certified(&best);
             if certificate.holds() {
                 return Ok(Motion {
                     eased,
+                    retried: attempt > 0 || density > 1.0,
                     ..Motion::new(spans, Method::Fit)
                 });
             }

@@ -73,20 +73,21 @@ impl Pace {
             };
         }
         // Between two ends in motion the passes of a sharp corner wander, and an iterate that comes close
-        // to a bound there does not leave it again: small changes of the weight, well centred.
+        // to a bound there does not leave it again: small changes of the weight, well centred, half of each
+        // slack left. The weight is never lowered: from there the iterate does not come back.
         Self {
             steps: BETWEEN,
-            growth: 2.5,
+            growth: 1.2,
             centre: 1.0,
-            low: f64::INFINITY,
-            keep: 0.2,
+            low: 0.0,
+            keep: 0.5,
             rounds: 12,
         }
     }
 }
 
 /// Most Newton steps between two ends in motion.
-const BETWEEN: usize = 200;
+const BETWEEN: usize = 400;
 
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
