@@ -19,6 +19,7 @@ mod kernel;
 mod least;
 mod least_turn;
 mod legs;
+mod memory;
 mod motion_error;
 mod moving;
 mod reach;
@@ -105,6 +106,7 @@ impl<const N: usize> Planner<N> {
         limits: JointLimits<N>,
         joint_names: Vec<String>,
     ) -> Self {
+        memory::keep();
         let kernel = Kernel::get();
         Self {
             solver: (kernel.solver)(chain.with_tool(&flange_from_tool)),
