@@ -110,8 +110,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let mut slow = Slow::default();
-    // What is known of the barrier at the iterate, under these bounds.
-    let (mut bounds, mut here) = (room.clone(), None);
+    let mut known = Known::nothing(&room);
     let more = usize::from(problem.anchor.is_some()) * ANCHORED;
     for count in 0..pace.steps + more {
         since += 1;
@@ -120,7 +119,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             since = 0;
         }
         if tight && is_let_go(problem, point) {
-            here = None;
+            known.seen = None;
             if problem.finish.is_some() {
                 weight = parameter / (2.0 * point.z);
             }
@@ -133,18 +132,13 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return done.then_some(count);
         };
-        let keep = pace.keep;
         let barrier = Barrier {
             problem,
             room: &room,
             weight,
-            keep,
+            keep: pace.keep,
         };
-        if bounds != room {
-            (bounds, here) = (room.clone(), None);
-        }
-        let (share, seen) = search(&barrier, point, (&step, here.take()), pace.rounds);
-        here = seen;
+        let share = known.search(&barrier, point, &step, pace.rounds);
         let moved = share > 0.0;
         if slow.is_new(tight && share < SHORT && step.decrement < pace.low) {
             weight = weight.min(parameter / (2.0 * point.z));
@@ -169,6 +163,35 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
     }
     (tight && problem.anchor.is_none()).then_some(pace.steps + more)
+}
+
+/// What is known of the barrier at the iterate, under these bounds.
+struct Known {
+    room: Room,
+    seen: Option<Seen>,
+}
+
+impl Known {
+    fn nothing(room: &Room) -> Self {
+        let room = room.clone();
+        Self { room, seen: None }
+    }
+
+    /// [`search`] from the iterate that is known, unless a bound has changed.
+    fn search<const D: usize>(
+        &mut self,
+        barrier: &Barrier<'_, D>,
+        point: &mut Point<D>,
+        step: &Step,
+        rounds: usize,
+    ) -> f64 {
+        if self.room != *barrier.room {
+            (self.room, self.seen) = (barrier.room.clone(), None);
+        }
+        let (share, seen) = search(barrier, point, (step, self.seen.take()), rounds);
+        self.seen = seen;
+        share
+    }
 }
 
 /// Whether the iterate has become faster than its start, which then holds it no longer.
