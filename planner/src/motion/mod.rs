@@ -19,7 +19,6 @@ mod kernel;
 mod least;
 mod least_turn;
 mod legs;
-mod memory;
 mod motion_error;
 mod moving;
 mod reach;
@@ -106,7 +105,6 @@ impl<const N: usize> Planner<N> {
         limits: JointLimits<N>,
         joint_names: Vec<String>,
     ) -> Self {
-        memory::keep();
         let kernel = Kernel::get();
         Self {
             solver: (kernel.solver)(chain.with_tool(&flange_from_tool)),
