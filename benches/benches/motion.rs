@@ -32,6 +32,8 @@ mod suite;
 mod dense;
 
 fn main() {
+    // As the command does.
+    scheduling::keep_freed_memory();
     let words: Vec<String> = std::env::args().skip(1).collect();
     if words.iter().any(|word| word == "moves") {
         random_moves(&words);

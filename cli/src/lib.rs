@@ -70,6 +70,7 @@ struct Arguments {
 ///
 /// The exit codes are part of the command line's contract, see `exit.rs`.
 pub fn main() -> ExitCode {
+    scheduling::keep_freed_memory();
     let printer = Printer::new();
     logging::start(&printer);
     let arguments = match Arguments::try_parse() {

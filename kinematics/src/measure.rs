@@ -63,8 +63,9 @@ pub fn singular_values<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [f64; 6
                 }
                 turned = true;
                 let zeta = (b - a) / (2.0 * c);
-                let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-                let cos = 1.0 / tangent.hypot(1.0);
+                // The tangent is at most 1, and is zero where the square overflows.
+                let tangent = zeta.signum() / (zeta.abs() + (zeta * zeta + 1.0).sqrt());
+                let cos = 1.0 / (tangent * tangent + 1.0).sqrt();
                 let sin = cos * tangent;
                 let (x, y) = (rows[i], rows[k]);
                 rows[i] = x * cos - y * sin;

@@ -124,23 +124,36 @@ impl<const N: usize> Op for Derivatives<'_, N> {
             let slides = self.chain.slides(i);
             let added = if slides { own } else { [zero; 3] };
             let arm = carried(&angular, reached.points[i] - before, added);
-            linear = [0, 1, 2].map(|k| linear[k] + arm[k]);
+            linear = sums(linear, arm);
             before = reached.points[i];
             if !slides {
                 angular = [w + own[0], dw + own[1], ddw + own[2]];
             }
         }
         let arm = carried(&angular, reached.end.p - before, [zero; 3]);
-        let vector = |v: F4<A>| {
-            let [x, y, z, _] = v.array();
-            Vector3::new(x, y, z)
-        };
         ToolMotion {
             pose: reached.end.frame().isometry(),
-            linear: [0, 1, 2].map(|k| vector(linear[k] + arm[k])),
-            angular: angular.map(vector),
+            linear: vectors(sums(linear, arm)),
+            angular: vectors(angular),
         }
     }
+}
+
+/// The sums of three pairs. Not by `map` of arrays, which would be compiled without SIMD.
+#[inline(always)]
+fn sums<A: Four>([a, b, c]: [F4<A>; 3], [x, y, z]: [F4<A>; 3]) -> [F4<A>; 3] {
+    [a + x, b + y, c + z]
+}
+
+/// The first three numbers of each.
+#[inline(always)]
+fn vectors<A: Four>([a, b, c]: [F4<A>; 3]) -> [Vector3<f64>; 3] {
+    let ([ax, ay, az, _], [bx, by, bz, _], [cx, cy, cz, _]) = (a.array(), b.array(), c.array());
+    [
+        Vector3::new(ax, ay, az),
+        Vector3::new(bx, by, bz),
+        Vector3::new(cx, cy, cz),
+    ]
 }
 
 /// The first three derivatives of a vector that turns with a link, and to which derivatives are

@@ -48,6 +48,10 @@ impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> Path<N> for JointLine<N
         }
     }
 
+    fn tool_at(&self, u: f64) -> ToolPoint {
+        (self.tool)(&self.joint_at(u))
+    }
+
     fn joint_at(&self, u: f64) -> JointPoint<N> {
         let u = u.clamp(0.0, 1.0);
         let step = self.end - self.start;

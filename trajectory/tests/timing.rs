@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use trajectory::timing::Limit;
+use trajectory::timing::{Limit, PathTiming};
 use trajectory::{
     JointLimits, JointLine, JointPoint, SplinePath, Timed, TimingOptions, ToolLimits, ToolPoint,
     time_path,
@@ -59,6 +59,24 @@ fn waypoints() -> impl Strategy<Value = Vec<[f64; 3]>> {
 
 proptest! {
     #![proptest_config(config())]
+
+    /// A search that is told of a faster motion ends early; one that is told of a slower motion finds
+    /// what it finds without.
+    #[test]
+    fn a_limit_of_time_only_ends_what_is_slower(points in waypoints(), limits in limits()) {
+        let path = spline(&points);
+        let (tool, options) = (ToolLimits::UNLIMITED, TimingOptions::default());
+        let timing = PathTiming::new(&path, &limits, &tool, &options).unwrap();
+        let best = timing.solve().unwrap();
+        let time = best.trajectory.duration();
+        for factor in [0.3, 0.9, 0.99] {
+            prop_assert!(timing.solve_below(factor * time).unwrap().is_none());
+        }
+        for factor in [1.01, 1.1, 3.0] {
+            let found = timing.solve_below(factor * time).unwrap();
+            prop_assert_eq!(found.as_ref(), Some(&best));
+        }
+    }
 
     /// The certificate holds, samples agree with it, and the motion starts and ends at rest.
     #[test]

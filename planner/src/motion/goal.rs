@@ -78,21 +78,22 @@ impl<const N: usize> Planner<N> {
     ) -> (Vec<SVector<f64, N>>, usize) {
         let rated = goals.into_iter().map(|goal| {
             let way = (goal - start).abs().component_div(&self.limits.velocity);
-            (way.max() / self.ease(&goal), goal)
+            let ease = self.ease(&goal);
+            (way.max() / ease, ease, goal)
         });
-        let mut rated: Vec<(f64, SVector<f64, N>)> = rated.collect();
+        let mut rated: Vec<(f64, f64, SVector<f64, N>)> = rated.collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all = rated.iter().map(|(_, goal)| *goal);
+        let all = rated.iter().map(|(_, _, goal)| *goal);
         let mut chosen = apart(Vec::new(), all, (TRIED, ALIKE));
         let sure = chosen.len();
         let most = |goal: &SVector<f64, N>| self.ease(goal);
         let enough = chosen.iter().map(most).fold(EASY, f64::min);
-        rated.retain(|(_, goal)| self.ease(goal) >= enough);
-        for (least, goal) in &mut rated {
+        rated.retain(|(_, ease, _)| *ease >= enough);
+        for (least, _, goal) in &mut rated {
             *least = self.least_of_line(start, goal, &motion.limits);
         }
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all = rated.into_iter().map(|(_, goal)| goal);
+        let all = rated.into_iter().map(|(_, _, goal)| goal);
         chosen = apart(chosen, all, (TRIED + TRIED_REDUNDANT, 0.5 * ALIKE));
         (chosen, sure)
     }

@@ -28,7 +28,7 @@ pub(super) const RESTING: TimingOptions = TimingOptions {
     rate_cap: None,
     cells: None,
     fit: 1e-8,
-    gap: 1e-3,
+    gap: 4e-4,
     reserve: 0.0,
 };
 
@@ -211,7 +211,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 }
             }
             Stage::Timed(timing) => {
-                if let Ok(timed) = timing.solve_below(self.limit()) {
+                if let Ok(Some(timed)) = timing.solve_below(self.limit()) {
                     self.keep(Draft::of(timed.trajectory));
                 }
             }

@@ -165,6 +165,7 @@ impl Attempts<'_> {
             finish,
             then,
         } = self.window;
+        let whole = self.inner.clone();
         for attempt in 0..5_usize {
             let narrowed = self.inner.clone();
             let mut request = Request {
@@ -198,12 +199,17 @@ impl Attempts<'_> {
             if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
                 return None;
             }
+            let couple = (attempt == 1 || over > 1.3) && turns;
+            self.coupled = Some(request.coupled || couple);
+            if couple && !request.coupled {
+                // What an orientation exceeds that follows the path says nothing about the optimum.
+                self.inner = whole.clone();
+                continue;
+            }
             narrow(&mut self.inner, &certificate, &crossings, request.coupled);
             if certificate.in_order && !settled {
                 self.inner.tolerance *= 0.5;
             }
-            let couple = (attempt == 1 || over > 1.3) && turns;
-            self.coupled = Some(request.coupled || couple);
         }
         None
     }

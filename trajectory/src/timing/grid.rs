@@ -19,6 +19,8 @@ pub(super) struct Grid {
     pub nodes: Vec<f64>,
     /// Whether a node lies on a knot of the path, where derivatives may jump.
     pub knot: Vec<bool>,
+    /// Whether the joints move on a straight line, evenly in the path parameter.
+    pub straight: bool,
 }
 
 /// A path with everything that bounds it.
@@ -116,7 +118,11 @@ impl Grid {
             let even = vec![end / total; spans + 1];
             Reparametrization::new(&even, span, end, [options.start, options.end])
         };
-        Self::with_reparametrization(reparametrization, knots, end, cells)
+        let grid = Self::with_reparametrization(reparametrization, knots, end, cells);
+        Self {
+            straight: reachability.straight,
+            ..grid
+        }
     }
 
     /// The grid of about `cells` cells over `reparametrization`, with nodes on the knots.
@@ -154,6 +160,7 @@ impl Grid {
             reparametrization,
             nodes,
             knot,
+            straight: false,
         }
     }
 }

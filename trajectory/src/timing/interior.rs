@@ -16,6 +16,25 @@ use super::state::State;
 use super::step_length::{Measure, StepLength};
 use simd::Build;
 
+/// How a law is improved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Descent {
+    /// Relative gap of the duration at which to end.
+    pub gap: f64,
+    /// The assumed relative gap of the start.
+    pub first: f64,
+    /// Most Newton steps.
+    pub steps: usize,
+    /// A law that takes this long (s) is of no use.
+    pub limit: f64,
+}
+
+/// Times the gap that a law may still gain. Until the multipliers meet their equations the gap is an
+/// estimate.
+const SURE: f64 = 2.0;
+/// Largest share of the first error in these equations with which the estimate is used.
+const SETTLED: f64 = 0.05;
+
 /// An iterate of the law with the multipliers of its rows. It can solve all problems over one grid,
 /// one after the other.
 #[derive(Clone, Debug)]
@@ -97,15 +116,16 @@ impl Interior {
         time.is_finite() && flat < 1.0 && steep < 1.0
     }
 
-    /// Improves the law until the relative gap of its duration is below `gap`, at most `most`
-    /// Newton steps. `first` is the assumed relative gap of the start.
-    pub(super) fn solve(&mut self, problem: &Problem, gap: f64, first: f64, most: usize) {
+    /// Improves the law until the relative gap of its duration is below that of `descent`; false if it
+    /// ended because the fastest law is not shorter than the limit.
+    pub(super) fn solve(&mut self, problem: &Problem, descent: &Descent) -> bool {
+        let Descent { gap, limit, .. } = *descent;
         let mut time = self.worth.time;
         let count = problem.counted_rows() as f64;
-        let mut mu = first * time / count;
+        let mut mu = descent.first * time / count;
         self.turn(Turn::Balance(mu), mu);
-        let mut sigma = 0.3;
-        for _ in 0..most {
+        let (mut sigma, mut error) = (0.3, 1.0);
+        for _ in 0..descent.steps {
             let centre = sigma * mu;
             let reach = self.newton(problem, centre);
             let dual = (0.95 / reach.dual).min(1.0);
@@ -121,8 +141,13 @@ impl Interior {
             if total < gap * time && best > 0.5 && (before - time).abs() < gap * time {
                 break;
             }
+            error *= 1.0 - best;
+            if error < SETTLED && time - SURE * total >= limit {
+                return false;
+            }
             sigma = (1.0 - best).powi(2).clamp(0.06, 0.7);
         }
+        true
     }
 
     /// Moves towards the centre of the feasible set, `steps` Newton steps, without regard to time.

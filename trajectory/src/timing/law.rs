@@ -3,7 +3,7 @@
 use super::TimingOptions;
 use super::grid::{Bounded, Grid};
 use super::gridpoints::Gridpoints;
-use super::interior::Interior;
+use super::interior::{Descent, Interior};
 use super::problem::Problem;
 use super::reachability::ReachabilityPass;
 use super::tighten::MOST_STEPS;
@@ -61,11 +61,21 @@ impl LawProblem {
     pub fn solve(&self) -> Law {
         let mut interior = Interior::new(&self.problem);
         interior.slow_down(&self.problem);
-        interior.solve(&self.problem, self.gap, 0.3, MOST_STEPS);
+        interior.solve(&self.problem, &descent(self.gap));
         Law {
             duration: interior.time(),
             iterations: interior.iterations,
         }
+    }
+}
+
+/// From a law that is only known to be possible, to a relative gap.
+fn descent(gap: f64) -> Descent {
+    Descent {
+        gap,
+        first: 0.3,
+        steps: MOST_STEPS,
+        limit: f64::INFINITY,
     }
 }
 
@@ -135,7 +145,7 @@ mod tests {
             let [wide, plain] = [Build::detect(), Build::Plain].map(|build| {
                 let mut interior = Interior::with(&problem, build);
                 interior.slow_down(&problem);
-                interior.solve(&problem, 1e-6, 0.3, MOST_STEPS);
+                interior.solve(&problem, &descent(1e-6));
                 interior
             });
             assert_eq!(wide.x, plain.x);

@@ -137,16 +137,21 @@ impl<'a, const N: usize> PathTiming<'a, N> {
     /// # Errors
     /// As [`time_path`].
     pub fn solve(&self) -> Result<Timed<N>, TimingError> {
-        self.solve_below(f64::INFINITY)
+        let timed = self.solve_below(f64::INFINITY)?;
+        timed.ok_or(TimingError::Unbounded)
     }
 
-    /// The fastest motion along the path; a slower one within the limits, for less work, where the
-    /// fastest is not shorter than `limit` (s).
+    /// The fastest motion along the path; `None`, for less work, if it is not shorter than `limit` (s).
     ///
     /// # Errors
     /// As [`time_path`].
-    pub fn solve_below(&self, limit: f64) -> Result<Timed<N>, TimingError> {
+    pub fn solve_below(&self, limit: f64) -> Result<Option<Timed<N>>, TimingError> {
         let draft = draft(self.bounded, &self.reachability, limit)?;
+        Ok(draft.map(|draft| self.finished(draft)))
+    }
+
+    /// The motion of a draft, slowed down until it keeps every limit.
+    fn finished(&self, draft: tighten::Draft<N>) -> Timed<N> {
         let tighten::Draft { pieces, audit, .. } = draft;
         // A moving start fixes the law there, so it cannot be stretched and must hold as it is.
         let moving = matches!(self.bounded.options.start, Boundary::Moving { .. });
@@ -173,11 +178,11 @@ impl<'a, const N: usize> PathTiming<'a, N> {
             cells: draft.cells,
             iterations: draft.iterations,
         };
-        Ok(Timed {
+        Timed {
             trajectory,
             law,
             certificate,
-        })
+        }
     }
 }
 
@@ -187,7 +192,7 @@ fn draft<const N: usize>(
     bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
     limit: f64,
-) -> Result<tighten::Draft<N>, TimingError> {
+) -> Result<Option<tighten::Draft<N>>, TimingError> {
     let mut options = *bounded.options;
     let mut refused = None;
     for _ in 0..FINER {

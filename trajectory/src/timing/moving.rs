@@ -6,7 +6,7 @@
 
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
-use super::interior::Interior;
+use super::interior::{Descent, Interior};
 use super::problem::Problem;
 use super::tighten::{Draft, MOST_STEPS, tighten};
 use crate::TimingError;
@@ -39,7 +39,13 @@ pub(super) fn best<const N: usize>(
     for round in 0..ROUNDS {
         enter(&mut interior, &problem)?;
         interior.slow_down(&problem);
-        interior.solve(&problem, bounded.options.gap, 0.3, MOST_STEPS);
+        let descent = Descent {
+            gap: bounded.options.gap,
+            first: 0.3,
+            steps: MOST_STEPS,
+            limit: f64::INFINITY,
+        };
+        interior.solve(&problem, &descent);
         let draft = Draft::new(bounded, gridpoints, &problem, &interior);
         if draft.audit.stretch_after_first() <= 1.0 {
             return start_holds(draft);

@@ -24,6 +24,9 @@ pub(super) struct Problem {
     pub widths: Vec<f64>,
     /// Joint rows at a slot.
     pub joints: usize,
+    /// The joints that come nearest to their limits of acceleration and of jerk, where each has the
+    /// only joint row of its kind.
+    pub leading: Option<[usize; 2]>,
     /// Tool rows of acceleration at a slot.
     pub tool_accelerations: usize,
     /// Tool rows of jerk at a slot.
@@ -163,6 +166,20 @@ impl Problem {
     /// Whether the jerk rows of cell `k` stand closer.
     pub(super) fn dense(&self, k: usize) -> bool {
         k.min(self.cells() - 1 - k) < DENSE
+    }
+
+    /// The row of joint `j` at a slot: of acceleration, or of jerk (1). `None` if it has none, because
+    /// another joint is always nearer to its limit.
+    pub(super) fn joint_row(&self, kind: usize, j: usize) -> Option<usize> {
+        match self.leading {
+            Some(leading) => (leading[kind] == j).then_some(0),
+            None => Some(j),
+        }
+    }
+
+    /// The joint of a row.
+    pub(super) fn joint_of(&self, kind: usize, row: usize) -> usize {
+        self.leading.map_or(row, |leading| leading[kind])
     }
 
     /// The slot of values of cell `k`: its left end, or its middle.

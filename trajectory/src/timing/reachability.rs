@@ -31,6 +31,8 @@ pub(super) struct ReachabilityPass {
     /// Lower bound of the duration (s) by velocity and acceleration limits, and by jerk limits at the
     /// ends of a path that is straight in joint space.
     pub bound: f64,
+    /// Whether the joints move on a straight line, evenly in the path parameter.
+    pub straight: bool,
 }
 
 /// The cap of `(du/dt)^2` from speeds: joints, tool and the rate itself.
@@ -57,12 +59,13 @@ impl ReachabilityPass {
         options: &TimingOptions,
     ) -> Result<Self, TimingError> {
         let at = places(path)?;
+        let bends = Bends::new(path, &at, tool)?;
         let rows = Rows {
             joint,
             tool,
             rate_cap: options.rate_cap,
+            leading: bends.step().map(|step| leading(&step, &joint.acceleration)),
         };
-        let bends = Bends::new(path, &at, tool)?;
         if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
             corners(path, bends.sizes)?;
         }
@@ -103,8 +106,14 @@ impl ReachabilityPass {
             times,
             ramp,
             bound,
+            straight: bends.step().is_some(),
         })
     }
+}
+
+/// The joint that comes nearest to its limit where the joints move by `step`.
+pub(super) fn leading<const N: usize>(step: &SVector<f64, N>, limit: &SVector<f64, N>) -> usize {
+    step.component_div(limit).iamax()
 }
 
 /// `(du/dt)^2` at the start: from the boundary, or free.
@@ -202,9 +211,15 @@ impl<const N: usize> Bends<N> {
     /// How fast the law can rise, if the path is straight in joint space and both ends are at rest.
     fn rise(&self, joint: &JointLimits<N>, options: &TimingOptions) -> Option<Rise> {
         let rest = options.start == Boundary::Rest && options.end == Boundary::Rest;
+        let step = self.step().filter(|_| rest)?;
+        Some(Rise::new(&step, joint))
+    }
+
+    /// How the joints move with the path parameter, if that is the same everywhere.
+    fn step(&self) -> Option<SVector<f64, N>> {
         let straight = self.sizes[2] == 0.0 && self.sizes[3] == 0.0;
-        let step = self.joints.first()?[0];
-        (rest && straight).then(|| Rise::new(&step, joint))
+        let first = self.joints.first().filter(|_| straight)?;
+        Some(first[0])
     }
 
     /// The tool at place `i`: position, then orientation.
@@ -263,6 +278,9 @@ struct Rows<'a, const N: usize> {
     joint: &'a JointLimits<N>,
     tool: &'a ToolLimits,
     rate_cap: Option<f64>,
+    /// The only joint whose acceleration counts, because the others are always farther from their
+    /// limits.
+    leading: Option<usize>,
 }
 
 impl<const N: usize> Rows<'_, N> {
@@ -270,7 +288,8 @@ impl<const N: usize> Rows<'_, N> {
     fn grid(&self, at: &[f64], bends: &Bends<N>, step: usize) -> ReachGrid {
         let tool = [self.tool.acceleration, self.tool.angular_acceleration];
         let tools = tool.iter().filter(|limit| limit.is_finite()).count();
-        let mut grid = ReachGrid::with_room(N + 3 * tools, at.len() / step + 2);
+        let joints = if self.leading.is_some() { 1 } else { N };
+        let mut grid = ReachGrid::with_room(joints + 3 * tools, at.len() / step + 2);
         let caps: Vec<f64> = (0..at.len()).map(|i| self.cap(bends, i)).collect();
         let most = caps
             .iter()
@@ -310,7 +329,8 @@ impl<const N: usize> Rows<'_, N> {
     ) -> impl Iterator<Item = (f64, f64)> {
         let [first, second] = bends.joints[i];
         let narrow = *narrow;
-        let joints = (0..N).map(move |j| (first[j] * narrow[j], second[j] * narrow[j]));
+        let all = self.leading.map_or(0..N, |j| j..j + 1);
+        let joints = all.map(move |j| (first[j] * narrow[j], second[j] * narrow[j]));
         let axes = |[p, q]: [Vector3<f64>; 2], limit: f64| {
             let count = if limit.is_finite() { 3 } else { 0 };
             (0..count).map(move |i| (p[i] / limit, q[i] / limit))

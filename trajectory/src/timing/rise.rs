@@ -15,14 +15,18 @@ pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f
 pub(super) struct Rise {
     acceleration: f64,
     jerk: f64,
+    /// The cube root of `6 J^2`.
+    root: f64,
 }
 
 impl Rise {
     /// For joints that move by `step` for one unit of `u` (rad).
     pub(super) fn new<const N: usize>(step: &SVector<f64, N>, limits: &JointLimits<N>) -> Self {
+        let jerk = 1.0 / joint_ratio(step, &limits.jerk);
         Self {
             acceleration: 1.0 / joint_ratio(step, &limits.acceleration),
-            jerk: 1.0 / joint_ratio(step, &limits.jerk),
+            jerk,
+            root: (6.0 * jerk * jerk).cbrt(),
         }
     }
 
@@ -39,7 +43,7 @@ impl Rise {
         // Where the acceleration reaches its limit.
         let full = a * a * a / (6.0 * j * j);
         let rising = u.min(full);
-        let half = 0.75 * (6.0 * j * j * rising * rising).cbrt() * rising.cbrt().powi(2);
+        let half = 0.75 * self.root * rising.cbrt().powi(4);
         2.0 * (half + a * (u - rising))
     }
 }

@@ -6,7 +6,7 @@ use super::block::{LANE, Lane};
 use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
-use super::reachability::speed_cap;
+use super::reachability::{leading, speed_cap};
 use super::rise::joint_ratio;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, ToolLimits};
@@ -48,7 +48,10 @@ impl<const N: usize> Bounded<'_, N> {
         let TimingOptions { start, .. } = self.options;
         let moving = matches!(start, Boundary::Moving { .. });
         let nodes = &gridpoints.grid.nodes;
-        let mut problem = Problem::new(nodes, N, tools, moving);
+        let leading = self.leading(gridpoints);
+        let joints = if leading.is_some() { 1 } else { N };
+        let mut problem = Problem::new(nodes, joints, tools, moving);
+        problem.leading = leading;
         let rows = Rows {
             joint: self.joint,
             tool,
@@ -70,6 +73,16 @@ impl<const N: usize> Bounded<'_, N> {
         };
         rows.values(&mut problem, slot, end);
         problem
+    }
+
+    /// The joints nearest to their limits of acceleration and of jerk, if these are the same along the
+    /// whole path.
+    fn leading(&self, gridpoints: &Gridpoints<'_, N>) -> Option<[usize; 2]> {
+        // At an end at rest the path does not move with the parameter.
+        let step = gridpoints.middle(gridpoints.grid.nodes.len() / 2 - 1).joint[0];
+        let limits = [&self.joint.acceleration, &self.joint.jerk];
+        let straight = gridpoints.grid.straight;
+        straight.then(|| limits.map(|limit| leading(&step, limit)))
     }
 
     /// Sets all rows of cell `k`.
@@ -118,8 +131,10 @@ impl<const N: usize> Rows<'_, N> {
         let Place { gridpoint, tool } = place;
         let Slot { slot, lane: l } = to;
         let [first, second, _] = &gridpoint.joint;
-        for (j, row) in problem.acceleration[slot * N..][..N].iter_mut().enumerate() {
-            let narrow = self.acceleration[j];
+        for i in 0..problem.joints {
+            let j = problem.joint_of(0, i);
+            let (narrow, row) = (self.acceleration[j], slot * problem.joints + i);
+            let row = &mut problem.acceleration[row];
             (row[0][l], row[1][l]) = (first[j] * narrow, second[j] * narrow);
         }
         let tools = [
@@ -152,8 +167,10 @@ impl<const N: usize> Rows<'_, N> {
         let Place { gridpoint, tool } = place;
         let Slot { slot, lane: l } = to;
         let [first, second, third] = &gridpoint.joint;
-        for (j, row) in problem.jerk[slot * N..][..N].iter_mut().enumerate() {
-            let narrow = self.jerk[j];
+        for i in 0..problem.joints {
+            let j = problem.joint_of(1, i);
+            let (narrow, row) = (self.jerk[j], slot * problem.joints + i);
+            let row = &mut problem.jerk[row];
             row[0][l] = third[j] * narrow;
             row[1][l] = 3.0 * second[j] * narrow;
             row[2][l] = first[j] * narrow;
@@ -176,5 +193,58 @@ impl<const N: usize> Rows<'_, N> {
 fn set(to: &mut [Lane; 3], l: usize, vector: Vector3<f64>) {
     for (lane, x) in to.iter_mut().zip(vector.iter()) {
         lane[l] = *x;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timing::grid::Grid;
+    use crate::timing::interior::{Descent, Interior};
+    use crate::timing::reachability::ReachabilityPass;
+    use crate::{JointLine, ToolPoint};
+    use nalgebra::{Isometry3, vector};
+
+    /// Along a straight line the rows of the joint that is nearest to its limits give the same law as
+    /// those of all joints.
+    #[test]
+    fn one_joint_leads_along_a_straight_line() {
+        let still = |_: &crate::JointPoint<3>| ToolPoint::still(Isometry3::identity());
+        let line = JointLine::new(vector![0.0, 0.5, 1.0], vector![0.7, -0.9, 1.1], still);
+        let joint = JointLimits {
+            velocity: vector![1.0, 2.0, 3.0],
+            acceleration: vector![4.0, 8.0, 2.0],
+            jerk: vector![90.0, 50.0, 60.0],
+            ..JointLimits::uniform(1.0, 1.0, 1.0)
+        };
+        let (tool, options) = (ToolLimits::UNLIMITED, TimingOptions::default());
+        let bounded = Bounded {
+            path: &line,
+            joint: &joint,
+            tool: &tool,
+            options: &options,
+        };
+        let pass = ReachabilityPass::new(&line, &joint, &tool, &options).unwrap();
+        let straight = Grid::new(&pass, &[0.0, 1.0], 1.0, &options);
+        assert!(straight.straight);
+        let any = Grid {
+            straight: false,
+            ..straight.clone()
+        };
+        let times = [straight, any].map(|grid| {
+            let problem = bounded.problem(&Gridpoints::new(bounded, &grid));
+            assert_eq!(problem.joints, if grid.straight { 1 } else { 3 });
+            let mut interior = Interior::new(&problem);
+            interior.slow_down(&problem);
+            let descent = Descent {
+                gap: 1e-9,
+                first: 0.3,
+                steps: 200,
+                limit: f64::INFINITY,
+            };
+            assert!(interior.solve(&problem, &descent));
+            interior.time()
+        });
+        assert!((times[0] / times[1] - 1.0).abs() < 1e-7, "{times:?}");
     }
 }

@@ -3,7 +3,7 @@
 
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
-use super::interior::Interior;
+use super::interior::{Descent, Interior};
 use super::moving;
 use super::tighten::{Draft, MOST_STEPS, tighten};
 use crate::TimingError;
@@ -15,43 +15,56 @@ const ROUNDS: usize = 2;
 /// Time that need not be gained back by another round.
 const ENOUGH: f64 = 1.0005;
 
-/// The fastest law found over `grid` once it is stretched to meet every bound. A law that cannot be
-/// shorter than `limit` (s) is not improved.
+/// The fastest law found over `grid` once it is stretched to meet every bound. `None` if it is not
+/// shorter than `limit` (s).
 pub(super) fn best<const N: usize>(
     bounded: Bounded<'_, N>,
     gridpoints: &Gridpoints<'_, N>,
     limit: f64,
-) -> Result<Draft<N>, TimingError> {
+) -> Result<Option<Draft<N>>, TimingError> {
     let mut problem = bounded.problem(gridpoints);
     if problem.moving {
-        return moving::best(bounded, gridpoints, problem);
+        return moving::best(bounded, gridpoints, problem).map(Some);
     }
-    let gap = bounded.options.gap;
+    let mut descent = Descent {
+        gap: bounded.options.gap,
+        first: 0.3,
+        steps: MOST_STEPS,
+        limit,
+    };
+    // Tightened rows never make a law faster than it is now, up to the gap.
+    let share = 1.0 - 2.0 * descent.gap;
     let mut interior = Interior::new(&problem);
     interior.slow_down(&problem);
-    interior.solve(&problem, gap, 0.3, MOST_STEPS);
-    let mut last = Draft::new(bounded, gridpoints, &problem, &interior);
-    let mut best = None;
+    if !interior.solve(&problem, &descent) || interior.time() * share >= limit {
+        return Ok(None);
+    }
+    let mut best = Draft::new(bounded, gridpoints, &problem, &interior);
+    let mut last = None;
     for _ in 0..ROUNDS {
-        // Tightened rows never make the law faster than it is now, up to the gap.
-        if last.audit.stretch < ENOUGH || interior.time() * (1.0 - 2.0 * gap) >= limit {
+        let draft = last.as_ref().unwrap_or(&best);
+        if draft.audit.stretch < ENOUGH {
             break;
         }
-        tighten(&mut problem, &last, 1.0);
-        best = Some(faster(best, last));
+        tighten(&mut problem, draft, 1.0);
+        (descent.first, descent.steps) = (0.02, FEW_STEPS);
+        descent.limit = limit.min(best.duration);
         interior.slow_down(&problem);
-        interior.solve(&problem, gap, 0.02, FEW_STEPS);
-        last = Draft::new(bounded, gridpoints, &problem, &interior);
+        if !interior.solve(&problem, &descent) || interior.time() * share >= descent.limit {
+            break;
+        }
+        let next = Draft::new(bounded, gridpoints, &problem, &interior);
+        last = keep_faster(&mut best, next);
     }
-    let mut best = faster(best, last);
     best.iterations = interior.iterations;
-    Ok(best)
+    Ok(Some(best))
 }
 
-/// The faster of two drafts, the first when they are even.
-fn faster<const N: usize>(first: Option<Draft<N>>, second: Draft<N>) -> Draft<N> {
-    match first {
-        Some(first) if first.duration <= second.duration => first,
-        _ => second,
+/// Keeps the faster of two drafts, the first when they are even; returns the second if it is slower.
+fn keep_faster<const N: usize>(best: &mut Draft<N>, next: Draft<N>) -> Option<Draft<N>> {
+    if best.duration <= next.duration {
+        return Some(next);
     }
+    *best = next;
+    None
 }

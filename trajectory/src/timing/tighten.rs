@@ -93,13 +93,19 @@ fn scale(problem: &mut Problem, k: usize, tools: &Tools, limit: Limit, factor: f
     let (joints, tool_jerks) = (problem.joints, problem.tool_jerks);
     match limit {
         Limit::JointAcceleration(j) => {
+            let Some(row) = problem.joint_row(0, j) else {
+                return;
+            };
             for (slot, l) in values {
-                widen(&mut problem.acceleration[slot * joints + j], l, factor);
+                widen(&mut problem.acceleration[slot * joints + row], l, factor);
             }
         }
         Limit::JointJerk(j) => {
+            let Some(row) = problem.joint_row(1, j) else {
+                return;
+            };
             for slot in jerks {
-                widen(&mut problem.jerk[slot * joints + j], l, factor);
+                widen(&mut problem.jerk[slot * joints + row], l, factor);
             }
         }
         Limit::ToolAcceleration | Limit::AngularAcceleration => {

@@ -1,5 +1,7 @@
 //! Symmetric positive definite systems with a narrow band.
 
+use std::ops::Range;
+
 use simd::{Build, Four, LANES, Op};
 
 /// A symmetric band matrix, lower half, by columns: entry `[c][k]` is row
@@ -16,7 +18,7 @@ pub(crate) const SPARE: usize = 3;
 
 /// Columns eliminated together: each later number is read and written once for
 /// all of them, and always at the same place of a register.
-const PANEL: usize = LANES;
+pub(crate) const PANEL: usize = LANES;
 
 /// Length of a panel column with zeros after it, for `B` up to 36.
 const ROOM: usize = 48;
@@ -46,10 +48,25 @@ impl<const B: usize> Band<B> {
         self.build.run(Factor(&mut self.columns))
     }
 
-    /// Solves with the factor, in place, for `M` right-hand sides at once, each
+    /// Solves with the factor and with the transposed one, in place, for `M` right-hand sides, each
     /// followed by `B` zeros or more.
     pub(crate) fn solve<const M: usize>(&self, x: [&mut [f64]; M]) {
-        self.build.run(Solve(&self.columns, x));
+        for x in x {
+            self.lower([&mut *x], 0..self.columns.len());
+            self.upper(x);
+        }
+    }
+
+    /// Solves with the factor, in place, for `M` right-hand sides at once, each followed by `B` zeros
+    /// or more; only the panels with these rows, where all before are zero.
+    pub(crate) fn lower<const M: usize>(&self, x: [&mut [f64]; M], rows: Range<usize>) {
+        let panels = rows.start / PANEL..rows.end.div_ceil(PANEL);
+        self.build.run(Lower(&self.columns, x, panels));
+    }
+
+    /// Solves with the transposed factor, in place, for one that is followed by `B` zeros or more.
+    pub(crate) fn upper(&self, x: &mut [f64]) {
+        self.build.run(Upper(&self.columns, x));
     }
 }
 
@@ -136,20 +153,33 @@ fn simd_chunks<const B: usize>(column: &mut [f64; B]) -> std::slice::ChunksExact
     column.chunks_exact_mut(LANES)
 }
 
-/// [`Band::solve`].
-struct Solve<'a, const B: usize, const M: usize>(&'a [[f64; B]], [&'a mut [f64]; M]);
+/// [`Band::lower`].
+struct Lower<'a, const B: usize, const M: usize>(&'a [[f64; B]], [&'a mut [f64]; M], Range<usize>);
 
-impl<const B: usize, const M: usize> Op for Solve<'_, B, M> {
+impl<const B: usize, const M: usize> Op for Lower<'_, B, M> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Four>(self, simd: S) {
-        let Self(columns, mut x) = self;
-        for (p, panel) in columns.chunks(PANEL).enumerate() {
+        let Self(columns, mut x, panels) = self;
+        let all = columns.chunks(PANEL).enumerate();
+        for (p, panel) in all.take(panels.end).skip(panels.start) {
             forward(simd, panel, &mut x, p * PANEL);
         }
+    }
+}
+
+/// [`Band::upper`].
+struct Upper<'a, const B: usize>(&'a [[f64; B]], &'a mut [f64]);
+
+impl<const B: usize> Op for Upper<'_, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) {
+        let Self(columns, x) = self;
         for (p, panel) in columns.chunks(PANEL).enumerate().rev() {
-            backward(simd, panel, &mut x, p * PANEL);
+            backward(simd, panel, &mut [&mut *x], p * PANEL);
         }
     }
 }

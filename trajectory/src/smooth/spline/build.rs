@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::basis;
-use super::ends::{correct, rolled, rotations};
+use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
 use super::solve::{Effort, solve};
-use super::start;
+use super::start::{self, KNOTS_PER_RAMP};
 use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
@@ -25,6 +25,19 @@ const ANGULAR: f64 = 0.985;
 
 /// Bound of an angular rate at an end in motion over its value there.
 const AT_END: f64 = 1.0 + 1e-5;
+
+/// Poses up to which position and orientation have bands of their own.
+const FEW: usize = 26;
+
+/// Times that the jump of an angular velocity within one knot may exceed the angular jerk where the
+/// orientation is to follow the progress.
+const HOPELESS: f64 = 30.0;
+
+/// Share of the angular limits that a correction of the drift may take, and the largest second and third
+/// derivative of its course from 0 to 1.
+const CORRECTED: f64 = 0.015;
+const BEND: f64 = 5.8;
+const STEEPEST: f64 = 60.0;
 
 /// Control points over which the difference of an orientation in motion fades out.
 const FADE: f64 = 12.0;
@@ -69,16 +82,29 @@ impl Request<'_> {
         ]
     }
 
-    /// True when each leg that turns takes about as long to move as to turn, so
-    /// that the orientation can follow the progress.
+    /// True when each leg that turns takes about as long to move as to turn, so that the orientation
+    /// can follow the progress, and when no pose is passed with a jump of the angular velocity that is
+    /// far above the angular jerk.
     pub(crate) fn can_follow(&self) -> bool {
         let limits = &self.options.limits;
+        let ramps = [
+            limits.acceleration / limits.jerk,
+            limits.angular_acceleration / limits.angular_jerk,
+        ];
+        let knot = ramps[0].max(ramps[1]) / KNOTS_PER_RAMP;
+        let most = HOPELESS * limits.angular_jerk * knot * knot / limits.speed;
+        let mut before: Option<Vector3<f64>> = None;
         self.poses.windows(2).all(|pair| {
             let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
-            let turn = body_turn(&pair[0].rotation, &pair[1].rotation).norm();
-            turn < 1e-12
-                || (way > self.options.tolerance.min(1e-3)
-                    && turn / limits.angular_speed < 1.5 * way / limits.speed)
+            let turn = body_turn(&pair[0].rotation, &pair[1].rotation);
+            let angle = turn.norm();
+            let far = way > self.options.tolerance.min(1e-3);
+            let slow = angle / limits.angular_speed < 1.5 * way / limits.speed;
+            let rate = turn / way.max(1e-300);
+            let jump = before
+                .replace(rate)
+                .map_or(0.0, |before| (rate - before).norm());
+            (angle < 1e-12 || (far && slow)) && jump <= most
         })
     }
 }
@@ -98,6 +124,8 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
         [true, false] => task.run::<3, 20>([true, false]),
         [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
         [false, true] => task.run::<3, 20>([false, true]),
+        // The passing times beside the band cost the square of their number.
+        [true, true] if request.poses.len() <= FEW => task.run::<6, 20>([true, true]),
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
     }
@@ -363,7 +391,13 @@ impl Task<'_> {
             } else {
                 self.on_leg(&vector(to), leg)
             };
-            correct(&mut result, from, to, &target);
+            // As long as it has to be, over other corrections where the legs are short.
+            let drift = body_turn(&result[to], &target).norm() / CORRECTED;
+            let [_, bent, steep] = problem.groups[D / 3 - 1].caps;
+            let reach = (BEND * drift / bent).sqrt();
+            let reach = reach.max((STEEPEST * drift / steep).cbrt()) / h;
+            let since = from.min(to.saturating_sub(reach as usize));
+            correct(&mut result, since.max(3), to, &target);
             from = to;
         }
         result[knots - 4..].copy_from_slice(&end);
@@ -443,29 +477,4 @@ impl Task<'_> {
             * UnitQuaternion::from_scaled_axis(way * share)
             * UnitQuaternion::from_scaled_axis(off - way * share)
     }
-}
-
-/// Control points in the middle of a leg, with the leg, at least six apart.
-fn anchors<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Vec<(usize, usize)> {
-    let knots = point.control.len();
-    let mut result = Vec::new();
-    let mut last = 3;
-    for leg in 1..problem.vertices.len() {
-        let since = if leg == 1 {
-            0.0
-        } else {
-            point.crossings[leg - 2]
-        };
-        let until = point
-            .crossings
-            .get(leg - 1)
-            .copied()
-            .unwrap_or(point.spans() as f64);
-        let middle = (0.5 * (since + until) + 1.5).round().max(0.0) as usize;
-        if middle >= last + 6 && middle + 10 <= knots {
-            result.push((middle, leg));
-            last = middle;
-        }
-    }
-    result
 }

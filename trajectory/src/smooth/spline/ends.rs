@@ -1,8 +1,9 @@
-//! The control orientations that a start or an end in motion fixes.
+//! The control orientations that a start or an end in motion fixes, and those that poses draw to themselves.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::basis::START;
+use super::problem::{Point, Problem};
 use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
@@ -70,16 +71,45 @@ pub(super) fn correct(
     to: usize,
     target: &UnitQuaternion<f64>,
 ) {
-    let drift = body_turn(&rotations[to], target);
-    let was = rotations[to];
+    // In the axes of the room: a correction in those of the tool would end with a jump of the angular
+    // velocity, which it turns too.
+    let drift = rotations[to] * body_turn(&rotations[to], target);
     for k in from + 1..=to {
         let x = (k - from) as f64 / (to - from) as f64;
         let share = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
-        rotations[k] *= UnitQuaternion::from_scaled_axis(drift * share);
+        rotations[k] = UnitQuaternion::from_scaled_axis(drift * share) * rotations[k];
     }
-    let follow = rotations[to] * was.inverse();
+    let follow = UnitQuaternion::from_scaled_axis(drift);
     for rotation in rotations.iter_mut().skip(to + 1) {
         // Products of many unit quaternions drift in length.
         *rotation = UnitQuaternion::new_normalize((follow * *rotation).into_inner());
     }
+}
+
+/// Control points in the middle of a leg, with the leg, at least six apart.
+pub(super) fn anchors<const D: usize>(
+    problem: &Problem<D>,
+    point: &Point<D>,
+) -> Vec<(usize, usize)> {
+    let knots = point.control.len();
+    let mut result = Vec::new();
+    let mut last = 3;
+    for leg in 1..problem.vertices.len() {
+        let since = if leg == 1 {
+            0.0
+        } else {
+            point.crossings[leg - 2]
+        };
+        let until = point
+            .crossings
+            .get(leg - 1)
+            .copied()
+            .unwrap_or(point.spans() as f64);
+        let middle = (0.5 * (since + until) + 1.5).round().max(0.0) as usize;
+        if middle >= last + 6 && middle + 10 <= knots {
+            result.push((middle, leg));
+            last = middle;
+        }
+    }
+    result
 }

@@ -6,12 +6,14 @@
 //! uniform splines is convex, and its barrier method are this project's own;
 //! see docs/decisions/0050-smooth-spline.md.
 
+mod balls;
 mod band;
 mod basis;
 mod build;
 mod ends;
 mod known;
 mod newton;
+mod passes;
 mod problem;
 mod project;
 mod solve;

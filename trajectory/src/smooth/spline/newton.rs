@@ -1,18 +1,24 @@
 //! Barrier value, gradient and Hessian of an iterate, and the Newton step.
 
 use super::band::Band;
-use super::basis::{FIRST, SECOND, THIRD, weights};
-use super::problem::{Point, Problem, Room, part, sample_weights, square};
-use simd::{Build, Four, Op};
+use super::basis::{FIRST, SECOND, THIRD};
+use super::passes::Passes;
+use super::problem::{Point, Problem, Room, sample_weights, square};
+use simd::{Build, Four, Op, V4};
 
 /// Gradient and Hessian of the barrier: a band for the control points, one
-/// border column for `z`. `B` is `5 D` and the spare diagonals of [`Band`].
+/// border column for `z`. `B` is `5 D` and the spare diagonals of [`Band`]; or `5 * 3` of them, where
+/// position and orientation stand apart, coupled only by [`Passes`].
 pub(crate) struct System<const D: usize, const B: usize> {
-    band: Band<B>,
+    pub(super) band: Band<B>,
+    /// Columns of the blocks that limits and corridors add to the band, by group, row and distance from
+    /// the diagonal. In the band they would overlap in memory, and each sum would wait for the one before.
+    blocks: Vec<[V4; 3]>,
     /// Gradient and border, side by side.
-    sides: Vec<[f64; 2]>,
-    gradient_z: f64,
-    hessian_z: f64,
+    pub(super) sides: Vec<[f64; 2]>,
+    pub(super) gradient_z: f64,
+    pub(super) hessian_z: f64,
+    pub(super) passes: Passes,
 }
 
 /// A direction in control points and `z`, and the fall of the barrier along it.
@@ -59,6 +65,14 @@ impl Slacks<'_> {
     }
 }
 
+/// The barrier at an iterate, without the share of the weight.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    rest: f64,
+    /// All slacks, as shares of their bounds.
+    pub(crate) slacks: Vec<f64>,
+}
+
 /// The barrier with a weight on `z`.
 #[derive(Clone, Copy)]
 pub(crate) struct Barrier<'a, const D: usize> {
@@ -70,14 +84,20 @@ pub(crate) struct Barrier<'a, const D: usize> {
 }
 
 impl<const D: usize> Barrier<'_, D> {
-    /// Value at an iterate, and its slacks in `seen`; `None` outside of the domain, and if a slack
+    /// Value at an iterate.
+    pub(crate) fn value(&self, point: &Point<D>, seen: &Seen) -> f64 {
+        self.weight * point.z + seen.rest
+    }
+
+    /// The value without the weight's share, and the slacks; `None` outside of the domain, and if a slack
     /// is only a small fraction of its value `before`.
-    pub(crate) fn value(
-        &self,
-        point: &Point<D>,
-        before: &[f64],
-        seen: &mut Vec<f64>,
-    ) -> Option<f64> {
+    pub(crate) fn look(&self, point: &Point<D>, before: &[f64]) -> Option<Seen> {
+        let mut slacks = Vec::with_capacity(before.len());
+        let rest = self.rest(point, before, &mut slacks)?;
+        Some(Seen { rest, slacks })
+    }
+
+    fn rest(&self, point: &Point<D>, before: &[f64], seen: &mut Vec<f64>) -> Option<f64> {
         seen.clear();
         let mut slacks = Slacks {
             product: 1.0,
@@ -106,7 +126,7 @@ impl<const D: usize> Barrier<'_, D> {
                 }
             }
         }
-        Some(self.weight * point.z - bounds - slacks.sum - slacks.product.ln())
+        Some(-bounds - slacks.sum - slacks.product.ln())
     }
 
     /// Adds the slacks of speed, acceleration and jerk; returns the sum of the logarithms of their
@@ -132,14 +152,36 @@ impl<const D: usize> Barrier<'_, D> {
 }
 
 impl<const D: usize, const B: usize> System<D, B> {
-    /// Room for an iterate of `knots` control points.
-    pub(crate) fn new(knots: usize) -> Self {
-        let size = D * knots.saturating_sub(8);
+    /// Whether the groups stand one behind the other in the band.
+    pub(super) const APART: bool = B < 5 * D;
+    /// Rows from one control point to the next.
+    pub(super) const STRIDE: usize = if Self::APART { 3 } else { D };
+
+    /// Room for an iterate with its control points.
+    pub(crate) fn new(point: &Point<D>) -> Self {
+        let size = D * point.control.len().saturating_sub(8);
+        let times = if Self::APART {
+            point.crossings.len()
+        } else {
+            0
+        };
         Self {
             band: Band::zeros(size),
+            blocks: vec![NO_BLOCK; WIDE * size / 3],
             sides: vec![[0.0; 2]; size],
             gradient_z: 0.0,
             hessian_z: 0.0,
+            passes: Passes::new(times, size, B),
+        }
+    }
+
+    /// The row of the first coordinate of group `g` of the free control point `k`, of `free` in all.
+    #[inline(always)]
+    pub(super) fn row(free: usize, k: usize, g: usize) -> usize {
+        if Self::APART {
+            3 * (g * free + k)
+        } else {
+            k * D + 3 * g
         }
     }
 
@@ -152,6 +194,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         t: f64,
     ) -> Option<Step> {
         self.band.clear();
+        self.blocks.fill(NO_BLOCK);
         self.sides.fill([0.0; 2]);
         (self.gradient_z, self.hessian_z) = (t, 0.0);
         let at = Iterate {
@@ -165,6 +208,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             system: self,
             at: &at,
         });
+        self.place_blocks();
         self.balls(&at);
         self.solve(&at.slides)
     }
@@ -173,29 +217,29 @@ impl<const D: usize, const B: usize> System<D, B> {
         if !self.band.factor() {
             return None;
         }
+        let size = self.sides.len();
         let [mut along, mut border] = [0, 1].map(|m| {
             let values = self.sides.iter().map(|side| side[m]);
             values.chain([0.0; B]).collect::<Vec<_>>()
         });
-        self.band.solve([&mut along, &mut border]);
-        let solved = self.sides.iter().zip(along.iter().zip(&border));
-        let (mut cross, mut bent) = (0.0, 0.0);
-        for (side, (along, border)) in solved.clone() {
-            cross += side[1] * along;
-            bent += side[1] * border;
-        }
-        let pivot = self.hessian_z - bent;
+        self.band.lower([&mut along, &mut border], 0..size);
+        let eliminated = self.passes.eliminate(&self.band, [&along, &border])?;
+        let pivot = self.hessian_z - eliminated.bent;
         if pivot <= 0.0 || pivot.is_nan() {
             return None;
         }
-        let z = -(self.gradient_z - cross) / pivot;
-        let mut slope = self.gradient_z * z;
-        let mut control = Vec::with_capacity(self.sides.len());
-        for (side, (along, border)) in solved {
-            let step = -along - border * z;
-            slope += side[0] * step;
-            control.push(step);
+        let z = -(self.gradient_z - eliminated.cross) / pivot;
+        for (step, border) in along[..size].iter_mut().zip(&border) {
+            *step = -*step - border * z;
         }
+        self.passes.take(&eliminated, z, &mut along[..size]);
+        self.band.upper(&mut along);
+        let falls = self.sides.iter().zip(&along);
+        let falls: f64 = falls.map(|(side, step)| side[0] * step).sum();
+        let slope = self.gradient_z * z + falls;
+        let free = size / D;
+        let entry = |i: usize| along[Self::row(free, i / D, i % D / 3) + i % 3];
+        let mut control: Vec<f64> = (0..size).map(entry).collect();
         for (step, slide) in control.iter_mut().zip(slides.iter().skip(4).flatten()) {
             *step += slide * z;
         }
@@ -293,113 +337,42 @@ impl<const D: usize, const B: usize> System<D, B> {
         h: &[[f64; 3]; 3],
     ) {
         let Sum { first, w, g } = *sum;
-        // Columns of the symmetric block, whole and from the diagonal on.
-        let whole = [0, 1, 2].map(|b| simd.load(&[h[b][0], h[b][1], h[b][2], 0.0]));
-        let second = simd.load(&[h[1][1], h[1][2], 0.0, 0.0]);
-        let lower = [whole[0], second, simd.load(&[h[2][2], 0.0, 0.0, 0.0])];
+        let columns = [0, 1, 2].map(|b| simd.load(&[h[b][0], h[b][1], h[b][2], 0.0]));
         let free = self.sides.len() / D;
         for i in 0..M {
             if first + i < 4 || first + i - 4 >= free || w[i] == 0.0 {
                 continue;
             }
-            let row = (first + i - 4) * D + 3 * g;
+            let k = first + i - 4;
+            let row = Self::row(free, k, g);
             for d in 0..3 {
                 self.sides[row + d][0] += w[i] * gradient[d];
                 self.sides[row + d][1] += w[i] * border[d];
             }
-            for j in 0..=i {
-                if first + j < 4 {
-                    continue;
-                }
-                let (back, both) = ((i - j) * D, simd.splat(w[i] * w[j]));
-                let block = if i == j { &lower } else { &whole };
-                let columns = &mut self.band.columns[row - back..row - back + 3];
-                for (b, column) in columns.iter_mut().enumerate() {
-                    let to = &mut column[back.saturating_sub(b)..];
-                    let sum = simd.add(simd.load(to), simd.mul(both, block[b]));
-                    simd.store(sum, to);
+            let blocks = &mut self.blocks[(g * free + k) * WIDE..][..WIDE];
+            for j in (0..=i).filter(|j| first + j >= 4) {
+                let both = simd.splat(w[i] * w[j]);
+                for (to, column) in blocks[i - j].iter_mut().zip(columns) {
+                    let sum = simd.add(simd.load(&to.0), simd.mul(both, column));
+                    simd.store(sum, &mut to.0);
                 }
             }
         }
     }
 
-    /// Balls, each at its closest approach: the passing time is eliminated, so there is no
-    /// curvature in the direction of motion.
-    fn balls(&mut self, at: &Iterate<'_, D>) {
-        let (problem, point, room) = (at.problem, at.point, at.room);
-        for (i, goal) in problem.inner().iter().enumerate() {
-            let (span, share) = point.locate(point.crossings[i]);
-            let w = weights(share);
-            let [p, v, a] = point.at(point.crossings[i]);
-            let (mut gradient, mut hessian) = ([0.0; D], [[0.0; D]; D]);
-            let mut damping = 0.0;
-            for g in 0..Problem::<D>::GROUPS {
-                let y = [0, 1, 2].map(|d| p[3 * g + d] - goal[3 * g + d]);
-                let slack = 1.0 / (room.balls[g][i].powi(2) - square(&y));
-                let block = outer(&y, 2.0 * slack, 4.0 * slack * slack);
-                damping += 2.0 * slack * (square(&y) * square(&part(&a, g))).sqrt();
-                for d in 0..3 {
-                    gradient[3 * g + d] = 2.0 * slack * y[d];
-                    hessian[3 * g + d][3 * g..3 * g + 3].copy_from_slice(&block[d]);
-                }
-            }
-            let mut bent = [0.0; D];
-            for d in 0..D {
-                bent[d] = (0..D).map(|e| hessian[d][e] * v[e]).sum();
-            }
-            let stiff: f64 = (0..D).map(|d| bent[d] * v[d]).sum::<f64>() + damping;
-            if stiff > 0.0 {
-                for d in 0..D {
-                    for e in 0..D {
-                        hessian[d][e] -= bent[d] * bent[e] / stiff;
-                    }
-                }
-            }
-            let mut border = [0.0; D];
-            if !at.slides.is_empty() {
-                let mut slide = [0.0; D];
-                for (weight, change) in w[0].iter().zip(&at.slides[span..]) {
-                    for d in 0..D {
-                        slide[d] += weight * change[d];
-                    }
-                }
-                for d in 0..D {
-                    border[d] = (0..D).map(|e| hessian[d][e] * slide[e]).sum();
-                    self.gradient_z += gradient[d] * slide[d];
-                    self.hessian_z += slide[d] * border[d];
-                }
-            }
-            self.add_ball(span, &w[0], [&gradient, &border], &hessian);
-        }
-    }
-
-    /// Adds a term that couples all coordinates.
-    fn add_ball(
-        &mut self,
-        first: usize,
-        w: &[f64; 5],
-        [gradient, border]: [&[f64; D]; 2],
-        hessian: &[[f64; D]; D],
-    ) {
+    /// Writes the blocks into the band.
+    fn place_blocks(&mut self) {
         let free = self.sides.len() / D;
-        for i in 0..5 {
-            if first + i < 4 || first + i - 4 >= free {
-                continue;
-            }
-            let row = (first + i - 4) * D;
-            for d in 0..D {
-                self.sides[row + d][0] += w[i] * gradient[d];
-                self.sides[row + d][1] += w[i] * border[d];
-            }
-            for j in 0..=i {
-                if first + j < 4 {
-                    continue;
-                }
-                let (back, both) = ((i - j) * D, w[i] * w[j]);
-                let columns = &mut self.band.columns[row - back..row - back + D];
-                for (b, column) in columns.iter_mut().enumerate() {
-                    for a in (if i == j { b } else { 0 })..D {
-                        column[back + a - b] += both * hessian[a][b];
+        let mut rows = self.blocks.chunks_exact(WIDE);
+        for g in 0..Problem::<D>::GROUPS {
+            for (k, blocks) in rows.by_ref().take(free).enumerate() {
+                for (back, block) in blocks[..WIDE.min(k + 1)].iter().enumerate() {
+                    let row = Self::row(free, k - back, g);
+                    for (b, column) in self.band.columns[row..row + 3].iter_mut().enumerate() {
+                        let above = if back == 0 { b } else { 0 };
+                        for a in above..3 {
+                            column[back * Self::STRIDE + a - b] = block[b].0[a];
+                        }
                     }
                 }
             }
@@ -407,15 +380,21 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 }
 
+/// Blocks in a row of the band, the diagonal with them.
+const WIDE: usize = 5;
+
+/// A block of zeros.
+const NO_BLOCK: [V4; 3] = [V4([0.0; 4]); 3];
+
 /// An iterate with what the terms of its barrier need.
-struct Iterate<'a, const D: usize> {
-    problem: &'a Problem<D>,
-    point: &'a Point<D>,
-    room: &'a Room,
+pub(super) struct Iterate<'a, const D: usize> {
+    pub(super) problem: &'a Problem<D>,
+    pub(super) point: &'a Point<D>,
+    pub(super) room: &'a Room,
     /// The control points that the start fixes, and their derivatives to `z`.
     pinned: [[[f64; D]; 2]; 4],
     /// How each control point moves with `z` if the end is in motion; empty if it rests.
-    slides: Vec<[f64; D]>,
+    pub(super) slides: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Iterate<'_, D> {
@@ -481,7 +460,7 @@ impl<const D: usize, const B: usize> Op for Norms<'_, D, B> {
 
 /// `diagonal I + scale y y^T`.
 #[inline(always)]
-fn outer(y: &[f64; 3], diagonal: f64, scale: f64) -> [[f64; 3]; 3] {
+pub(super) fn outer(y: &[f64; 3], diagonal: f64, scale: f64) -> [[f64; 3]; 3] {
     let mut result = [[0.0; 3]; 3];
     for a in 0..3 {
         for b in 0..3 {

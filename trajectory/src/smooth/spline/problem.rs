@@ -50,7 +50,7 @@ pub(crate) struct Point<const D: usize> {
 }
 
 /// Widened bounds that the present iterate needs until it is feasible.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Room {
     /// Factor on speed, acceleration and jerk of each group.
     pub(crate) caps: [[f64; 3]; 2],

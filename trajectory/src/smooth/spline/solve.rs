@@ -1,7 +1,7 @@
 //! The interior point iteration. It may stop at any time: every iterate after the first feasible
 //! one is a valid motion.
 
-use super::newton::{Barrier, KEEP, Step, System};
+use super::newton::{Barrier, KEEP, Seen, Step, System};
 use super::problem::{Point, Problem, Room, spreading};
 use super::project::project;
 
@@ -104,13 +104,14 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     effort: Effort,
 ) -> Option<usize> {
     let pace = Pace::new(problem, effort);
-    let mut system = System::<D, B>::new(point.control.len());
+    let mut system = System::<D, B>::new(point);
     begin(problem, point, effort);
     let mut room = Room::new(problem, point);
     let parameter = problem.parameter(point);
     let mut weight = parameter / (2.0 * point.z);
     let (mut tight, mut since) = (room.tighten(problem, point), 0);
     let mut slow = Slow::default();
+    let mut known = Known::nothing(&room);
     let more = usize::from(problem.anchor.is_some()) * ANCHORED;
     for count in 0..pace.steps + more {
         since += 1;
@@ -118,8 +119,11 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             tight = room.tighten(problem, point);
             since = 0;
         }
-        if tight && is_let_go(problem, point) && problem.finish.is_some() {
-            weight = parameter / (2.0 * point.z);
+        if tight && is_let_go(problem, point) {
+            known.seen = None;
+            if problem.finish.is_some() {
+                weight = parameter / (2.0 * point.z);
+            }
         }
         let done = tight && problem.anchor.is_none();
         // An iterate that is inside goes on until it is as fast as its start.
@@ -129,14 +133,13 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return done.then_some(count);
         };
-        let keep = pace.keep;
         let barrier = Barrier {
             problem,
             room: &room,
             weight,
-            keep,
+            keep: pace.keep,
         };
-        let share = search(&barrier, point, &step, pace.rounds);
+        let share = known.search(&barrier, point, &step, pace.rounds);
         let moved = share > 0.0;
         if slow.is_new(tight && share < SHORT && step.decrement < pace.low) {
             weight = weight.min(parameter / (2.0 * point.z));
@@ -161,6 +164,35 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
     }
     (tight && problem.anchor.is_none()).then_some(pace.steps + more)
+}
+
+/// What is known of the barrier at the iterate, under these bounds.
+struct Known {
+    room: Room,
+    seen: Option<Seen>,
+}
+
+impl Known {
+    fn nothing(room: &Room) -> Self {
+        let room = room.clone();
+        Self { room, seen: None }
+    }
+
+    /// [`search`] from the iterate that is known, unless a bound has changed.
+    fn search<const D: usize>(
+        &mut self,
+        barrier: &Barrier<'_, D>,
+        point: &mut Point<D>,
+        step: &Step,
+        rounds: usize,
+    ) -> f64 {
+        if self.room != *barrier.room {
+            (self.room, self.seen) = (barrier.room.clone(), None);
+        }
+        let (share, seen) = search(barrier, point, (step, self.seen.take()), rounds);
+        self.seen = seen;
+        share
+    }
 }
 
 /// Whether the iterate has become faster than its start, which then holds it no longer.
@@ -216,18 +248,18 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
 }
 
 /// Moves the iterate along the step as far as the barrier falls; returns the fraction of the step,
-/// 0 if it does not fall at all.
+/// 0 if it does not fall at all, and the barrier there. With the step what is known of the barrier here.
 fn search<const D: usize>(
     barrier: &Barrier<'_, D>,
     point: &mut Point<D>,
-    step: &Step,
+    (step, known): (&Step, Option<Seen>),
     rounds: usize,
-) -> f64 {
+) -> (f64, Option<Seen>) {
     let problem = barrier.problem;
-    let (mut slacks, mut seen) = (Vec::new(), Vec::new());
-    let Some(here) = barrier.value(point, &[], &mut slacks) else {
-        return 0.0;
+    let Some(seen) = known.or_else(|| barrier.look(point, &[])) else {
+        return (0.0, None);
     };
+    let here = barrier.value(point, &seen);
     let mut share: f64 = if step.z < 0.0 {
         (-0.9 * point.z / step.z).min(1.0)
     } else {
@@ -246,15 +278,15 @@ fn search<const D: usize>(
         problem.pin(&mut trial);
         trial.crossings.copy_from_slice(&point.crossings);
         project(problem, &mut trial, Some(barrier.room), rounds);
-        if let Some(there) = barrier.value(&trial, &slacks, &mut seen)
-            && there < here - 0.01 * share * step.decrement
+        if let Some(there) = barrier.look(&trial, &seen.slacks)
+            && barrier.value(&trial, &there) < here - 0.01 * share * step.decrement
         {
             *point = trial;
-            return share;
+            return (share, Some(there));
         }
         share *= BACK;
     }
-    0.0
+    (0.0, Some(seen))
 }
 
 /// Lets the free control points follow those that two ends in motion fix, which do not move evenly with `z`:
