@@ -7,7 +7,6 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::certify;
 use super::choose::{Then, Window, stretch};
 use super::crossing::crossings;
 use super::method::Method;
@@ -20,8 +19,8 @@ use crate::ToolPoint;
 
 /// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
 const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
-/// Most rests of a motion that are tried: one that stops at thousands of poses is not worth thousands of splines.
-const MOST: usize = 64;
+/// Most splines that are tried for one motion: one that stops at thousands of poses is not worth thousands.
+const MOST: usize = 48;
 /// Rounds over all rests: where a rest beside another is gone, a bridge may reach farther.
 const ROUNDS: usize = 2;
 /// Knots in the time of the corner that the tolerance allows.
@@ -44,12 +43,13 @@ struct Bridges<'a> {
     passes: Vec<f64>,
 }
 
-/// The motion through `poses` without those of its rests for which a faster way past is found; `None` if
-/// there is none.
+/// The motion through `poses` without those of its rests for which a faster way past is found, with which
+/// the whole `holds`; `None` if there is none.
 pub(super) fn bridged(
     motion: &Motion,
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
+    holds: &dyn Fn(&Motion) -> bool,
 ) -> Option<Motion> {
     let mut spans = motion.spans.clone();
     stretch(&mut spans, ROOM);
@@ -74,10 +74,14 @@ pub(super) fn bridged(
             })
             .collect(),
     };
+    let mut left = MOST;
     for _ in 0..ROUNDS {
         let (before, mut k) = (bridges.rests.len(), 0);
-        for _ in 0..before.min(MOST) {
-            let passed = REACHES.iter().find_map(|reach| bridges.passed(k, *reach));
+        while k < bridges.rests.len() && left > 0 {
+            let passed = REACHES.iter().find_map(|reach| {
+                left = left.checked_sub(1)?;
+                bridges.passed(k, *reach, holds)
+            });
             match passed {
                 Some(passed) => bridges = passed,
                 None => k += 1,
@@ -91,13 +95,12 @@ pub(super) fn bridged(
 }
 
 impl Bridges<'_> {
-    /// The motion past the rest with the number `k`, if all of it is certified then.
-    fn passed(&self, k: usize, reach: f64) -> Option<Self> {
+    /// The motion past the rest with the number `k`, if the whole of it holds then: a pass beside the bridge
+    /// may be another one now, so the bridge by itself does not tell.
+    fn passed(&self, k: usize, reach: f64, holds: &dyn Fn(&Motion) -> bool) -> Option<Self> {
         let mut next = self.clone();
         next.pass(k, reach)?;
-        // A pass beside the bridge may be another one now, so the bridge by itself does not tell.
-        let whole = certify(&next.spans, self.poses, self.options);
-        whole.0.holds().then_some(next)
+        holds(&next.clone().motion()).then_some(next)
     }
 
     /// Braking time from full speed, s.

@@ -81,7 +81,10 @@ impl<'a> List<'a> {
                 Some(fit.plan)
             }
             fitted => {
-                let mut best = faster(fitted.map(|fit| fit.plan), self.by_spline(form));
+                let spline = self.by_spline(form);
+                let spline =
+                    spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
+                let mut best = faster(fitted.map(|fit| fit.plan), spline);
                 if best.as_ref().is_some_and(|plan| self.is_slow(plan)) {
                     best = self.again(form, best, dense);
                 }
@@ -185,7 +188,7 @@ impl<'a> List<'a> {
 
     /// The same under options of the form, once.
     fn by_windows(&self, form: &NormalForm, options: &SmoothOptions) -> Option<SmoothPlan> {
-        let motion = windows::motion(&form.poses, options)?;
+        let motion = windows::motion(&form.poses, options, form.backwards)?;
         self.certified(form, motion)
     }
 
@@ -195,10 +198,11 @@ impl<'a> List<'a> {
         let mut rests = motion.rests.iter();
         let divided = rests.any(|rest| rest.cause != RestCause::TurnsBack);
         let before = (motion.duration(), divided);
+        let holds = |motion: &Motion| self.placed(form, motion.clone()).is_some();
         let bridged = if motion.rests.is_empty() {
             None
         } else {
-            bridge::bridged(&motion, &form.poses, &form.options)
+            bridge::bridged(&motion, &form.poses, &form.options, &holds)
         };
         let mut plan = bridged
             .and_then(|motion| self.placed(form, motion))

@@ -34,7 +34,7 @@ pub(super) struct NormalForm {
     /// The first pose of the form as it was given.
     frame: Isometry3<f64>,
     /// Whether the form begins at the end of the list.
-    backwards: bool,
+    pub(super) backwards: bool,
     /// Unit of length, m.
     unit: f64,
     /// From the goal of the form to the goal that was given, in its units.

@@ -37,23 +37,50 @@ const MOST_POSES: usize = 400;
 const DIVISIONS: usize = 3;
 
 /// The motion through a list by windows, uncertified; where it misses a pose the list is divided, so that
-/// one pose does not cost the whole motion.
-pub(super) fn motion(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
-    in_parts(poses, options, DIVISIONS)
+/// one pose does not cost the whole motion. A list that was laid `backwards` is passed from its end: the
+/// first approaches may be others then.
+pub(super) fn motion(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    backwards: bool,
+) -> Option<Motion> {
+    in_parts(poses, options, (backwards, DIVISIONS))
 }
 
 /// The same, divided at most so many times.
-fn in_parts(poses: &[Isometry3<f64>], options: &SmoothOptions, divisions: usize) -> Option<Motion> {
+fn in_parts(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    (backwards, divisions): (bool, usize),
+) -> Option<Motion> {
     let motion = Windows::new(poses, options).ok()?.motion();
-    let passes = crossings(&motion.spans, poses, options);
-    let missed = passes.iter().find(|pass| !pass.holds());
+    let missed = missed(&motion, poses, options, backwards);
     let Some(missed) = missed.filter(|_| divisions > 0) else {
         return Some(motion);
     };
-    let mut first = in_parts(&poses[..=missed.index], options, divisions - 1)?;
-    let second = in_parts(&poses[missed.index..], options, divisions - 1)?;
-    first.append(second, RestCause::Division);
+    let part = |poses| in_parts(poses, options, (backwards, divisions - 1));
+    let mut first = part(&poses[..=missed])?;
+    first.append(part(&poses[missed..])?, RestCause::Division);
     Some(first)
+}
+
+/// The first pose that a motion misses, as seen from the end at which it is to begin.
+fn missed(
+    motion: &Motion,
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    backwards: bool,
+) -> Option<usize> {
+    if !backwards {
+        let passes = crossings(&motion.spans, poses, options);
+        return passes
+            .iter()
+            .find(|pass| !pass.holds())
+            .map(|pass| pass.index);
+    }
+    let back: Vec<_> = poses.iter().rev().copied().collect();
+    let index = missed(&motion.reversed(), &back, options, false)?;
+    Some(poses.len() - 1 - index)
 }
 
 /// Plans a list of poses window by window, with look-ahead.
