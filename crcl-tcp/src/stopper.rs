@@ -28,13 +28,13 @@ pub(crate) struct Stop {
     pub(crate) fast: bool,
 }
 
-/// Stops the arm on its path and forgets what is queued.
+/// Stops the arm on its path and forgets what is queued. An arm that an operator stopped stays
+/// stopped.
 ///
 /// # Errors
 /// The sentence of an engine that refuses, or why there is no answer.
 pub(crate) fn abort(client: &ControlClient, fast: bool) -> Result<ControlAnswer, String> {
-    ask(client, ControlAsk::Stop { fast })?;
-    ask(client, ControlAsk::Abort)
+    ask(client, ControlAsk::Discard { fast })
 }
 
 fn ask(client: &ControlClient, ask: ControlAsk) -> Result<ControlAnswer, String> {

@@ -155,6 +155,7 @@ fn obey(steering: &Steering, client: Controlled) -> Option<Waiting> {
         Ok(ControlAsk::Override(share)) => order(Control::Override(share)),
         Ok(ControlAsk::Stop { fast }) => order(Control::Stop { fast }),
         Ok(ControlAsk::Abort) => order(Control::Abort),
+        Ok(ControlAsk::Discard { fast }) => order(Control::Discard { fast }),
         Ok(ControlAsk::Recover) => steering
             .recover()
             .map(Wanted::Recovery)

@@ -40,8 +40,14 @@ pub enum ControlAsk {
         /// With all that the joints have, instead of gently.
         fast: bool,
     },
-    /// Stop on the path and drop the queue.
+    /// Stop on the path and drop the queue. A pause or stop that is in force is over.
     Abort,
+    /// Stop on the path and drop the queue; a pause or stop that is in force stays. For a client
+    /// that ends its own motion, and has no right to free an arm that an operator stopped.
+    Discard {
+        /// With all that the joints have, instead of gently.
+        fast: bool,
+    },
     /// Clear the latched fault and open a new session with the driver.
     Recover,
 }
@@ -77,6 +83,8 @@ impl ControlRequest {
             ControlAsk::Stop { fast: true } => (5, 0.0),
             ControlAsk::Abort => (6, 0.0),
             ControlAsk::Recover => (7, 0.0),
+            ControlAsk::Discard { fast: false } => (8, 0.0),
+            ControlAsk::Discard { fast: true } => (9, 0.0),
         };
         let id = RequestId::new();
         Self {
@@ -111,6 +119,8 @@ impl ControlRequest {
             5 => ControlAsk::Stop { fast: true },
             6 => ControlAsk::Abort,
             7 => ControlAsk::Recover,
+            8 => ControlAsk::Discard { fast: false },
+            9 => ControlAsk::Discard { fast: true },
             other => return Err(format!("this engine knows no control {other}")),
         })
     }
@@ -329,6 +339,8 @@ mod tests {
             ControlAsk::Stop { fast: true },
             ControlAsk::Abort,
             ControlAsk::Recover,
+            ControlAsk::Discard { fast: false },
+            ControlAsk::Discard { fast: true },
         ];
         for ask in asks {
             assert_eq!(ControlRequest::new(ask).ask(), Ok(ask));

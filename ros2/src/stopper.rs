@@ -42,10 +42,10 @@ pub(crate) fn run(
     }
 }
 
-/// Stops the arm on its path, drops what is queued, and waits until it rests.
+/// Stops the arm on its path, drops what is queued, and waits until it rests. An arm that an
+/// operator stopped stays stopped.
 fn stop(client: &ControlClient) -> Result<(), String> {
-    ask(client, ControlAsk::Stop { fast: true })?;
-    ask(client, ControlAsk::Abort)?;
+    ask(client, ControlAsk::Discard { fast: true })?;
     let end = Instant::now() + REST;
     loop {
         let (resting, idle) = ask(client, ControlAsk::Look)?;

@@ -18,7 +18,10 @@ pub enum Control {
     /// over: what is pushed afterwards moves.
     Abort,
     /// Stop on the path, then drop everything that was pushed; a pause or stop that is in force
-    /// stays. So ends a motion that ends by itself, for example a jog whose time is over: nobody
-    /// has asked then that the arm may move again.
-    Discard,
+    /// stays. So ends a motion that its client or a time limit ends, for example a jog: nobody has
+    /// asked then that a stopped arm may move again.
+    Discard {
+        /// As fast as the joints can.
+        fast: bool,
+    },
 }

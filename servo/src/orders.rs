@@ -209,8 +209,8 @@ impl Orders {
                 }
                 self.give(|word| word)
             }
-            Control::Abort => self.give(|word| aborted(word) & !DEMAND),
-            Control::Discard => self.give(aborted),
+            Control::Abort => self.give(|word| aborted(word, false) & !DEMAND),
+            Control::Discard { fast } => self.give(|word| aborted(word, fast)),
         }
     }
 
@@ -237,9 +237,13 @@ impl Orders {
     }
 }
 
-/// The word with one more abort, which keeps the category of a stop in force.
-fn aborted(word: u64) -> u64 {
-    let fast = if word & DEMAND == FAST { ABORT_FAST } else { 0 };
+/// The word with one more abort, which is fast where that is asked for or a fast stop is in force.
+fn aborted(word: u64, fast: bool) -> u64 {
+    let fast = if fast || word & DEMAND == FAST {
+        ABORT_FAST
+    } else {
+        0
+    };
     (word & !(ABORTS | ABORT_FAST)) | fast | (word.wrapping_add(ABORT) & ABORTS)
 }
 
@@ -336,14 +340,27 @@ mod tests {
         hand.control(Control::Pause);
         let asked = hand.orders.asked();
         assert_eq!((asked.aborts(), asked.holds()), (1, true));
-        // What ends by itself does not end the stop.
-        hand.control(Control::Discard);
-        let asked = hand.orders.asked();
-        assert_eq!((asked.aborts(), asked.holds()), (2, true));
+        // What ends by itself does not end the stop, and stops nothing that comes later.
+        for (fast, category) in [(false, StopCategory::Gentle), (true, StopCategory::Fast)] {
+            hand.control(Control::Discard { fast });
+            let asked = hand.orders.asked();
+            assert!(asked.holds());
+            assert_eq!(asked.abort_category(), category);
+        }
+        assert_eq!(hand.orders.asked().aborts(), 3);
         hand.control(Control::Override(f64::NAN));
         hand.control(Control::Resume);
         assert_eq!(hand.orders.asked().demand(), Demand::Run(0.3));
         assert!(hand.was_resumed_after(abort) && !hand.was_resumed_after(hand.newest()));
+    }
+
+    #[test]
+    fn a_free_arm_is_free_after_a_discard() {
+        let hand = steering();
+        hand.control(Control::Discard { fast: true });
+        let asked = hand.orders.asked();
+        assert_eq!((asked.aborts(), asked.holds()), (1, false));
+        assert_eq!(asked.demand(), Demand::Run(1.0));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::io::{Read, Write};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::canter::canter;
 use crate::crcl_client::{Connection, Scene, document, move_to};
 
 /// How far a joint may be from where it was when nothing has moved (degrees): noise of nothing.
@@ -180,4 +181,57 @@ fn another_server_takes_over_from_one_that_was_killed() {
     let mut client = scene.connect();
     client.done("InitCanon", 1, "");
     client.done("Dwell", 2, "<DwellTime>0.1</DwellTime>");
+}
+
+/// The arm does not move for a while.
+fn assert_still(client: &mut Connection, case: &str) {
+    let before = client.status().joints();
+    sleep(Duration::from_millis(400));
+    let now = client.status().joints();
+    let moved = now.iter().zip(&before).map(|(a, b)| (a - b).abs());
+    let moved = moved.fold(0.0, f64::max);
+    assert!(moved < STILL, "{case}: moved {moved} degrees");
+}
+
+/// An operator stops the arm. Whatever a client does then, a StopMotion, a move that replaces its own,
+/// or that it goes away: the arm is held until the operator resumes.
+#[test]
+fn an_operators_stop_outlives_what_clients_do() {
+    let scene = Scene::new("held", &[]);
+    let operator = |verb: &str| {
+        let ran = canter([verb, "--arm", &scene.arm]);
+        assert_eq!(ran.code, 0, "{verb}: {}", ran.stderr);
+    };
+    let mut watcher = scene.connect();
+    let mut client = scene.connect();
+    client.done("InitCanon", 1, "");
+    slow(&mut client, 2);
+
+    begin_move(&mut client, 3);
+    operator("stop");
+    client.done("StopMotion", 4, "<StopCondition>Fast</StopCondition>");
+    let start = client.status();
+    let [x, y, z] = start.point();
+    client.send(&move_to(5, &start, [x, y, z + 20.0]));
+    assert_still(&mut watcher, "a move after StopMotion");
+    client.send(&move_to(6, &start, [x, y, z + 30.0]));
+    assert_still(&mut watcher, "a move that replaces one that is held");
+    operator("resume");
+    let end = client.wait(6);
+    assert_eq!(end.state(), "CRCL_Done", "{}", end.0);
+    assert!((end.point()[2] - z - 30.0).abs() < 1.0, "{}", end.0);
+
+    begin_move(&mut client, 7);
+    operator("stop");
+    drop(client);
+    let gone = watcher.wait(7);
+    assert!(gone.why().contains("gone"), "{}", gone.0);
+    watcher.send(&document("InitCanon", 8, ""));
+    let start = watcher.status();
+    let [x, y, z] = start.point();
+    assert_eq!(watcher.wait(8).state(), "CRCL_Done");
+    watcher.send(&move_to(9, &start, [x, y, z + 20.0]));
+    assert_still(&mut scene.connect(), "a move of another client");
+    operator("resume");
+    assert_eq!(watcher.wait(9).state(), "CRCL_Done");
 }

@@ -130,7 +130,7 @@ impl<const N: usize> Worker<'_, N> {
             Phase::Moving => {
                 jogging.phase = Phase::Ending;
                 self.jog_aborts += 1;
-                self.remote.control(Control::Discard);
+                self.remote.control(Control::Discard { fast: false });
             }
             Phase::Ending => {}
         }
