@@ -8,7 +8,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::time::Duration;
 
-use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, Sensor, State, Verdict};
+use ipc::{Clock, DriverLink, DriverState, EngineLink, HelloAck, Sensor, Setpoint, State, Verdict};
 use servo::{
     Control, Event, FeedForward, GuardKind, GuardOrder, GuardOutcome, GuardSource, MAX_GUARDS,
     Monitor, Runner, SegmentSender, SensorGuard, Tick, Work,
@@ -104,6 +104,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
     state.commanded = ack.position;
     state.sensor_count = 1;
     let force = Cell::new(0.0);
+    let mut received = Setpoint::default();
     let mut period = |number: u64| {
         let begin_ns = number * 1_000_000;
         let tick = Tick {
@@ -112,9 +113,9 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
             now_ns: begin_ns,
             skipped: 0,
         };
-        let setpoint = runner.tick(engine.last_state(), tick);
-        assert!(engine.send(setpoint));
-        let received = driver.last_setpoint().unwrap();
+        let came = engine.take_last_state(runner.incoming());
+        assert!(engine.send(runner.tick(came, tick)));
+        assert!(driver.take_last_setpoint(&mut received));
         if number == 0 {
             assert_eq!(received.effort[..JOINTS], *weight.as_slice());
         }
@@ -123,7 +124,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
         state.commanded = received.position;
         state.sequence += 1;
         state.driver_state = DriverState::Active as u32;
-        assert!(driver.send(state));
+        assert!(driver.send(&state));
     };
     // Connections are made when the first messages pass.
     (0..100).for_each(&mut period);

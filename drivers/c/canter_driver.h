@@ -118,7 +118,7 @@ typedef struct {
     uint32_t command;
     uint32_t flags;
     uint32_t valid;
-    uint32_t reserved_word;
+    uint32_t revision;
     double path_time;
     double time_scaling;
     double position[16];

@@ -70,7 +70,7 @@ impl DriverLink {
     }
 
     /// Sends a state; says whether iceoryx2 took it. Does not wait.
-    pub fn send(&self, state: State) -> bool {
+    pub fn send(&self, state: &State) -> bool {
         self.end.send(state)
     }
 
@@ -79,8 +79,20 @@ impl DriverLink {
         self.end.next()
     }
 
+    /// Writes the oldest setpoint that was not read yet over another one, unchecked; says whether there
+    /// was one. What has no meaning in it, as numbers of more joints, stays as it was. Does not wait.
+    pub fn take_setpoint(&self, place: &mut Setpoint) -> bool {
+        self.end.take(place)
+    }
+
+    /// The same with the newest setpoint; older ones are dropped.
+    pub fn take_last_setpoint(&self, place: &mut Setpoint) -> bool {
+        self.end.take_last(place)
+    }
+
     /// The newest setpoint, unchecked; older ones are dropped. Does not wait.
     pub fn last_setpoint(&self) -> Option<Setpoint> {
-        self.end.last()
+        let mut place = Setpoint::default();
+        self.take_last_setpoint(&mut place).then_some(place)
     }
 }

@@ -192,7 +192,7 @@ impl EngineLink {
 
     /// Sends a setpoint; says whether iceoryx2 took it. Does not wait, and does not allocate once
     /// the driver is connected. A slow reader loses its oldest message.
-    pub fn send(&self, setpoint: Setpoint) -> bool {
+    pub fn send(&self, setpoint: &Setpoint) -> bool {
         self.end.send(setpoint)
     }
 
@@ -201,8 +201,20 @@ impl EngineLink {
         self.end.next()
     }
 
+    /// Writes the oldest state that was not read yet over another one, unchecked; says whether there
+    /// was one. What has no meaning in it, as numbers of more joints, stays as it was. Does not wait.
+    pub fn take_state(&self, place: &mut State) -> bool {
+        self.end.take(place)
+    }
+
+    /// The same with the newest state; older ones are dropped.
+    pub fn take_last_state(&self, place: &mut State) -> bool {
+        self.end.take_last(place)
+    }
+
     /// The newest state, unchecked; older ones are dropped. Does not wait.
     pub fn last_state(&self) -> Option<State> {
-        self.end.last()
+        let mut place = State::default();
+        self.take_last_state(&mut place).then_some(place)
     }
 }

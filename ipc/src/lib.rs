@@ -25,6 +25,7 @@ mod engine_link;
 mod error;
 mod hello;
 mod link_end;
+mod message;
 mod node;
 mod observer;
 mod ownership;

@@ -7,6 +7,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, Node, ZeroCopySend};
 use iceoryx2::service::port_factory::request_response::PortFactory;
 
+use crate::message::Message;
 use crate::node::{Shared, exchange, inhabitants, join, topic};
 use crate::{Arm, Hello, HelloAck, IpcError, room};
 
@@ -42,8 +43,8 @@ where
 
 impl<S, R> LinkEnd<S, R>
 where
-    S: Copy + Debug + ZeroCopySend + 'static,
-    R: Copy + Debug + ZeroCopySend + 'static,
+    S: Message + Debug + ZeroCopySend + 'static,
+    R: Message + Debug + ZeroCopySend + 'static,
 {
     /// Opens an end of `arm`, after cleaning up behind dead processes.
     ///
@@ -99,8 +100,21 @@ where
 
     /// Sends a message; says whether iceoryx2 took it. Does not wait, and does not allocate once
     /// the other end is connected. A slow reader loses its oldest message.
-    pub(crate) fn send(&self, message: S) -> bool {
-        self.sender.send_copy(message).is_ok()
+    #[expect(
+        unsafe_code,
+        reason = "an older message in shared memory is changed in place: decision 0138"
+    )]
+    pub(crate) fn send(&self, message: &S) -> bool {
+        let Ok(mut place) = self.sender.loan_uninit() else {
+            return false;
+        };
+        // SAFETY: the memory has an older message, or the zeros that the kernel gave. A message has
+        // only numbers, for which any bytes are a value, and no byte between them.
+        let filled = unsafe {
+            message.write_over(place.payload_mut().assume_init_mut());
+            place.assume_init()
+        };
+        filled.send().is_ok()
     }
 
     /// The oldest message that was not read yet, unchecked. Does not wait.
@@ -108,16 +122,29 @@ where
         self.receiver.receive().ok().flatten().map(|sample| *sample)
     }
 
-    /// The newest message, unchecked; older ones are dropped. Does not wait.
-    pub(crate) fn last(&self) -> Option<R> {
+    /// Writes the oldest message that was not read yet over another one, unchecked; says whether there
+    /// was one. Does not wait.
+    pub(crate) fn take(&self, place: &mut R) -> bool {
+        let sample = self.receiver.receive().ok().flatten();
+        sample
+            .as_deref()
+            .map(|message| message.write_over(place))
+            .is_some()
+    }
+
+    /// Writes the newest message over another one, unchecked; older ones are dropped. Says whether
+    /// there was one. Does not wait.
+    pub(crate) fn take_last(&self, place: &mut R) -> bool {
         let mut last = None;
         for _ in 0..A_LOOK {
-            match self.next() {
-                Some(message) => last = Some(message),
-                None => break,
+            match self.receiver.receive() {
+                Ok(Some(sample)) => last = Some(sample),
+                _ => break,
             }
         }
-        last
+        last.as_deref()
+            .map(|message| message.write_over(place))
+            .is_some()
     }
 }
 

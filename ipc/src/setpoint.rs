@@ -25,7 +25,7 @@ impl SetpointFlags {
 
 /// The wanted state of the joints at one time. The engine sends it once per period.
 ///
-/// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` are used, the rest is 0. Times are
+/// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` are used, the rest has no meaning. Times are
 /// nanoseconds of `CLOCK_MONOTONIC`.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
@@ -58,8 +58,9 @@ pub struct Setpoint {
     pub flags: u32,
     /// One bit for each joint whose numbers are valid.
     pub valid: u32,
-    /// For later; 0.
-    pub reserved_word: u32,
+    /// Counts the changes of what follows the efforts: tools, outputs, payload. In a session, setpoints
+    /// of the same revision are equal there; 0 where the sender does not count.
+    pub revision: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Speed along the path as a fraction of the planned speed, 0..=1.
@@ -104,7 +105,7 @@ impl Default for Setpoint {
             command: 0,
             flags: 0,
             valid: 0,
-            reserved_word: 0,
+            revision: 0,
             path_time: 0.0,
             time_scaling: 0.0,
             position: [0.0; MAX_JOINTS],
@@ -202,7 +203,12 @@ pub(crate) fn check_finite(
     values: &[f64],
     count: usize,
 ) -> Result<(), MessageError> {
-    for (joint, value) in values.iter().take(count).enumerate() {
+    let used = || values.iter().take(count);
+    // Of a number that is not finite, no multiple is 0.
+    if used().map(|value| value * 0.0).sum::<f64>() == 0.0 {
+        return Ok(());
+    }
+    for (joint, value) in used().enumerate() {
         if !value.is_finite() {
             return Err(MessageError::NotFinite {
                 quantity,

@@ -23,13 +23,13 @@ fn setpoints_and_states_pass() {
     let engine = EngineLink::open(&arm).unwrap();
     let driver = DriverLink::open(&arm).unwrap();
     for sequence in 1..=100 {
-        assert!(engine.send(Setpoint {
+        assert!(engine.send(&Setpoint {
             sequence,
             joints: 6,
             ..Setpoint::default()
         }));
         assert_eq!(driver.last_setpoint().unwrap().sequence, sequence);
-        assert!(driver.send(State {
+        assert!(driver.send(&State {
             sequence,
             joints: 6,
             ..State::default()
@@ -45,7 +45,7 @@ fn a_slow_reader_loses_the_oldest_and_blocks_nobody() {
     let engine = EngineLink::open(&arm).unwrap();
     let driver = DriverLink::open(&arm).unwrap();
     for sequence in 1..=10_000 {
-        assert!(engine.send(Setpoint {
+        assert!(engine.send(&Setpoint {
             sequence,
             ..Setpoint::default()
         }));

@@ -84,8 +84,12 @@ pub struct Runner<const N: usize> {
     shared: Arc<Shared<N>>,
     epoch: u32,
     session: u64,
-    sequence: u64,
-    state: State,
+    /// The last setpoint: the message of a period is written over it.
+    message: Setpoint,
+    /// Where the next state is received.
+    incoming: Box<State>,
+    /// The last good state of the session.
+    state: Box<State>,
     quiet: u64,
     /// Periods since the driver knew where the arm is.
     blind: u64,
@@ -138,8 +142,9 @@ impl<const N: usize> Runner<N> {
             shared: Arc::clone(&shared),
             epoch: 0,
             session: 0,
-            sequence: 0,
-            state: State::default(),
+            message: Setpoint::default(),
+            incoming: Box::default(),
+            state: Box::default(),
             quiet: 0,
             blind: 0,
             ready: false,
@@ -183,8 +188,7 @@ impl<const N: usize> Runner<N> {
         self.cycle.reset(position);
         self.published = Sample::rest(position);
         self.session = ack.session;
-        self.sequence = 0;
-        self.state = State {
+        *self.state = State {
             position: ack.position,
             ..State::default()
         };
@@ -201,6 +205,7 @@ impl<const N: usize> Runner<N> {
         self.tools = [ToolCommand::default(); MAX_TOOLS];
         // A session begins without any.
         self.payload.number = self.payload.number.min(1);
+        self.begin_messages();
         self.speed = SVector::zeros();
         self.pending = None;
         self.share_position();
@@ -267,12 +272,19 @@ impl<const N: usize> Runner<N> {
     }
 
     /// The last setpoint once more, as a sign of life.
-    pub(super) fn again(&mut self, last: Setpoint) -> Setpoint {
-        self.sequence += 1;
-        Setpoint {
-            sequence: self.sequence,
-            ..last
-        }
+    pub(super) fn again(&mut self) -> &Setpoint {
+        self.message.sequence += 1;
+        &self.message
+    }
+
+    /// The last setpoint.
+    pub(super) fn last(&self) -> &Setpoint {
+        &self.message
+    }
+
+    /// Where the state that came since the last period is written, for [`Self::tick`].
+    pub fn incoming(&mut self) -> &mut State {
+        &mut self.incoming
     }
 
     /// Latches a fault, unless one is latched already.
@@ -291,11 +303,12 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// One period: `state` is the newest state that came since the last one, unchecked.
-    pub fn tick(&mut self, state: Option<State>, tick: Tick) -> Setpoint {
+    /// One period; `came` says whether a state came since the last one: the newest of them was written
+    /// to [`Self::incoming`], unchecked. Returns the setpoint to send.
+    pub fn tick(&mut self, came: bool, tick: Tick) -> &Setpoint {
         self.tick = tick.number;
         self.watch_stall(tick.skipped);
-        self.take_state(state, tick);
+        self.take_state(came, tick);
         self.record();
         self.obey();
         self.feed();
@@ -309,7 +322,8 @@ impl<const N: usize> Runner<N> {
             .skipped
             .fetch_add(tick.skipped, Ordering::Relaxed);
         self.share_position();
-        self.setpoint(tick)
+        self.write_message(tick);
+        &self.message
     }
 
     /// Takes what the operator asked for.

@@ -6,9 +6,7 @@ use std::sync::mpsc::SyncSender;
 use std::thread;
 use std::time::Instant;
 
-use ipc::{
-    Clock, DriverState, EngineLink, Greeted, Hello, Setpoint, SetpointFlags, State, text_of,
-};
+use ipc::{Clock, DriverState, EngineLink, Greeted, Hello, Setpoint, SetpointFlags, text_of};
 use scheduling::{Granted, Turns, now_ns, request_real_time, sleep_until_ns};
 
 use super::config::{ExecutorConfig, ExecutorError};
@@ -48,6 +46,9 @@ struct Loop<'a, const N: usize> {
     waits: String,
     turns: Turns,
 }
+
+/// How many states are read at once at most: a driver that floods them does not hold the period.
+const A_LOOK: usize = 64;
 
 /// Time between two requests for a new session.
 const AGAIN: Duration = Duration::from_millis(100);
@@ -182,10 +183,11 @@ impl<const N: usize> Loop<'_, N> {
     }
 
     /// Tells the driver that the session ends, if the arm rests.
-    fn say_goodbye(&self, last: Setpoint) {
+    fn say_goodbye(&self) {
+        let last = *self.runner.last();
         if last.flags & SetpointFlags::HOLD != 0 && last.session == self.runner.session() {
             let flags = last.flags | SetpointFlags::GOODBYE;
-            self.link.send(Setpoint {
+            self.link.send(&Setpoint {
                 flags,
                 sequence: last.sequence + 1,
                 ..last
@@ -193,10 +195,38 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    fn send(&self, setpoint: Setpoint) {
+    /// The work of a period: receives, computes and sends.
+    fn work(&mut self, came: bool, tick: Tick) {
+        let setpoint = self.runner.tick(came, tick);
         if !self.link.send(setpoint) {
             self.shared.unsent.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Sends the last setpoint once more.
+    fn repeat(&mut self) {
+        if !self.link.send(self.runner.again()) {
+            self.shared.unsent.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Receives the states that came since the last period, the newest last; says whether one came.
+    /// There is one in each period: one that was sent within the last `period` (ns) before `now_ns` is
+    /// the newest, and nobody looks for another.
+    fn receive(&mut self, now_ns: u64, period: u64) -> bool {
+        let mut came = false;
+        for _ in 0..A_LOOK {
+            let incoming = self.runner.incoming();
+            if !self.link.take_state(incoming) {
+                break;
+            }
+            came = true;
+            let age = now_ns.checked_sub(incoming.published_ns);
+            if age.is_some_and(|age| age < period) {
+                break;
+            }
+        }
+        came
     }
 
     /// Periods by the wall clock: absolute deadlines; late periods are left out.
@@ -217,13 +247,13 @@ impl<const N: usize> Loop<'_, N> {
                 now_ns,
                 skipped,
             };
-            let setpoint = self.runner.tick(self.link.last_state(), tick);
-            self.send(setpoint);
+            let came = self.receive(now_ns, period);
+            self.work(came, tick);
             let work = scheduling::now_ns().saturating_sub(now_ns);
             self.shared.work.count(work);
             self.tick += 1;
             if self.leaves() {
-                return self.say_goodbye(setpoint);
+                return self.say_goodbye();
             }
             self.recover();
         }
@@ -231,32 +261,18 @@ impl<const N: usize> Loop<'_, N> {
 
     /// Periods in step with the driver: each state releases the next setpoint.
     fn in_step(&mut self) {
-        let period = self.config.period_ns();
-        let mut last = Setpoint::default();
         loop {
-            let state = self.wait_for_state();
-            match state.and_then(|state| self.stand(state, &mut last)) {
-                Some(state) => {
-                    let begin_ns = self.tick * period;
-                    let tick = Tick {
-                        number: self.tick,
-                        begin_ns,
-                        now_ns: begin_ns,
-                        skipped: 0,
-                    };
-                    last = self.runner.tick(Some(state), tick);
-                    self.send(last);
-                    self.tick += 1;
-                }
-                None if self.shared.orders.is_shutting_down() => return,
-                None => {
-                    let silent_ms = LOCK_STEP_PATIENCE.as_millis() as u64;
-                    self.runner.latch(Fault::DriverLost { silent_ms });
-                    self.stop_alone(period);
-                }
+            if self.wait_for_state() && self.stand() {
+                self.virtual_period(true);
+            } else if self.shared.orders.is_shutting_down() {
+                return;
+            } else {
+                let silent_ms = LOCK_STEP_PATIENCE.as_millis() as u64;
+                self.runner.latch(Fault::DriverLost { silent_ms });
+                self.stop_alone();
             }
             if self.leaves() {
-                return self.say_goodbye(last);
+                return self.say_goodbye();
             }
             self.recover();
             while self.runner.samples_wait() && !self.shared.orders.is_shutting_down() {
@@ -265,13 +281,13 @@ impl<const N: usize> Loop<'_, N> {
         }
     }
 
-    /// Stops virtual time as long as the runner allows it; returns the newest state, or `None` when
-    /// the driver has ended.
-    fn stand(&mut self, mut state: State, last: &mut Setpoint) -> Option<State> {
+    /// Stops virtual time as long as the runner allows it; says whether there is a state, and not the
+    /// end of the driver.
+    fn stand(&mut self) -> bool {
         let mut since = Instant::now();
         let mut turns = 0_u32;
         // A sign of life repeats a period, so the first period of a session comes before it.
-        let mine = last.session == self.runner.session();
+        let mine = self.runner.last().sequence > 0;
         while self.config.wait_for_planner && mine && self.runner.may_stand() {
             if self.shared.orders.is_shutting_down() {
                 self.leaving.get_or_insert_with(Instant::now);
@@ -288,45 +304,51 @@ impl<const N: usize> Loop<'_, N> {
             }
             if since.elapsed() > SIGN_OF_LIFE {
                 since = Instant::now();
-                *last = self.runner.again(*last);
-                self.send(*last);
-                state = self.wait_for_state()?;
-                if matches!(state.driver(), DriverState::Stopping | DriverState::Fault) {
+                self.repeat();
+                if !self.wait_for_state() {
+                    return false;
+                }
+                let driver = self.runner.incoming().driver();
+                if matches!(driver, DriverState::Stopping | DriverState::Fault) {
                     break;
                 }
             }
         }
-        Some(state)
+        true
     }
 
     /// The driver of a lock-step session has ended: the motion comes to rest in virtual time.
-    fn stop_alone(&mut self, period: u64) {
+    fn stop_alone(&mut self) {
         for _ in 0..100_000 {
             if self.runner.may_leave() {
                 return;
             }
-            let begin_ns = self.tick * period;
-            let tick = Tick {
-                number: self.tick,
-                begin_ns,
-                now_ns: begin_ns,
-                skipped: 0,
-            };
-            let setpoint = self.runner.tick(None, tick);
-            self.send(setpoint);
-            self.tick += 1;
+            self.virtual_period(false);
         }
     }
 
-    /// The next state of the session. `None` when none came for a long time, when the thread should
-    /// end, or when a new session is wanted.
-    fn wait_for_state(&mut self) -> Option<State> {
+    /// One period of virtual time.
+    fn virtual_period(&mut self, came: bool) {
+        let begin_ns = self.tick * self.config.period_ns();
+        let tick = Tick {
+            number: self.tick,
+            begin_ns,
+            now_ns: begin_ns,
+            skipped: 0,
+        };
+        self.work(came, tick);
+        self.tick += 1;
+    }
+
+    /// Receives the next state of the session. `false` when none came for a long time, when the thread
+    /// should end, or when a new session is wanted.
+    fn wait_for_state(&mut self) -> bool {
         let start = Instant::now();
         loop {
-            if let Some(state) = self.link.next_state() {
-                if state.session == self.runner.session() {
+            if self.link.take_state(self.runner.incoming()) {
+                if self.runner.incoming().session == self.runner.session() {
                     self.turns.next();
-                    return Some(state);
+                    return true;
                 }
                 continue;
             }
@@ -334,7 +356,7 @@ impl<const N: usize> Loop<'_, N> {
                 let ends = self.shared.orders.is_shutting_down()
                     && start.elapsed() > Duration::from_millis(200);
                 if ends || self.runner.wants_session() || start.elapsed() > LOCK_STEP_PATIENCE {
-                    return None;
+                    return false;
                 }
             }
         }

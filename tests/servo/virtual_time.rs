@@ -73,7 +73,11 @@ impl Bench {
             now_ns: begin_ns,
             skipped,
         };
-        let setpoint = self.runner.tick(change(self.state), tick);
+        let state = change(self.state);
+        if let Some(state) = state {
+            *self.runner.incoming() = state;
+        }
+        let setpoint = *self.runner.tick(state.is_some(), tick);
         self.state.position = setpoint.position;
         self.state.commanded = setpoint.position;
         self.tick += 1;
@@ -409,7 +413,7 @@ fn a_clock_that_jumps_at_the_driver() {
         if follow {
             driver.receive(&setpoint, now);
         }
-        let state = driver.step(now, PERIOD);
+        let state = *driver.step(now, PERIOD);
         positions.push(core::array::from_fn(|joint| state.position[joint]));
         state
     };

@@ -25,7 +25,7 @@ pub(crate) fn echo_link(arm: &str) {
             && setpoint.check(N).is_ok()
         {
             let setpoint_sequence = setpoint.sequence;
-            link.send(State {
+            link.send(&State {
                 joints: N as u32,
                 setpoint_sequence,
                 ..State::default()
@@ -93,7 +93,7 @@ fn link_trips(arm: &Arm) -> Vec<u64> {
         let mut next = setpoint;
         next.sequence = sequence;
         next.published_ns = scheduling::now_ns();
-        link.send(next);
+        link.send(&next);
         let end = Instant::now() + Duration::from_secs(1);
         loop {
             if let Some(state) = link.next_state()

@@ -155,7 +155,7 @@ impl Player {
         sleep_until_ns(self.next_ns);
         self.next_ns = (self.next_ns + PERIOD).max(now_ns());
         if let Some(setpoint) = setpoint {
-            self.link.send(setpoint);
+            self.link.send(&setpoint);
         }
         let mut states = 0;
         while let Some(state) = self.link.next_state() {
@@ -224,6 +224,6 @@ impl Player {
     pub(crate) fn say_goodbye(&mut self) {
         let mut setpoint = self.setpoint([0.0; 3]);
         setpoint.flags |= SetpointFlags::GOODBYE | SetpointFlags::HOLD;
-        self.link.send(setpoint);
+        self.link.send(&setpoint);
     }
 }

@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 
 use ipc::{Clock, DriverState, FaultCode, MAX_TOOLS, Setpoint, SetpointFlags, State};
 
-use crate::{About, DriverError, Limiter, Measured, Measurement, Outputs, Reference, Robot};
+use crate::{
+    About, DriverError, Limiter, Measured, Measurement, Outputs, Reference, Robot, Sensors,
+};
 
 /// How far the first setpoint of a session may be from the commanded position (rad).
 const FIRST: f64 = 1e-3;
@@ -69,6 +71,7 @@ pub struct Driver<R> {
     pub(crate) orders: [u32; MAX_TOOLS],
     pub(crate) payload: u32,
     pub(crate) outputs: Outputs,
+    pub(crate) sensors: Sensors,
     pub(crate) last: Setpoint,
     /// Setpoints that came since the last period.
     pub(crate) waiting: VecDeque<Setpoint>,
@@ -80,7 +83,8 @@ pub struct Driver<R> {
     pub(crate) sequence: u64,
     pub(crate) missed: u64,
     missed_ever: u64,
-    reported: State,
+    /// The last state: that of a period is written over it.
+    pub(crate) reported: State,
 }
 
 impl<R: Robot> Driver<R> {
@@ -107,6 +111,7 @@ impl<R: Robot> Driver<R> {
             at_ns: 0,
             payload: 0,
             outputs: Outputs::default(),
+            sensors: Sensors::default(),
             fault_code: 0,
             fault_text: [0; 96],
             lost: false,
@@ -271,7 +276,7 @@ impl<R: Robot> Driver<R> {
 
     /// Answers a sign of life: in lock-step, a setpoint that repeats the last period. Nothing
     /// moves; the answer is the last state with a new sequence number.
-    pub fn sign_of_life(&mut self, setpoint: &Setpoint) -> Option<State> {
+    pub fn sign_of_life(&mut self, setpoint: &Setpoint) -> Option<&State> {
         let repeats = self.is_of_session(setpoint)
             && setpoint.tick == self.last.tick
             && setpoint.flags & (SetpointFlags::GOODBYE | SetpointFlags::STOP_REQUEST) == 0
@@ -284,7 +289,7 @@ impl<R: Robot> Driver<R> {
         self.sequence += 1;
         self.reported.sequence = self.sequence;
         self.reported.setpoint_sequence = setpoint.sequence;
-        Some(self.reported)
+        Some(&self.reported)
     }
 
     /// The first joint whose setpoint is out of range, too fast, accelerates too much, or is further
@@ -355,7 +360,7 @@ impl<R: Robot> Driver<R> {
 
     /// One period of `period_ns` that ends at `now_ns`: measures, chooses the reference, has the
     /// robot follow it, and returns the state to send.
-    pub fn step(&mut self, now_ns: u64, period_ns: u64) -> State {
+    pub fn step(&mut self, now_ns: u64, period_ns: u64) -> &State {
         self.measurement = self.robot.measure(&mut self.measured);
         for (commanded, measured) in self.commanded.iter_mut().zip(&self.measured) {
             *commanded = measured.position;
@@ -363,11 +368,10 @@ impl<R: Robot> Driver<R> {
         self.says_commanded = self.robot.commanded(&mut self.commanded);
         self.watch(now_ns);
         self.stepped_ns = now_ns;
-        let state = self.report(now_ns);
-        self.reported = state;
+        self.report(now_ns);
         self.give_orders();
         self.refer(now_ns, period_ns);
-        state
+        &self.reported
     }
 
     /// The watchdog, and the end of a stop.

@@ -113,8 +113,15 @@ impl Sensors {
         true
     }
 
-    /// All values, and how many are used.
-    pub(crate) fn all(&self) -> ([Sensor; MAX_SENSORS], u32) {
-        (self.values, self.count as u32)
+    /// Forgets all values.
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Writes the values into a state; returns how many there are.
+    pub(crate) fn write(&self, places: &mut [Sensor; MAX_SENSORS]) -> u32 {
+        let values = places.iter_mut().zip(&self.values).take(self.count);
+        values.for_each(|(place, value)| *place = *value);
+        self.count as u32
     }
 }

@@ -187,7 +187,8 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
     if driver.clock() == Some(Clock::LockStep) {
         return;
     }
-    while let Some(setpoint) = link.next_setpoint() {
+    let mut setpoint = *driver.last_setpoint();
+    while link.take_setpoint(&mut setpoint) {
         // Read again each time: a process may be stopped anywhere, and the age of a setpoint
         // counts.
         let now = now_ns();

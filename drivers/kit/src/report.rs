@@ -1,44 +1,42 @@
 //! The state that a driver sends.
 
-use ipc::{Clock, State, StateFlags};
+use ipc::{Clock, StateFlags};
 
-use crate::{Driver, Measurement, Robot, Sensors, speed_share};
+use crate::{Driver, Measurement, Robot, speed_share};
 
 impl<R: Robot> Driver<R> {
-    /// The state at `now_ns`, with the next sequence number.
-    pub(crate) fn report(&mut self, now_ns: u64) -> State {
+    /// Writes the state at `now_ns`, with the next sequence number, over the last one.
+    pub(crate) fn report(&mut self, now_ns: u64) {
         self.sequence += 1;
-        let mut state = State {
-            joints: self.joints() as u32,
-            session: self.session.as_ref().map_or(0, |session| session.number),
-            sequence: self.sequence,
-            published_ns: now_ns,
-            setpoint_sequence: self.last.sequence,
-            setpoint_published_ns: self.last.published_ns,
-            setpoint_received_ns: self.received_ns,
-            driver_state: self.state as u32,
-            fault: self.fault as u32,
-            fault_joint: self.fault_joint,
-            fault_code: self.fault_code,
-            text: self.fault_text,
-            missed: self.missed,
-            ..State::default()
-        };
-        self.report_joints(&mut state, now_ns);
+        let share = self.robot.speed_scaling();
+        // A share that is not a number asks for no motion.
+        let robot = if share.is_nan() { 0.0 } else { share };
+        let speed_scaling = robot.clamp(0.0, speed_share(self.lag()));
+        let state = &mut self.reported;
+        state.joints = self.about.joints() as u32;
+        state.session = self.session.as_ref().map_or(0, |session| session.number);
+        state.sequence = self.sequence;
+        state.published_ns = now_ns;
+        state.setpoint_sequence = self.last.sequence;
+        state.setpoint_published_ns = self.last.published_ns;
+        state.setpoint_received_ns = self.received_ns;
+        state.driver_state = self.state as u32;
+        state.fault = self.fault as u32;
+        state.fault_joint = self.fault_joint;
+        state.fault_code = self.fault_code;
+        state.text = self.fault_text;
+        state.missed = self.missed;
+        state.speed_scaling = speed_scaling;
         for (tool, feedback) in state.tools.iter_mut().enumerate() {
             *feedback = self.robot.tool(tool);
             feedback.order = self.orders[tool];
         }
         let inputs = self.robot.inputs();
         (state.digital_inputs, state.analogue_inputs) = (inputs.digital, inputs.analogue);
-        let mut sensors = Sensors::default();
-        self.robot.sensors(&mut sensors);
-        (state.sensors, state.sensor_count) = sensors.all();
-        let share = self.robot.speed_scaling();
-        // A share that is not a number asks for no motion.
-        let robot = if share.is_nan() { 0.0 } else { share };
-        state.speed_scaling = robot.clamp(0.0, speed_share(self.lag()));
-        state
+        self.sensors.clear();
+        self.robot.sensors(&mut self.sensors);
+        state.sensor_count = self.sensors.write(&mut state.sensors);
+        self.report_joints(now_ns);
     }
 
     /// How far what the robot follows is behind the setpoints, as the time that the last joint needs at its
@@ -62,7 +60,10 @@ impl<R: Robot> Driver<R> {
         times.fold(0.0, f64::max)
     }
 
-    fn report_joints(&self, state: &mut State, now_ns: u64) {
+    fn report_joints(&mut self, now_ns: u64) {
+        let virtual_time = self.clock() == Some(Clock::LockStep);
+        let state = &mut self.reported;
+        (state.flags, state.measured_ns, state.hardware_ns) = (0, 0, 0);
         for (joint, measured) in self.measured.iter().enumerate() {
             state.position[joint] = measured.position;
             state.velocity[joint] = measured.velocity;
@@ -76,7 +77,6 @@ impl<R: Robot> Driver<R> {
         if self.says_commanded {
             state.flags |= StateFlags::COMMANDED;
         }
-        let virtual_time = self.clock() == Some(Clock::LockStep);
         match self.measurement {
             Measurement::Now => state.measured_ns = now_ns,
             Measurement::At { hardware_ns, .. } if virtual_time => {

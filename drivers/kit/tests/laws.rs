@@ -152,7 +152,7 @@ impl Pair {
         for setpoint in std::mem::take(&mut self.waiting) {
             self.driver.receive(&setpoint, self.now + 400_000);
         }
-        let state = self.driver.step(self.now + 400_000, PERIOD);
+        let state = *self.driver.step(self.now + 400_000, PERIOD);
         assert_eq!(state.check(1), Ok(()));
         state
     }
@@ -283,7 +283,7 @@ fn an_acceleration_beyond_the_limit_is_refused() {
         let mut bad = pair.setpoint();
         bad.acceleration[0] = value;
         pair.driver.receive(&bad, pair.now);
-        let state = pair.driver.step(pair.now, PERIOD);
+        let state = *pair.driver.step(pair.now, PERIOD);
         let fault = pair.driver.fault();
         assert_eq!(
             fault == FaultCode::OutOfRange,

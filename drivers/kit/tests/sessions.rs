@@ -187,7 +187,7 @@ impl Pair {
     }
 
     fn step(&mut self) -> ipc::State {
-        let state = self.driver.step(self.now + 400_000, PERIOD);
+        let state = *self.driver.step(self.now + 400_000, PERIOD);
         assert_eq!(state.check(1), Ok(()));
         state
     }

@@ -92,7 +92,7 @@ class Setpoint(ctypes.Structure):
         ("command", c_uint32),
         ("flags", c_uint32),
         ("valid", c_uint32),
-        ("reserved_word", c_uint32),
+        ("revision", c_uint32),
         ("path_time", c_double),
         ("time_scaling", c_double),
         ("position", Joints),

@@ -58,7 +58,7 @@ impl Pair {
         if let Some(setpoint) = setpoint {
             self.driver.receive(&setpoint, self.now);
         }
-        let state = self.driver.step(self.now, PERIOD);
+        let state = *self.driver.step(self.now, PERIOD);
         assert_eq!(state.check(2), Ok(()));
         state
     }

@@ -159,7 +159,7 @@ fn setpoint() -> Message {
         "canter_setpoint",
         "canter.Setpoint.2",
             protocol joints session sequence tick published_ns tick_ns period_ns watchdog_ns
-            state_sequence command flags valid reserved_word path_time time_scaling position
+            state_sequence command flags valid revision path_time time_scaling position
             velocity acceleration effort tools digital_outputs digital_mask analogue_outputs
             analogue_mask payload reserved
     )

@@ -46,50 +46,58 @@ impl<const N: usize> Runner<N> {
         });
     }
 
-    /// The message of the period.
-    pub(super) fn setpoint(&mut self, tick: Tick) -> Setpoint {
-        self.sequence += 1;
-        let resting = self.cycle.is_resting();
-        let stopping = !resting && matches!(self.demand(), Demand::Stop(_));
-        let mut setpoint = Setpoint {
+    /// What is the same in all messages of a session.
+    pub(super) fn begin_messages(&mut self) {
+        self.message = Setpoint {
             joints: N as u32,
             session: self.session,
-            sequence: self.sequence,
-            tick: tick.number,
-            published_ns: tick.now_ns,
-            tick_ns: tick.begin_ns,
             period_ns: self.config.period_ns(),
             watchdog_ns: self.config.watchdog.as_nanos() as u64,
-            state_sequence: self.state.sequence,
-            command: self.cycle.command(),
-            flags: if resting {
-                SetpointFlags::HOLD
-            } else if stopping {
-                SetpointFlags::STOPPING
-            } else {
-                0
-            },
             valid: (1_u32 << N) - 1,
-            path_time: self.cycle.path_time(),
-            time_scaling: self.cycle.time_scaling(),
             tools: self.tools,
             payload: self.payload,
+            revision: 1,
             ..Setpoint::default()
         };
+    }
+
+    /// Writes the message of the period over the last one.
+    pub(super) fn write_message(&mut self, tick: Tick) {
+        let resting = self.cycle.is_resting();
+        let stopping = !resting && matches!(self.demand(), Demand::Stop(_));
+        let message = &mut self.message;
+        message.sequence += 1;
+        message.tick = tick.number;
+        message.published_ns = tick.now_ns;
+        message.tick_ns = tick.begin_ns;
+        message.state_sequence = self.state.sequence;
+        message.command = self.cycle.command();
+        message.flags = if resting {
+            SetpointFlags::HOLD
+        } else if stopping {
+            SetpointFlags::STOPPING
+        } else {
+            0
+        };
+        message.path_time = self.cycle.path_time();
+        message.time_scaling = self.cycle.time_scaling();
+        if message.tools != self.tools || message.payload != self.payload {
+            (message.tools, message.payload) = (self.tools, self.payload);
+            message.revision = message.revision.wrapping_add(1).max(1);
+        }
         let published = &self.published;
-        put(&mut setpoint.position, &published.position);
-        put(&mut setpoint.velocity, &published.velocity);
-        put(&mut setpoint.acceleration, &published.acceleration);
+        put(&mut message.position, &published.position);
+        put(&mut message.velocity, &published.velocity);
+        put(&mut message.acceleration, &published.acceleration);
         if let Some(feed_forward) = &self.config.feed_forward {
             let joints = [
                 published.position,
                 published.velocity,
                 published.acceleration,
             ];
-            put(&mut setpoint.effort, &feed_forward.efforts(&joints));
-            setpoint.flags |= SetpointFlags::EFFORT;
+            put(&mut message.effort, &feed_forward.efforts(&joints));
+            message.flags |= SetpointFlags::EFFORT;
         }
-        setpoint
     }
 }
 

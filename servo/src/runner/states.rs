@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use ipc::{DriverState, State, StateFlags};
+use ipc::{DriverState, StateFlags};
 use nalgebra::SVector;
 use realtime::{Following, Quantity, Trip};
 
@@ -18,11 +18,11 @@ const FULL_SPEED: f64 = 0.995;
 const LEAST_SHARE: f64 = 0.2;
 
 impl<const N: usize> Runner<N> {
-    /// Looks at what the driver says.
-    pub(super) fn take_state(&mut self, state: Option<State>, tick: Tick) {
-        let fresh = state
-            .filter(|state| state.session == self.session && state.sequence > self.state.sequence);
-        let Some(state) = fresh else {
+    /// Looks at what the driver says, if a state came.
+    pub(super) fn take_state(&mut self, came: bool, tick: Tick) {
+        let is_new =
+            self.incoming.session == self.session && self.incoming.sequence > self.state.sequence;
+        if !(came && is_new) {
             self.quiet += 1;
             let silent = self.quiet as f64 * self.period;
             if silent > self.config.patience.as_secs_f64() {
@@ -31,13 +31,19 @@ impl<const N: usize> Runner<N> {
                 });
             }
             return;
-        };
-        if let Err(cause) = state.check(N) {
+        }
+        if let Err(cause) = self.incoming.check(N) {
             self.latch(Fault::BadState(cause));
             return;
         }
         self.quiet = 0;
-        self.state = state;
+        core::mem::swap(&mut self.state, &mut self.incoming);
+        self.heed(tick);
+    }
+
+    /// Acts on a good state.
+    fn heed(&mut self, tick: Tick) {
+        let state = &self.state;
         self.shared
             .driver_missed
             .store(state.missed, Ordering::Relaxed);
@@ -49,12 +55,13 @@ impl<const N: usize> Runner<N> {
         match state.driver() {
             DriverState::Stopping | DriverState::Fault => {
                 let joint = (state.fault_joint < N as u32).then_some(state.fault_joint);
-                self.latch(Fault::DriverFault {
+                let fault = Fault::DriverFault {
                     code: state.fault_code(),
                     joint,
                     number: state.fault_code,
                     text: ShortText(state.text),
-                });
+                };
+                self.latch(fault);
             }
             DriverState::Active => self.ready = true,
             _ => {}

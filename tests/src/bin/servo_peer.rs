@@ -137,11 +137,11 @@ fn hostile(arm: &str, log: &str, kind: &str) -> Outcome {
             driver.receive(&setpoint, next);
             write(&mut log, &setpoint, &driver, next)?;
         }
-        let mut state = driver.step(next, PERIOD);
+        let mut state = *driver.step(next, PERIOD);
         if active > 900 {
             spoil(&mut state, kind, &mut random);
         }
-        link.send(state);
+        link.send(&state);
     }
 }
 

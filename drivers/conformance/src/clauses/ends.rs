@@ -35,7 +35,7 @@ impl Player {
                 return Err(format!("{states} states after {sent} setpoints"));
             }
             let setpoint = self.setpoint([0.0; 3]);
-            self.link.send(setpoint);
+            self.link.send(&setpoint);
             states += self.states_within(Duration::from_secs(1), 1);
         }
         let speed = SETPOINTS as f64 * PERIOD as f64 * 1e-9 / start.elapsed().as_secs_f64();
