@@ -5,7 +5,7 @@
 //! is left of the list does not matter there: a spline over twice the way of braking, with knots as
 //! close together as the corner asks for, is found where one through the whole list is not.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 use super::choose::{Then, Window, stretch};
 use super::crossing::crossings;
@@ -29,6 +29,8 @@ const KNOTS_PER_CORNER: f64 = 6.0;
 const ROOM: f64 = 1.0 + 2e-6;
 /// Share of its time that a bridge has to save at least.
 const GAIN: f64 = 1e-4;
+/// Difference of two states that are the same, in the units of the normal form: rounding of jerks is the largest.
+const SAME: f64 = 1e-7;
 
 /// A motion with its rests, and when it passes each pose between the ends.
 #[derive(Clone, Debug)]
@@ -129,6 +131,7 @@ impl Bridges<'_> {
         };
         let most = (to - from) * (1.0 - GAIN);
         let bridge = window.spline(Some(&known), most)?;
+        joins(&bridge.spans, &ends).then_some(())?;
         let times = crossings(&bridge.spans, window.poses, self.options);
         for (time, pass) in self.passes[first..after].iter_mut().zip(times) {
             *time = from + pass.time;
@@ -246,4 +249,20 @@ impl Bridges<'_> {
             retried: false,
         }
     }
+}
+
+/// Whether spans begin and end in two states, up to rounding.
+fn joins(spans: &[Span], ends: &[ToolPoint; 2]) -> bool {
+    let (Some(first), Some(last)) = (spans.first(), spans.last()) else {
+        return false;
+    };
+    let got = [first.at(0.0), last.at(last.duration)];
+    got.iter().zip(ends).all(|(got, end)| {
+        let off = got.pose.translation.vector - end.pose.translation.vector;
+        let turned = got.pose.rotation.angle_to(&end.pose.rotation);
+        let rates = got.linear.iter().zip(&end.linear);
+        let mut rates = rates.chain(got.angular.iter().zip(&end.angular));
+        let near = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm() <= SAME * (1.0 + b.norm());
+        off.norm() + turned <= SAME && rates.all(|(a, b)| near(a, b))
+    })
 }
