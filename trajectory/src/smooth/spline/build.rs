@@ -69,16 +69,18 @@ pub(crate) struct Request<'a> {
 }
 
 impl Request<'_> {
-    /// Whether the poses move the controlled point, and whether they turn it.
+    /// Whether the poses and the ends move the controlled point, and whether they turn it.
     pub(crate) fn moves(&self) -> [bool; 2] {
         let begin = self.moving.map_or(self.poses[0], |m| m.state.pose);
         let far =
             |p: &Isometry3<f64>| (p.translation.vector - begin.translation.vector).norm() > 1e-12;
         let turned = |p: &Isometry3<f64>| body_turn(&begin.rotation, &p.rotation).norm() > 1e-12;
-        let fast = |k: fn(&ToolPoint) -> f64| self.moving.is_some_and(|m| k(&m.state) > 1e-9);
+        let ends = || self.moving.map(|m| &m.state).into_iter().chain(self.finish);
+        let fast = |k: fn(&ToolPoint) -> f64| ends().any(|state| k(state) > 1e-9);
+        let finish = self.finish.map(|state| &state.pose);
         [
-            self.poses.iter().any(far) || fast(|s| s.linear[0].norm()),
-            self.poses.iter().any(turned) || fast(|s| s.angular[0].norm()),
+            self.poses.iter().chain(finish).any(far) || fast(|s| s.linear[0].norm()),
+            self.poses.iter().chain(finish).any(turned) || fast(|s| s.angular[0].norm()),
         ]
     }
 
