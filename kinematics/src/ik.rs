@@ -32,6 +32,9 @@ use numeric::{Descent, SolverResult, Stop};
 
 /// Restarts before a goal is reported as not reached.
 const RESTARTS: u32 = 1500;
+/// The same for six joints with an exact closed form, which has found nothing: the search finds what
+/// stands in the way.
+const EXPLAINING: u32 = 100;
 /// Restarts after which the search ends if the position alone is out of reach.
 const PATIENCE: u32 = 40;
 /// Restarts of the search for all solutions.
@@ -162,7 +165,9 @@ impl<const N: usize> Solver<N> {
                 return Ok(solution);
             }
         }
-        self.reach(&Goal::Pose(*pose), seed)
+        let known = closed.exact() && !closed.is_redundant();
+        let restarts = if known { EXPLAINING } else { RESTARTS };
+        self.reach_within(&Goal::Pose(*pose), seed, restarts)
     }
 
     /// All branches of a pose inside the limits, at most [`MOST_BRANCHES`], each with its whole
@@ -230,9 +235,19 @@ impl<const N: usize> Solver<N> {
     /// # Errors
     /// [`IkReport`]: what is in the way, and the nearest pose that was found.
     pub fn reach(&self, goal: &Goal, seed: &SVector<f64, N>) -> Result<Solution<N>, IkReport<N>> {
+        self.reach_within(goal, seed, RESTARTS)
+    }
+
+    /// The same with at most so many restarts.
+    fn reach_within(
+        &self,
+        goal: &Goal,
+        seed: &SVector<f64, N>,
+        restarts: u32,
+    ) -> Result<Solution<N>, IkReport<N>> {
         let target = goal.target();
         let mut best = self.descend(&target, seed, self.stop);
-        for index in 0..RESTARTS {
+        for index in 0..restarts {
             if best.reached {
                 return Ok(self.solution(&best, seed));
             }

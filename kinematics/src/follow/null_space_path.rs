@@ -5,7 +5,8 @@
 //! null-space motion. The candidates are polynomials fitted to that path.
 
 use super::null_space::{NullSpace, NullSpacePolynomial};
-use super::trace::{Guess, Task, smallest};
+use super::trace::{Guess, Task};
+use crate::measure::LENGTH;
 use nalgebra::{SMatrix, SVector};
 
 /// Steps along the path.
@@ -17,6 +18,10 @@ const WIDTH: usize = 2 * SIDE + 1;
 const STEP: f64 = 0.1;
 /// Most such steps from one layer to the next.
 const SWING: usize = 3;
+/// Distance of the tool at which a cell counts as reached, m (rad times 0.3 m).
+const CLOSE: f64 = 1e-7;
+/// Steps of the power method.
+const POWERS: usize = 6;
 /// Largest difference of a joint from one cell of the grid to the next, rad.
 const CELL_CHANGE: f64 = 0.8;
 
@@ -70,6 +75,7 @@ fn fill<const N: usize>(
         let guess = Guess {
             q: q0,
             within: CELL_CHANGE,
+            exact: CLOSE,
         };
         let q = task.newton(&guess, u, still, &value(column))?;
         Some(Cell {
@@ -121,7 +127,26 @@ fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>) -> f64 {
         sum += (0.15 / room).powi(2).min(1e6);
     }
     let (_, jacobian) = chain.jacobian(q);
-    sum + (0.08 / smallest(jacobian).max(1e-4)).powi(2)
+    sum + (0.08 / about_smallest(jacobian).max(1e-4)).powi(2)
+}
+
+/// About the smallest singular value of a Jacobian, lengths in units of [`LENGTH`]; never less than it.
+///
+/// # Source
+/// G. Golub, C. Van Loan, "Matrix Computations", 4th edition 2013, 8.2.2 (power method of the inverse).
+fn about_smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
+    jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+    let Some(factor) = (jacobian * jacobian.transpose()).cholesky() else {
+        return 0.0;
+    };
+    let mut along = SVector::<f64, 6>::repeat(1.0).normalize();
+    let mut most = 0.0;
+    for _ in 0..POWERS {
+        along = factor.solve(&along);
+        most = along.norm();
+        along /= most;
+    }
+    1.0 / most.sqrt()
 }
 
 /// Columns of the cheapest path through the grid.

@@ -1,6 +1,6 @@
 //! The null-space motion of arms with more than six joints: chosen over the whole path.
 
-use super::error::FollowError;
+use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::trace::Task;
@@ -26,7 +26,7 @@ pub(super) fn resolve<const N: usize>(
     let (_, jacobian) = task.solver.chain().jacobian(start);
     let directions = null_space(&jacobian);
     let (mut best, mut answer) = along(task, start, &directions);
-    if answer.is_ok() {
+    if answer.is_ok() || is_beyond(&answer) {
         return answer;
     }
     for joint in measures(&directions[0]) {
@@ -41,6 +41,12 @@ pub(super) fn resolve<const N: usize>(
         }
     }
     answer
+}
+
+/// Whether a path leads to a pose that the arm reaches with no joint position: no null-space motion helps.
+fn is_beyond<P>(traced: &Result<P, FollowError>) -> bool {
+    let cause = traced.as_ref().err().map(|error| error.cause);
+    matches!(cause, Some(FollowCause::Unreachable(_)))
 }
 
 /// A path of this quality ends the search along single joints.
@@ -66,7 +72,7 @@ fn along<const N: usize>(
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
     // A path cannot be expected to be better than its start.
-    if first.is_ok() && best >= 1.0 {
+    if (first.is_ok() && best >= 1.0) || is_beyond(&first) {
         return (best, first);
     }
     let mut answer = first;

@@ -38,11 +38,13 @@ struct Overrun {
     amount: f64,
 }
 
-/// Joint positions near which others are searched for.
+/// Joint positions near which others are searched for, and how well.
 pub(super) struct Guess<'a, const N: usize> {
     pub(super) q: &'a SVector<f64, N>,
     /// How far from it a joint of the solution may be (rad, m).
     pub(super) within: f64,
+    /// Distance of the tool at which the search ends, m (rad times [`LENGTH`]).
+    pub(super) exact: f64,
 }
 
 impl<const N: usize> Task<'_, N> {
@@ -161,6 +163,7 @@ impl<const N: usize> Task<'_, N> {
         let guess = Guess {
             q: &predict(last, u),
             within: OTHER_BRANCH,
+            exact: EXACT,
         };
         self.newton(&guess, u, null_space, &null_space.at(u))
     }
@@ -185,7 +188,7 @@ impl<const N: usize> Task<'_, N> {
                 b[6 + k] = at[k] - null_space.direction(k).dot(&q);
             }
             let error = b.iter().fold(0.0_f64, |most, value| most.max(value.abs())) * LENGTH;
-            if error <= EXACT || (error <= ENOUGH && error > 0.5 * reached) {
+            if error <= guess.exact || (error <= ENOUGH && error > 0.5 * reached) {
                 return Some(q);
             }
             if !error.is_finite() || error > 4.0 * reached {
@@ -243,9 +246,9 @@ impl<const N: usize> Task<'_, N> {
     /// Why no step from a point is possible, however short.
     #[cold]
     fn refusal(&self, last: &FollowPoint<N>, u: f64) -> FollowError {
-        let goal = Goal::Pose((self.tool)(u).pose);
+        let goal = (self.tool)(u).pose;
         let fastest = last.q[1].iamax();
-        if let Err(report) = self.solver.reach(&goal, &last.q[0]) {
+        if let Err(report) = self.solver.nearest(&goal, &last.q[0]) {
             let amount = report.position_error.max(report.rotation_error);
             return FollowError {
                 u,

@@ -311,7 +311,7 @@ impl<const N: usize> Planner<N> {
 
 /// The smooth motion of the tool that the joints are to follow.
 pub(super) struct SmoothPath {
-    plan: smooth::SmoothPlan,
+    pub(super) plan: smooth::SmoothPlan,
     /// Whether all poses are where the arm is.
     still: bool,
 }

@@ -1,21 +1,37 @@
 //! MoveSmoothlyTo: which of the motions that can be certified is taken.
 
 use nalgebra::{Isometry3, SVector};
-use trajectory::Trajectory;
 use trajectory::smooth::{RestCause, SmoothOptions, least_time};
+use trajectory::{Line, Trajectory};
 
-use super::cartesian::SmoothPath;
+use super::cartesian::{SmoothPath, Way, is_still};
 use super::draft::Draft;
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
 use crate::task::{Move, Shape};
 
 /// Share of the tolerance that is tried where all of it fails with the joints.
 const QUARTER: f64 = 0.25;
+/// Time of the motion over that of the tool alone from which on the joints rule.
+const RULED: f64 = 2.2;
+/// Shares of the linear and of the angular limits under which other curves are tried then.
+const SLOWER: [[f64; 2]; 2] = [[0.7, 1.0], [1.0, 0.4]];
+/// Most spans of a curve that is cheap enough for that.
+const CHEAP: usize = 400;
+
+/// A motion along a smooth curve of the tool.
+struct Along<const N: usize> {
+    planned: PlannedMove<N>,
+    /// Time of the tool alone, s.
+    tool: f64,
+    /// Spans of the curve.
+    spans: usize,
+}
 
 impl<const N: usize> Planner<N> {
-    /// The smooth motion within the tolerance asked for. If its certificate with the joints fails,
-    /// a quarter of the tolerance is tried, then a stop at each pose. Never slower than straight
-    /// moves to each pose in turn: these are tried wherever they may be faster.
+    /// The smooth motion within the tolerance asked for. If its certificate with the joints fails, or
+    /// if they cannot follow its curve but could follow the straight legs, a quarter of the tolerance is
+    /// tried, then a stop at each pose. Never slower than straight moves to each pose in turn: these are
+    /// tried wherever they may be faster.
     pub(super) fn smooth_move(
         &self,
         motion: &Move,
@@ -24,16 +40,95 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(motion, start) {
             return self.all_windows(windowed);
         }
-        let planned = match self.blended(motion, start, motion.tolerance) {
-            Err(first)
-                if matches!(first, MotionError::Uncertified(_)) && motion.tolerance > 0.0 =>
-            {
-                self.blended(motion, start, QUARTER * motion.tolerance)
-                    .or_else(|_| self.blended(motion, start, 0.0))
-                    .map_err(|_| first)
+        let planned = match self.blended(motion, start, motion) {
+            Ok(first) => self.for_the_joints(motion, start, first),
+            Err(first) if motion.tolerance > 0.0 && self.helps_less(&first, motion, start) => {
+                let within = |share: f64| Move {
+                    tolerance: share * motion.tolerance,
+                    ..motion.clone()
+                };
+                self.blended(motion, start, &within(QUARTER))
+                    .or_else(|_| self.blended(motion, start, &within(0.0)))
+                    .map_err(|_| first)?
+                    .planned
             }
-            other => other,
-        }?;
+            Err(first) => return Err(first),
+        };
+        self.or_straight(motion, start, planned)
+    }
+
+    /// Whether a curve nearer to the legs may be possible where one was not.
+    fn helps_less(&self, error: &MotionError, motion: &Move, start: &SVector<f64, N>) -> bool {
+        match error {
+            MotionError::Uncertified(_) => true,
+            MotionError::Blocked { .. } => self.legs_are_free(motion, start),
+            _ => false,
+        }
+    }
+
+    /// Whether the joints can follow straight legs to all poses; much cheaper than a curve.
+    fn legs_are_free(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+        let mut joints = *start;
+        motion.poses.iter().all(|pose| {
+            let from = self.chain().forward(&joints);
+            if is_still(&[from, *pose]) {
+                return true;
+            }
+            let Ok(points) = self.followed(&Way::along(&Line::new(from, *pose)), &joints) else {
+                return false;
+            };
+            joints = points.last().map_or(joints, |point| point.q[0]);
+            true
+        })
+    }
+
+    /// The fastest of the motion found and of those along curves planned for less speed along or about,
+    /// where the joints rule: the fastest curve of the tool is not the fastest one for the joints. Only where
+    /// a curve is cheap to plan.
+    fn for_the_joints(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        first: Along<N>,
+    ) -> PlannedMove<N> {
+        let ruled = first.planned.trajectory.duration() > RULED * first.tool;
+        let mut best = first.planned;
+        if !ruled || motion.tolerance <= 0.0 || first.spans > CHEAP {
+            return best;
+        }
+        for [along, about] in SLOWER {
+            let mut slower = motion.clone();
+            let limits = &mut slower.limits;
+            for limit in [
+                &mut limits.speed,
+                &mut limits.acceleration,
+                &mut limits.jerk,
+            ] {
+                *limit *= along;
+            }
+            for limit in [
+                &mut limits.angular_speed,
+                &mut limits.angular_acceleration,
+                &mut limits.angular_jerk,
+            ] {
+                *limit *= about;
+            }
+            if let Ok(other) = self.blended(motion, start, &slower)
+                && other.planned.trajectory.duration() < best.trajectory.duration()
+            {
+                best = other.planned;
+            }
+        }
+        best
+    }
+
+    /// A smooth motion, or straight moves to each pose in turn if these are faster.
+    fn or_straight(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        planned: PlannedMove<N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
         let least = self.least_with_straights(motion, start, &planned) * (1.0 + ROUNDING);
         if planned.trajectory.duration() <= least {
             return Ok(planned);
@@ -85,21 +180,18 @@ impl<const N: usize> Planner<N> {
         sum
     }
 
-    /// The motion within a tolerance, at most that of the command. An arm that cannot follow the
-    /// curve fitted through a dense list may follow the spline.
+    /// The motion along the curve of another move through the same poses, of at most the tolerance and the
+    /// limits of this one. An arm that cannot follow the curve fitted through a dense list may follow the
+    /// spline.
     fn blended(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        tolerance: f64,
-    ) -> Result<PlannedMove<N>, MotionError> {
-        let tighter = Move {
-            tolerance,
-            ..motion.clone()
-        };
+        curve: &Move,
+    ) -> Result<Along<N>, MotionError> {
         let along = |path: &SmoothPath| -> Result<_, MotionError> {
             let mut planned = Err(MotionError::NoWay);
-            for draft in self.follow_smooth(path, &tighter, start)? {
+            for draft in self.follow_smooth(path, motion, start)? {
                 planned = self.certify(motion, start, draft);
                 if planned.is_ok() {
                     break;
@@ -107,14 +199,18 @@ impl<const N: usize> Planner<N> {
             }
             let mut planned = planned?;
             path.name_rests(&mut planned.certificate);
-            Ok(PlannedMove {
-                blend: Some(path.blend(tolerance)),
-                ..planned
+            Ok(Along {
+                planned: PlannedMove {
+                    blend: Some(path.blend(curve.tolerance)),
+                    ..planned
+                },
+                tool: path.plan.duration(),
+                spans: path.plan.spans(),
             })
         };
-        let path = self.smooth_path(&tighter, start, true)?;
+        let path = self.smooth_path(curve, start, true)?;
         match along(&path) {
-            Err(_) if path.is_fitted() => along(&self.smooth_path(&tighter, start, false)?),
+            Err(_) if path.is_fitted() => along(&self.smooth_path(curve, start, false)?),
             other => other,
         }
     }

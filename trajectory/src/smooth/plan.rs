@@ -60,6 +60,12 @@ impl SmoothPlan {
         self.spans.last().map_or(0.0, Span::end)
     }
 
+    /// Number of polynomial spans.
+    #[must_use]
+    pub fn spans(&self) -> usize {
+        self.spans.len()
+    }
+
     /// How each intermediate pose is passed, in order.
     #[must_use]
     pub fn crossings(&self) -> &[Crossing] {
