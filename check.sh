@@ -15,11 +15,12 @@ if [ "${1-}" != tests ]; then
     step cargo clippy --workspace --all-targets --locked -- -D warnings
     RUSTDOCFLAGS="-D warnings" step cargo doc --workspace --no-deps --locked
 fi
+# There is no test in `benches`, and what its benchmarks are compared with takes a minute to build.
 if cargo nextest --version >/dev/null 2>&1; then
-    step cargo nextest run --workspace --locked --no-fail-fast
-    step cargo test --workspace --doc --locked
+    step cargo nextest run --workspace --exclude benches --locked --no-fail-fast
+    step cargo test --workspace --exclude benches --doc --locked
 else
-    step cargo test --workspace --locked --no-fail-fast
+    step cargo test --workspace --exclude benches --locked --no-fail-fast
 fi
 if [ "${1-}" = tests ]; then
     exit

@@ -111,9 +111,9 @@ fn straight_time<const N: usize>(
 /// The bounds of a whole motion may be above those of its parts by this share, and slow it down.
 const ROOM: f64 = 1e-3;
 
-/// Counts the random lists of an arm of which both motions can be planned; the smooth one is never
-/// the slower one.
-fn compared<const N: usize>(name: &str, seed: u64) -> usize {
+/// Counts the random lists of an arm, of so many, of which both motions can be planned; the smooth one
+/// is never the slower one.
+fn compared<const N: usize>(name: &str, lists: usize, seed: u64) -> usize {
     let robot = load(name).unwrap();
     let home: SVector<f64, N> = vector(&robot.home);
     let planner = Planner::new(
@@ -123,7 +123,7 @@ fn compared<const N: usize>(name: &str, seed: u64) -> usize {
         robot.joint_names(),
     );
     let (mut state, mut both) = (seed, 0);
-    for round in 0..18 {
+    for round in 0..lists {
         let tolerance = [0.0, 5e-5, 1e-3, 5e-3, 2e-2, 0.0][round % 6];
         let first = planner.chain().forward(&home);
         let poses = (0..3 + round % 4).map(|_| near(&first, 0.12, 0.3, &mut state));
@@ -147,10 +147,13 @@ fn compared<const N: usize>(name: &str, seed: u64) -> usize {
     both
 }
 
+/// Each tolerance once on each of two arms; `CANTER_SMOOTH_LISTS=18` is the long run.
 #[test]
 fn smooth_moves_are_never_slower_than_straight_ones() {
-    let both = compared::<6>("ur5e", 11) + compared::<7>("panda", 12);
-    assert!(both >= 24, "{both} of 36 planned");
+    let lists = std::env::var("CANTER_SMOOTH_LISTS");
+    let lists = lists.map_or(6, |count| count.parse().unwrap());
+    let both = compared::<6>("ur5e", lists, 11) + compared::<7>("panda", lists, 12);
+    assert!(3 * both >= 4 * lists, "{both} of {} planned", 2 * lists);
 }
 
 /// Where a move rests on its way the certificate names the pose and the cause; a pose that is passed in motion

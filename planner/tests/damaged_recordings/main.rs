@@ -16,7 +16,7 @@ use std::thread;
 
 use damage::{Damaged, Kind, Make};
 use planner::recorded::{RecordedSample, Rule};
-use scene::{Scene, recorded, verdict};
+use scene::{Scene, verdict};
 
 /// Time between samples of the damaged recordings, s.
 pub(crate) const PERIOD: f64 = 0.002;
@@ -54,7 +54,7 @@ fn damaged(scene: &Scene, kind: &Kind, good: &[RecordedSample]) -> Option<Damage
         }
         Make::Program(make) => {
             let [doing, commands] = make(scene);
-            let rows = recorded(&scene.robot, &doing, PERIOD)?;
+            let rows = scene.recorded(&doing, PERIOD)?;
             Some(Damaged { commands, rows })
         }
     }
@@ -70,7 +70,8 @@ struct Outcome {
 
 fn outcome(robot: &str) -> Outcome {
     let scene = Scene::new(robot);
-    let good = recorded(&scene.robot, &scene.program(), PERIOD)
+    let good = scene
+        .recorded(&scene.program(), PERIOD)
         .unwrap_or_else(|| panic!("{robot} cannot do the program"));
     for rows in [&good, &runs::as_run(&good)] {
         let holds = verdict(&scene.robot, &scene.program(), rows);
@@ -151,7 +152,7 @@ fn no_good_recording_is_refused() {
     for robot in planner::robot::list() {
         let scene = Scene::new(robot);
         for period in [0.0005, 0.001, 0.0037, 0.01, 0.05, 0.3] {
-            let rows = recorded(&scene.robot, &scene.program(), period).unwrap();
+            let rows = scene.recorded(&scene.program(), period).unwrap();
             let verdict = verdict(&scene.robot, &scene.program(), &rows);
             let broken: Vec<_> = verdict.all_broken().map(ToString::to_string).collect();
             assert!(broken.is_empty(), "{robot} at {period} s: {broken:#?}");

@@ -1,8 +1,12 @@
 //! Programs that every robot can execute, made from its home pose, and recordings of them.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use crcl::{Command, LengthUnit, Pose, Program};
 use nalgebra::{Isometry3, Vector3};
-use planner::dry_run::{PlanOptions, plan_program};
+use planner::dry_run::{Plan, PlanOptions, plan_program};
 use planner::recorded::{ProgramVerdict, RecordedSample, verify_program};
 use planner::robot::{Robot, load};
 
@@ -11,6 +15,8 @@ pub(crate) struct Scene {
     pub(crate) robot: Robot,
     /// The controlled point at home, in the workstation.
     home: Isometry3<f64>,
+    /// Plans that were made, by their programs: many recordings are of the same program.
+    plans: RefCell<HashMap<String, Rc<Plan>>>,
 }
 
 /// Pose of the flange at home, from a plan that only waits.
@@ -26,8 +32,44 @@ impl Scene {
         let robot = load(robot).unwrap();
         Self {
             home: home(&robot),
+            plans: RefCell::default(),
             robot,
         }
+    }
+
+    /// The plan of a program, made once.
+    fn planned(&self, commands: &[Command]) -> Rc<Plan> {
+        let name = format!("{commands:?}");
+        if let Some(plan) = self.plans.borrow().get(&name) {
+            return Rc::clone(plan);
+        }
+        let program: Program = commands.iter().cloned().collect();
+        let plan = plan_program(&self.robot, &program, &PlanOptions::default()).unwrap();
+        let plan = Rc::new(plan);
+        self.plans.borrow_mut().insert(name, Rc::clone(&plan));
+        plan
+    }
+
+    /// What was recorded of a program; none when the robot cannot do it.
+    pub(crate) fn recorded(
+        &self,
+        commands: &[Command],
+        period: f64,
+    ) -> Option<Vec<RecordedSample>> {
+        let plan = self.planned(commands);
+        if !plan.refusals.is_empty() {
+            return None;
+        }
+        let row = |sample: planner::dry_run::PlanSample| RecordedSample {
+            t_s: sample.t_s,
+            command: sample.command,
+            joints: sample.q,
+            rates: sample.dq,
+            accelerations: sample.ddq,
+            pose: sample.workstation_from_tool,
+            run: None,
+        };
+        Some(plan.samples(period).map(row).collect())
     }
 
     /// A pose `way` (mm) and `turn` (rotation vector, rad) from home, in the tool's axes.
@@ -88,29 +130,6 @@ pub(crate) fn written(pose: &Isometry3<f64>) -> Pose {
     }
 }
 
-/// What was recorded of a program; none when the robot cannot do it.
-pub(crate) fn recorded(
-    robot: &Robot,
-    commands: &[Command],
-    period: f64,
-) -> Option<Vec<RecordedSample>> {
-    let program: Program = commands.iter().cloned().collect();
-    let plan = plan_program(robot, &program, &PlanOptions::default()).unwrap();
-    if !plan.refusals.is_empty() {
-        return None;
-    }
-    let row = |sample: planner::dry_run::PlanSample| RecordedSample {
-        t_s: sample.t_s,
-        command: sample.command,
-        joints: sample.q,
-        rates: sample.dq,
-        accelerations: sample.ddq,
-        pose: sample.workstation_from_tool,
-        run: None,
-    };
-    Some(plan.samples(period).map(row).collect())
-}
-
 /// Rows held against commands.
 pub(crate) fn verdict(
     robot: &Robot,
@@ -124,7 +143,7 @@ pub(crate) fn verdict(
 impl Scene {
     /// How far from its pose a smooth move is at its widest pass, m.
     pub(crate) fn largest_deviation(&self, commands: &[Command], command: usize) -> f64 {
-        let rows = recorded(&self.robot, commands, crate::PERIOD).unwrap();
+        let rows = self.recorded(commands, crate::PERIOD).unwrap();
         let verdict = verdict(&self.robot, commands, &rows);
         let passes = &verdict.commands[command].poses;
         let between = &passes[..passes.len() - 1];

@@ -124,7 +124,7 @@ fn scale(problem: &mut Problem, k: usize, tools: &Tools, limit: Limit, factor: f
             }
         }
         _ => {
-            debug_assert_eq!(order(limit), 1);
+            assert_eq!(order(limit), 1);
             for (slot, l) in values {
                 problem.value[slot / 2][slot % 2][1][l] *= factor * factor;
             }

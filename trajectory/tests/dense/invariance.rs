@@ -26,8 +26,10 @@ struct List {
     limits: ToolLimits,
 }
 
-/// Both suites, and random lists without and with limits of rotation.
+/// Both suites, and random lists without and with limits of rotation; `DENSE_LISTS=20` is the long run.
 fn all() -> Vec<List> {
+    let count = std::env::var("DENSE_LISTS").ok();
+    let count = count.map_or(10, |given| given.parse().unwrap());
     let list = |name: &str, poses, tolerance| List {
         name: name.to_owned(),
         poses,
@@ -41,7 +43,7 @@ fn all() -> Vec<List> {
     for (name, poses, tolerance, _) in sparse::cases() {
         all.push(list(name, poses, tolerance));
     }
-    for seed in 0..20 {
+    for seed in 0..count {
         let (poses, tolerance) = lists::random(seed, 600.0);
         all.push(List {
             limits: if seed % 2 == 0 {
