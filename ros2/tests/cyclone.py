@@ -198,6 +198,28 @@ def stopped(peer):
     print(f"stopped: {answer.message}; {result.result.error_string}")
 
 
+def held(peer, processes):
+    """An operator's stop outlives the service stop: nothing moves until the operator resumes."""
+    start = at_rest(peer)
+    name, accepted = peer.send(bend(start.position, 0.4, 3.0, 10, start.name))
+    assert accepted
+    time.sleep(1.0)
+    assert processes.run("stop").returncode == 0
+    answer = peer.stop.call(0)
+    assert answer.success, answer
+    result = peer.result(name)
+    assert (result.status, result.result.error_code) == (ABORTED, -4), result
+    rest = at_rest(peer).position
+    _, accepted = peer.send(bend(rest, 0.1, 1.0, 5, start.name))
+    assert not accepted, peer.said
+    time.sleep(1.0)
+    assert near(peer.joints().position, rest, 1e-4), "it moves although the operator stopped it"
+    assert processes.run("resume").returncode == 0
+    result = peer.follow(bend(at_rest(peer).position, 0.1, 1.0, 5, start.name))
+    assert result.status == SUCCEEDED, result
+    print("held: nothing moves until the operator resumes")
+
+
 def program(peer):
     """A program that the operator has named is started by its service and answered at its end."""
     answer = peer.program("greet").call(0)
@@ -295,6 +317,7 @@ def main():
         rejected(peer)
         tolerances(peer)
         stopped(peer)
+        held(peer, processes)
         program(peer)
         goals_in_a_row(peer, processes)
         fault(peer, processes)
