@@ -48,7 +48,8 @@ class SmoothMotion:
     @property
     def certificate(self) -> dict[str, Any]:
         """What holds for all times: `holds`, `in_order`, `lower_bound_s`, and for `corridor`,
-        `speed`, `acceleration`, `jerk` and the angular ones the highest `ratio` to the limit."""
+        `speed`, `acceleration`, `jerk` and the angular ones the highest `ratio` to the limit, for `jump`
+        to what rounding may make of it."""
         found: dict[str, Any] = json.loads(self._own.certificate())
         return found
 

@@ -61,6 +61,7 @@ impl Smooth {
             "duration_s": found.duration,
             "lower_bound_s": found.lower_bound,
             "corridor": peak(&found.corridor),
+            "jump": peak(&found.jump),
             "speed": peak(&found.speed),
             "acceleration": peak(&found.acceleration),
             "jerk": peak(&found.jerk),

@@ -6,6 +6,7 @@ use super::crossing::{self, Crossing, RESOLUTION};
 use super::options::SmoothOptions;
 use super::poly::{bernstein, halve};
 use super::span::Span;
+use crate::ToolPoint;
 use crate::active::Active;
 use crate::timing::{ActiveSpan, Limit};
 
@@ -41,6 +42,9 @@ pub struct Certificate {
     pub in_order: bool,
     /// Distance from the leg travelled / half width of the corridor.
     pub corridor: Peak,
+    /// Largest jump of the pose, velocity or acceleration, also from rest at the start and to rest at
+    /// the end / what rounding may make of it.
+    pub jump: Peak,
     /// Speed of the controlled point / limit.
     pub speed: Peak,
     /// Acceleration of the controlled point / limit.
@@ -77,14 +81,22 @@ const LIMITS: [Limit; 6] = [
     Limit::AngularJerk,
 ];
 
+/// Share of a limit by which a quantity may jump: between splines, each solved for itself, rounding is
+/// the larger the shorter the knots are.
+const JUMP: f64 = 1e-6;
+/// Jump of a pose that rounding may make, in the unit of length and rad, for each unit of its distance from
+/// the origin.
+const POSE_JUMP: f64 = 1e-8;
+
 /// Room for rounding in a ratio: 1 part in 1e9.
 const ROUNDING: f64 = 1.0 + 1e-9;
 
 impl Certificate {
-    /// True when the order, the tolerances, the corridor and all limits hold.
+    /// True when the order, the tolerances, the corridor and all limits hold, and nothing jumps.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.in_order && self.corridor.ratio <= ROUNDING && self.worst_limit() <= ROUNDING
+        let whole = self.in_order && self.jump.ratio <= 1.0;
+        whole && self.corridor.ratio <= ROUNDING && self.worst_limit() <= ROUNDING
     }
 
     /// The greatest ratio over the six limits of motion.
@@ -151,10 +163,59 @@ pub(crate) fn certify(
         active.add(span.start, &limits_of(span, options, &mut certificate));
     }
     certificate.active = active.finish(certificate.duration);
+    certificate.jump = jumps(spans, options);
     let crossings = crossing::crossings(spans, poses, options);
     certificate.in_order = crossings.iter().all(Crossing::holds);
     certificate.corridor = corridor(spans, poses, &crossings, options.corridor());
     (certificate, crossings)
+}
+
+/// The same of a motion from rest to rest.
+pub(super) fn certify_whole(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> (Certificate, Vec<Crossing>) {
+    let mut whole = certify(spans, poses, options);
+    if let (Some(first), Some(last)) = (spans.first(), spans.last()) {
+        for end in [first.at(0.0), last.at(last.duration)] {
+            let off = jump(&end, &ToolPoint::still(end.pose), options);
+            whole.0.jump.raise(off, whole.0.duration);
+        }
+    }
+    whole
+}
+
+/// The largest jump between the spans of a motion.
+fn jumps(spans: &[Span], options: &SmoothOptions) -> Peak {
+    let mut worst = Peak::default();
+    for pair in spans.windows(2) {
+        let (one, other) = (pair[0].at(pair[0].duration), pair[1].at(0.0));
+        worst.raise(jump(&one, &other, options), pair[1].start);
+    }
+    worst
+}
+
+/// The largest part of a jump over what rounding may make of it.
+fn jump(one: &ToolPoint, other: &ToolPoint, options: &SmoothOptions) -> f64 {
+    let limits = &options.limits;
+    let caps = [
+        [limits.speed, limits.acceleration],
+        [limits.angular_speed, limits.angular_acceleration],
+    ];
+    let mut worst = Peak::default();
+    let place = other.pose.translation.vector;
+    let off = (one.pose.translation.vector - place).norm();
+    let turned = one.pose.rotation.angle_to(&other.pose.rotation);
+    worst.raise(off.max(turned) / (POSE_JUMP * (1.0 + place.norm())), 0.0);
+    let rates = [[&one.linear, &other.linear], [&one.angular, &other.angular]];
+    for (caps, [one, other]) in caps.iter().zip(rates) {
+        for k in 0..2 {
+            let off = (one[k] - other[k]).norm();
+            worst.raise(off / (JUMP * caps[k]), 0.0);
+        }
+    }
+    worst.ratio
 }
 
 /// Raises the six peaks by one span; its own six ratios.
@@ -364,4 +425,57 @@ pub(crate) fn to_segment(point: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 
         0.0
     };
     (point - ends[0] - way * share).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::ToolLimits;
+
+    /// A straight span (m, m/s, m/s²) of one second.
+    fn span(start: f64, at: f64, speed: f64, acceleration: f64) -> Span {
+        let x = |value: f64| Vector3::x() * value;
+        Span {
+            start,
+            duration: 1.0,
+            point: [x(at), x(speed), x(acceleration / 2.0), x(0.0), x(0.0)],
+            base: UnitQuaternion::identity(),
+            turns: Vec::new(),
+        }
+    }
+
+    /// Jumps of place, velocity and acceleration are no motion, whatever the limits; rounding is.
+    #[test]
+    fn a_jump_is_not_certified() {
+        let limits = ToolLimits {
+            speed: 1.0,
+            acceleration: 10.0,
+            jerk: 100.0,
+            angular_speed: 1.0,
+            angular_acceleration: 10.0,
+            angular_jerk: 100.0,
+        };
+        let options = SmoothOptions::new(1e-3, limits);
+        let poses = [0.0, 1.0].map(|x| Isometry3::translation(x, 0.0, 0.0));
+        let jump = |second: Span| {
+            let spans = [span(0.0, 0.0, 0.5, 0.0), second];
+            certify(&spans, &poses, &options).0
+        };
+        assert!(jump(span(1.0, 0.5 + 1e-12, 0.5, 1e-9)).holds());
+        for broken in [
+            span(1.0, 0.5001, 0.5, 0.0),
+            span(1.0, 0.5, 0.5001, 0.0),
+            span(1.0, 0.5, 0.4999, 0.0),
+            span(1.0, 0.5, 0.5, 0.001),
+        ] {
+            let found = jump(broken);
+            assert!(!found.holds() && found.worst_limit() <= 1.0, "{found:?}");
+            assert_eq!(found.jump.time, 1.0);
+        }
+        // From motion to motion, so not whole.
+        let spans = [span(0.0, 0.0, 0.5, 0.0), span(1.0, 0.5, 0.5, 0.0)];
+        assert!(!certify_whole(&spans, &poses, &options).0.holds());
+    }
 }

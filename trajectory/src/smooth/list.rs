@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::certify;
+use super::certificate::certify_whole;
 use super::lower_bound::lower_bound;
 use super::method::Method;
 use super::motion::Motion;
@@ -214,7 +214,7 @@ impl<'a> List<'a> {
     /// A motion through the normal form, laid back, if its certificate holds.
     fn placed(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
         let motion = form.place(motion);
-        let whole = certify(&motion.spans, self.poses, self.options);
+        let whole = certify_whole(&motion.spans, self.poses, self.options);
         let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
         let good = whole.0.holds() && soon;
         good.then(|| SmoothPlan::new(self.poses, motion, whole, self.exact_stop))

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::certificate::certify;
+use super::certificate::certify_whole;
 use super::choose::{Then, Window, corners, from_rest};
 use super::crossing::{RESOLUTION, crossings};
 use super::exact_stop;
@@ -191,10 +191,10 @@ impl Windows {
         let stop = exact_stop::plan(&self.given, &self.options.limits);
         let exact_stop = stop.last().map_or(0.0, Span::end);
         let bound = lower_bound(&self.given, &self.options);
-        let mut whole = certify(&self.done.spans, &self.given, &self.options);
+        let mut whole = certify_whole(&self.done.spans, &self.given, &self.options);
         if !whole.0.holds() || self.done.duration() > exact_stop * (1.0 + 1e-12) {
             self.done = corners(&self.given, &self.options);
-            whole = certify(&self.done.spans, &self.given, &self.options);
+            whole = certify_whole(&self.done.spans, &self.given, &self.options);
         }
         whole.0.lower_bound = bound;
         SmoothPlan::new(&self.given, self.done, whole, exact_stop)
