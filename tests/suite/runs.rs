@@ -143,18 +143,20 @@ fn measured_way(samples: &std::path::Path, program: &str, off_path: f64) {
     let text = std::fs::read_to_string(system_tests::repository::root().join(program)).unwrap();
     let reading = crcl::text::read(&text, &crcl::ReadOptions::default());
     let mut passed = 0;
-    for (index, command) in reading.program.iter().enumerate() {
-        let poses = match command {
+    let moves: Vec<(usize, &[crcl::Pose])> = (reading.program.iter().enumerate())
+        .filter_map(|(index, command)| match command {
             crcl::Command::MoveTo { pose } | crcl::Command::MoveStraightTo { pose } => {
-                std::slice::from_ref(pose)
+                Some((index, std::slice::from_ref(pose)))
             }
-            crcl::Command::MoveSmoothlyTo { poses } => poses,
-            _ => continue,
-        };
-        // The arm is behind its setpoints: what follows a move shows where it came to rest.
-        let rows = rows
-            .iter()
-            .filter(|row| (index..=index + 1).contains(&row.0));
+            crcl::Command::MoveSmoothlyTo { poses } => Some((index, poses.as_slice())),
+            _ => None,
+        })
+        .collect();
+    for (number, (index, poses)) in moves.iter().enumerate() {
+        // The arm is behind its setpoints, more so after a late period: what follows a move, up to the
+        // next one's end, shows where it came to rest.
+        let last = moves.get(number + 1).map_or(usize::MAX, |next| next.0);
+        let rows = rows.iter().filter(|row| (*index..=last).contains(&row.0));
         let mut rows = rows.peekable();
         for (number, pose) in poses.iter().enumerate() {
             let crcl::Pose::Axes { point, .. } = pose else {
