@@ -112,7 +112,7 @@ impl Console {
                 "canter: error: line {line}: {name}: {}",
                 error.message
             )),
-            Note::NotArrived { .. } | Note::SpeedAsked { .. } => {
+            Note::NotArrived { .. } | Note::NotSettled { .. } | Note::SpeedAsked { .. } => {
                 printer.note(&format!("canter: {note}"));
             }
             Note::Faulted { reason, .. } => printer.note(&format!("canter: error: {reason}")),

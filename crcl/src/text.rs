@@ -50,6 +50,15 @@ pub fn read(source: &str, options: &ReadOptions) -> Reading {
 ///
 /// Bytes that are not UTF-8 text give one finding; [`crate::Source::from_bytes`] fits its span.
 pub fn read_bytes(bytes: &[u8], options: &ReadOptions) -> Reading {
+    decoded(bytes, options, read)
+}
+
+/// Reads bytes as text with the reader of a form; bytes that are not text give one finding.
+pub(crate) fn decoded(
+    bytes: &[u8],
+    options: &ReadOptions,
+    read: impl FnOnce(&str, &ReadOptions) -> Reading,
+) -> Reading {
     match decode(bytes) {
         Ok(source) => read(source, options),
         Err(finding) => {
@@ -61,7 +70,7 @@ pub fn read_bytes(bytes: &[u8], options: &ReadOptions) -> Reading {
 }
 
 /// The bytes as text, or the finding that says why they are none.
-pub(crate) fn decode(bytes: &[u8]) -> Result<&str, Box<Finding>> {
+fn decode(bytes: &[u8]) -> Result<&str, Box<Finding>> {
     /// A NUL byte so far to the front tells a binary file.
     const LOOK: usize = 8192;
     if bytes.iter().take(LOOK).any(|&byte| byte == 0) {

@@ -3,6 +3,7 @@
 #ifndef CANTER_DRIVER_H
 #define CANTER_DRIVER_H
 
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -206,5 +207,17 @@ typedef struct {
     uint64_t reserved[4];
 } canter_hello_ack;
 _Static_assert(sizeof(canter_hello_ack) == 1184, "canter_hello_ack");
+
+/* The largest speed (rad/s) of a joint at `position` (rad) in the direction of `velocity`, for an arm that
+ * allows less speed near the ends of a range: towards an end at the distance x it is
+ * sqrt(2 deceleration x) - offset, at most `top`, at least 0. `ends` are the lower and the upper end
+ * (rad); they may lie beyond the range. As [joints.near_ends] in robot.toml. Link with -lm. */
+static inline double canter_end_speed(double top, const double ends[2], double deceleration, double offset,
+                                      double position, double velocity) {
+    double room = velocity < 0.0 ? position - ends[0] : ends[1] - position;
+    double speed = sqrt(2.0 * deceleration * (room > 0.0 ? room : 0.0)) - offset;
+    speed = speed > 0.0 ? speed : 0.0;
+    return speed < top ? speed : top;
+}
 
 #endif

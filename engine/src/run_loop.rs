@@ -220,6 +220,13 @@ impl<D, O: Operator> RunLoop<D, O> {
         self.operator
             .observe(&samples, &self.host.session)
             .map_err(RunLoopError::Samples)?;
+        while let Some(note) = self.host.session.note(Duration::ZERO) {
+            match note {
+                Note::NotSettled { .. } => self.operator.hear(&note),
+                Note::Closed => break,
+                _ => {}
+            }
+        }
         drop(self.host);
         Ok(Finished {
             operator: self.operator,

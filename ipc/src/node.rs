@@ -189,7 +189,7 @@ where
         .max_subscribers(8)
         .max_nodes(16)
         .open_or_create()
-        .map_err(|error| topic_error(service, &error))
+        .map_err(|error| Cause::from(error).error(service))
 }
 
 /// The same as [`topic`] for texts of any length.
@@ -209,7 +209,7 @@ pub(crate) fn text_topic(
         .max_subscribers(16)
         .max_nodes(24)
         .open_or_create()
-        .map_err(|error| topic_error(service, &error))
+        .map_err(|error| Cause::from(error).error(service))
 }
 
 /// Opens or creates the handshake `kind` of `arm`: one server, a few clients.
@@ -261,7 +261,7 @@ where
         .max_clients(clients)
         .max_nodes(nodes)
         .open_or_create()
-        .map_err(|error| exchange_error(service, &error))
+        .map_err(|error| Cause::from(error).error(service))
 }
 
 /// The same as [`exchange`] for texts of any length.
@@ -281,7 +281,7 @@ pub(crate) fn text_exchange(
         .max_clients(16)
         .max_nodes(24)
         .open_or_create()
-        .map_err(|error| exchange_error(service, &error))
+        .map_err(|error| Cause::from(error).error(service))
 }
 
 /// The other processes that use a service: names and process numbers.
@@ -309,63 +309,79 @@ where
     }
 }
 
-/// iceoryx2's error as a message that says what to do.
-fn topic_error(service: String, error: &PublishSubscribeOpenOrCreateError) -> IpcError {
-    use PublishSubscribeOpenError as Open;
-    match error {
-        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => match open {
-            Open::IncompatibleTypes
-            | Open::IncompatibleMessagingPattern
-            | Open::IncompatibleOverflowBehavior
-            | Open::DoesNotSupportRequestedMinBufferSize => IpcError::Incompatible {
-                service,
-                protocol: PROTOCOL,
-            },
-            Open::ServiceInCorruptedState => IpcError::OtherLibrary { service },
-            Open::InsufficientPermissions => IpcError::Permission {
-                service,
-                operation: "opening the service",
-            },
-            other => IpcError::Failed {
-                service,
-                operation: "opening the service",
-                cause: format!("{other:?}"),
-            },
-        },
-        other => IpcError::Failed {
+/// Why a service was neither opened nor created.
+enum Cause {
+    /// It exists with other types or settings.
+    Incompatible,
+    /// It exists and is damaged, or another version of iceoryx2 made it.
+    Corrupted,
+    /// It exists and is another user's.
+    Permission,
+    /// Another reason why it was not opened.
+    Open(String),
+    /// It did not exist and was not created.
+    Create(String),
+}
+
+impl Cause {
+    /// The cause as a message that says what to do.
+    fn error(self, service: String) -> IpcError {
+        let (operation, cause) = match self {
+            Self::Incompatible => {
+                return IpcError::Incompatible {
+                    service,
+                    protocol: PROTOCOL,
+                };
+            }
+            Self::Corrupted => return IpcError::OtherLibrary { service },
+            Self::Permission => {
+                return IpcError::Permission {
+                    service,
+                    operation: "opening the service",
+                };
+            }
+            Self::Open(cause) => ("opening the service", cause),
+            Self::Create(cause) => ("creating the service", cause),
+        };
+        IpcError::Failed {
             service,
-            operation: "creating the service",
-            cause: format!("{other:?}"),
-        },
+            operation,
+            cause,
+        }
     }
 }
 
-/// iceoryx2's error as a message that says what to do.
-fn exchange_error(service: String, error: &RequestResponseOpenOrCreateError) -> IpcError {
-    use RequestResponseOpenError as Open;
-    match error {
-        RequestResponseOpenOrCreateError::RequestResponseOpenError(open) => match open {
-            Open::IncompatibleRequestType
-            | Open::IncompatibleResponseType
-            | Open::IncompatibleMessagingPattern => IpcError::Incompatible {
-                service,
-                protocol: PROTOCOL,
+impl From<PublishSubscribeOpenOrCreateError> for Cause {
+    fn from(error: PublishSubscribeOpenOrCreateError) -> Self {
+        use PublishSubscribeOpenError as Open;
+        match error {
+            PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => match open {
+                Open::IncompatibleTypes
+                | Open::IncompatibleMessagingPattern
+                | Open::IncompatibleOverflowBehavior
+                | Open::DoesNotSupportRequestedMinBufferSize => Self::Incompatible,
+                Open::ServiceInCorruptedState => Self::Corrupted,
+                Open::InsufficientPermissions => Self::Permission,
+                other => Self::Open(format!("{other:?}")),
             },
-            Open::ServiceInCorruptedState => IpcError::OtherLibrary { service },
-            Open::InsufficientPermissions => IpcError::Permission {
-                service,
-                operation: "opening the service",
+            other => Self::Create(format!("{other:?}")),
+        }
+    }
+}
+
+impl From<RequestResponseOpenOrCreateError> for Cause {
+    fn from(error: RequestResponseOpenOrCreateError) -> Self {
+        use RequestResponseOpenError as Open;
+        match error {
+            RequestResponseOpenOrCreateError::RequestResponseOpenError(open) => match open {
+                Open::IncompatibleRequestType
+                | Open::IncompatibleResponseType
+                | Open::IncompatibleMessagingPattern => Self::Incompatible,
+                Open::ServiceInCorruptedState => Self::Corrupted,
+                Open::InsufficientPermissions => Self::Permission,
+                other => Self::Open(format!("{other:?}")),
             },
-            other => IpcError::Failed {
-                service,
-                operation: "opening the service",
-                cause: format!("{other:?}"),
-            },
-        },
-        other => IpcError::Failed {
-            service,
-            operation: "creating the service",
-            cause: format!("{other:?}"),
-        },
+            other => Self::Create(format!("{other:?}")),
+        }
     }
 }

@@ -67,7 +67,7 @@ impl Default for FollowOptions {
 
 /// Follows a path with a null-space motion.
 type Resolve<const N: usize> =
-    fn(&trace::Task<'_, N>, &SVector<f64, N>) -> Result<Vec<FollowPoint<N>>, FollowError>;
+    fn(&trace::Task<'_, N>, &SVector<f64, N>) -> Result<redundancy::Resolved<N>, FollowError>;
 
 /// Joint path of a tool path.
 ///
@@ -89,6 +89,19 @@ pub fn follow<const N: usize>(
     start: &SVector<f64, N>,
     options: &FollowOptions,
 ) -> Result<Vec<FollowPoint<N>>, FollowError> {
+    follow_choosing(solver, tool, (grid, start), options).map(|(points, _)| points)
+}
+
+/// As [`follow`], with the null-space motion that was chosen, for [`follow_with`] on a finer grid.
+///
+/// # Errors
+/// As [`follow`].
+pub fn follow_choosing<const N: usize>(
+    solver: &Solver<N>,
+    tool: &dyn Fn(f64) -> TwistPoint,
+    (grid, start): (&[f64], &SVector<f64, N>),
+    options: &FollowOptions,
+) -> Result<(Vec<FollowPoint<N>>, NullMotion<N>), FollowError> {
     let task = trace::Task {
         solver,
         tool,
@@ -104,13 +117,15 @@ pub fn follow<const N: usize>(
             None
         }
     };
-    match resolve {
+    let none = null_space::NullSpace::none();
+    let resolved = match resolve {
         Some(resolve) => resolve(&task, start),
-        None => task.trace(start, &null_space::NullSpace::none()),
-    }
+        None => task.trace(start, &none).map(|points| (points, none)),
+    };
+    resolved.map(|(points, motion)| (points, NullMotion(motion)))
 }
 
-/// A null-space motion along a path of the tool that was found by [`cheaper`].
+/// A null-space motion along a path of the tool that was found by [`follow_choosing`] or [`cheaper`].
 #[derive(Clone, Copy, Debug)]
 pub struct NullMotion<const N: usize>(null_space::NullSpace<N>);
 

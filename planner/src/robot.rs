@@ -6,6 +6,7 @@
 
 mod arrival;
 mod effort;
+mod ends;
 mod error;
 mod file;
 mod files;
@@ -15,6 +16,7 @@ mod shipped;
 
 pub use arrival::Arrival;
 pub use effort::EffortLimits;
+pub use ends::EndSpeeds;
 pub use error::RobotError;
 pub use import::{from_urdf, import};
 pub use meshes::{mesh_file, mesh_names};
@@ -69,6 +71,8 @@ pub struct JointLimits {
     pub source: String,
     /// The shares of the maker's limits that these limits are.
     pub margin: Margin,
+    /// Less speed near the ends of the range, if the maker asks for it.
+    pub ends: Option<EndSpeeds>,
 }
 
 impl JointLimits {
@@ -80,6 +84,7 @@ impl JointLimits {
         scale(&mut self.velocity, margin.velocity);
         scale(&mut self.acceleration, margin.acceleration);
         scale(&mut self.jerk, margin.jerk);
+        self.ends = self.ends.map(|ends| ends.scaled(margin.velocity));
         self.margin = margin;
         self
     }
@@ -92,6 +97,10 @@ impl JointLimits {
             acceleration: whole(&self.acceleration, self.margin.acceleration),
             jerk: whole(&self.jerk, self.margin.jerk),
             margin: Margin::default(),
+            ends: self
+                .ends
+                .clone()
+                .map(|ends| ends.scaled(1.0 / self.margin.velocity)),
             ..self.clone()
         }
     }
@@ -306,6 +315,7 @@ impl Robot {
             velocity: vector(&joints.velocity),
             acceleration: vector(&joints.acceleration),
             jerk: vector(&joints.jerk),
+            ends: joints.ends.as_ref().map(EndSpeeds::vectors),
         }
     }
 

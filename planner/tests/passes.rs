@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use planner::motion::Planner;
-use planner::robot::{load, vector};
+use planner::robot::{Robot, load, vector};
 use planner::task::{Move, Shape};
 use trajectory::smooth::angular_tolerance;
 
@@ -26,18 +26,23 @@ fn near(pose: &Isometry3<f64>, far: f64, turned: f64, state: &mut u64) -> Isomet
     Isometry3::from_parts(Translation3::from(place), pose.rotation * turn)
 }
 
+/// The planner of a robot, and its home.
+fn planner_at_home<const N: usize>(robot: &Robot) -> (Planner<N>, SVector<f64, N>) {
+    let planner = Planner::new(
+        &robot.chain::<N>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<N>(),
+        robot.joint_names(),
+    );
+    (planner, vector(&robot.home))
+}
+
 /// Poses in clusters that are smaller than the balls, with turns on the spot: the times of the
 /// passes never go back, and at each of them the tool is in the ball and turned as the rule says.
 #[test]
 fn passes_are_in_order_and_true() {
     let robot = load("ur5e").unwrap();
-    let home: SVector<f64, 6> = vector(&robot.home);
-    let planner = Planner::new(
-        &robot.chain::<6>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<6>(),
-        robot.joint_names(),
-    );
+    let (planner, home) = planner_at_home::<6>(&robot);
     let (mut state, mut planned) = (7, 0);
     for round in 0..24 {
         let tolerance = [0.0, 1e-4, 1e-3, 5e-3][round % 4];
@@ -115,13 +120,7 @@ const ROOM: f64 = 1e-3;
 /// is never the slower one.
 fn compared<const N: usize>(name: &str, lists: usize, seed: u64) -> usize {
     let robot = load(name).unwrap();
-    let home: SVector<f64, N> = vector(&robot.home);
-    let planner = Planner::new(
-        &robot.chain::<N>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    );
+    let (planner, home) = planner_at_home::<N>(&robot);
     let (mut state, mut both) = (seed, 0);
     for round in 0..lists {
         let tolerance = [0.0, 5e-5, 1e-3, 5e-3, 2e-2, 0.0][round % 6];
@@ -161,13 +160,7 @@ fn smooth_moves_are_never_slower_than_straight_ones() {
 #[test]
 fn rests_are_named_in_the_certificate() {
     let robot = load("ur5e").unwrap();
-    let home: SVector<f64, 6> = vector(&robot.home);
-    let planner = Planner::new(
-        &robot.chain::<6>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<6>(),
-        robot.joint_names(),
-    );
+    let (planner, home) = planner_at_home::<6>(&robot);
     let start = planner.chain().forward(&home);
     let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0) * start;
     let rests = |tolerance: f64, poses: Vec<_>| -> Vec<Option<&'static str>> {

@@ -18,6 +18,7 @@ use crate::{JointLimits, Sample};
 ///     velocity: vector![2.0],
 ///     acceleration: vector![5.0],
 ///     jerk: vector![50.0],
+///     ends: None,
 /// };
 /// let mut now = Sample { velocity: vector![1.0], ..Sample::rest(vector![0.0]) };
 /// for _ in 0..400 {

@@ -69,6 +69,7 @@ const LOW_HORIZON: f64 = 0.5;
 ///     velocity: vector![2.0],
 ///     acceleration: vector![10.0],
 ///     jerk: vector![100.0],
+///     ends: None,
 /// };
 /// let mut cycle = Cycle::<1, 64>::new(vector![0.0], limits, 0.001);
 /// let (from, to) = (Sample::rest(vector![0.0]), Sample::rest(vector![0.5]));

@@ -90,8 +90,9 @@ pub fn check<const N: usize>(
             let moved = of(&next.position, joint) - of(&previous.position, joint);
             let most = of(&limits.jerk, joint);
             let curve = most * period * period * period / 6.0 + POSITION_ROUNDING;
+            let speed = limits.speed(joint, of(&next.position, joint), v1);
             [
-                (Quantity::Velocity, v1, of(&limits.velocity, joint)),
+                (Quantity::Velocity, v1, speed),
                 (Quantity::Acceleration, a1, of(&limits.acceleration, joint)),
                 (Quantity::Jerk, (a1 - a0) / period, most),
                 (Quantity::Step, moved - (v0 + v1) * (period / 2.0), curve),
@@ -194,7 +195,37 @@ mod tests {
             velocity: vector![2.0, 2.0],
             acceleration: vector![5.0, 5.0],
             jerk: vector![50.0, 50.0],
+            ends: None,
         }
+    }
+
+    #[test]
+    fn less_speed_is_allowed_near_an_end() {
+        let near = crate::EndSpeeds {
+            lower: vector![-3.0, -3.0],
+            upper: vector![3.0, 3.0],
+            deceleration: vector![2.0, 2.0],
+            offset: vector![0.2, 0.2],
+        };
+        let limits = JointLimits {
+            ends: Some(near),
+            ..limits()
+        };
+        // 0.04 rad before the end: sqrt(2 * 2 * 0.04) - 0.2 = 0.2 rad/s.
+        let at = |speed: f64| Sample {
+            velocity: vector![0.0, speed],
+            ..Sample::rest(vector![0.0, 2.96])
+        };
+        let moved = |speed: f64| {
+            let (from, mut next) = (at(speed), at(speed));
+            next.position[1] += speed * 0.001;
+            check(&from, &next, &limits, 0.001)
+        };
+        assert_eq!(moved(0.19), None);
+        assert_eq!(moved(-1.9), None);
+        let trip = moved(0.21).unwrap();
+        assert_eq!((trip.joint, trip.quantity), (1, Quantity::Velocity));
+        assert!((trip.limit - 0.2).abs() < 2e-3, "{trip:?}");
     }
 
     #[test]

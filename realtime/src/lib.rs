@@ -34,5 +34,5 @@ pub use buffer::Pushed;
 pub use cycle::{Cycle, Demand, Step};
 pub use governor::StopCategory;
 pub use guard::{Following, Quantity, Trip, check};
-pub use limits::JointLimits;
+pub use limits::{EndSpeeds, JointLimits};
 pub use piece::{Piece, Sample, Segment};

@@ -23,6 +23,7 @@ fn limits() -> JointLimits<N> {
         velocity: Joints::new(3.0, 2.0, 4.0),
         acceleration: Joints::new(15.0, 8.0, 20.0),
         jerk: Joints::new(150.0, 100.0, 400.0),
+        ends: None,
     }
 }
 

@@ -49,8 +49,8 @@ impl Bridge {
         let now = Time::now();
         let read = if self.goals.knows(id) {
             Err("a goal of this name is known already".to_owned())
-        } else if self.is_busy() {
-            Err("the arm is executing something else".to_owned())
+        } else if let Some(why) = self.busy() {
+            Err(why.to_owned())
         } else {
             Wanted::read(asked.goal, &self.arm.joints, now.to_nanos() as f64 * 1e-9)
         };

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use ipc::{Arm, IpcError, Observer, Setpoint, State, StateFlags};
+use ipc::{Arm, IpcError, Observer, Setpoint, SetpointFlags, State, StateFlags};
 use ros2_client::builtin_interfaces::Time;
 
 use crate::messages::{Header, JointState, Point, Span};
@@ -76,6 +76,12 @@ impl ArmReader {
             velocity: unless(StateFlags::NO_VELOCITY, &state.velocity),
             effort: unless(StateFlags::NO_EFFORT, &state.effort),
         })
+    }
+
+    /// Whether the last setpoint moves.
+    pub(crate) fn moves(&self) -> bool {
+        let setpoint = self.setpoint.as_ref();
+        setpoint.is_some_and(|setpoint| setpoint.flags & SetpointFlags::HOLD == 0)
     }
 
     /// Planned time since the start of the command (s).

@@ -77,6 +77,8 @@ pub(crate) struct Bridge {
     serial: u64,
     published: Instant,
     lost: bool,
+    /// A pause or stop has brought the arm to rest, and it has not moved since.
+    held: bool,
 }
 
 /// What a bridge does for its options.
@@ -108,6 +110,7 @@ impl Bridge {
             serial: 0,
             published: Instant::now(),
             lost: false,
+            held: false,
         }
     }
 
@@ -127,6 +130,7 @@ impl Bridge {
     /// Everything once.
     fn turn(&mut self) {
         self.arm.look();
+        self.held &= !self.arm.moves();
         self.read_goals();
         self.read_cancels();
         self.read_results();
@@ -160,8 +164,18 @@ impl Bridge {
     }
 
     /// Whether something is executed for ROS.
-    pub(crate) fn is_busy(&self) -> bool {
+    fn is_busy(&self) -> bool {
         self.goals.active.is_some() || self.running.is_some()
+    }
+
+    /// Why the arm takes nothing new now; nothing where it does.
+    pub(crate) fn busy(&self) -> Option<&'static str> {
+        let why = if self.held {
+            "a pause or stop holds the arm in the middle of a motion; canter resume goes on with it"
+        } else {
+            "the arm is executing something else"
+        };
+        self.is_busy().then_some(why)
     }
 
     fn read_stops(&mut self) {
@@ -179,8 +193,7 @@ impl Bridge {
     fn read_programs(&mut self) {
         for program in 0..self.programs.len() {
             while let Ok(Some((request, _))) = self.ends.programs[program].receive_request() {
-                if self.is_busy() {
-                    let said = "the arm is executing something else";
+                if let Some(said) = self.busy() {
                     self.answer(program, request, (false, said));
                     continue;
                 }
@@ -235,6 +248,7 @@ impl Bridge {
                 self.lost = false;
                 let (level, text) = words(&note);
                 self.ends.say(level, &text);
+                self.held |= note["event"] == "stopped";
                 let fate = Fate::of(&note);
                 self.program_fate(&fate);
                 self.goal_fate(fate);

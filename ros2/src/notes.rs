@@ -47,6 +47,13 @@ pub(crate) fn words(note: &Value) -> (LogLevel, String) {
                 format!("joint {joint} is {error:.4} from its end and does not arrive"),
             )
         }
+        "not-settled" => {
+            let (error, joint) = (note["error"].as_f64().unwrap_or(f64::NAN), number("joint"));
+            let said = format!(
+                "joint {joint} is {error:.6} from the last setpoint, and the driver does not come to rest"
+            );
+            (LogLevel::Warn, said)
+        }
         "faulted" => (LogLevel::Error, format!("fault: {}", text("reason"))),
         "recovered" => (LogLevel::Info, "the fault is cleared".to_owned()),
         "closed" => (LogLevel::Error, "the engine has ended".to_owned()),

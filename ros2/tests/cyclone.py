@@ -205,6 +205,10 @@ def held(peer, processes):
     assert accepted
     time.sleep(1.0)
     assert processes.run("stop").returncode == 0
+    rest = at_rest(peer).position
+    _, accepted = peer.send(bend(rest, 0.1, 1.0, 5, start.name))
+    assert not accepted, peer.said
+    peer.hear("a pause or stop holds the arm")
     answer = peer.stop.call(0)
     assert answer.success, answer
     result = peer.result(name)

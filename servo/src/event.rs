@@ -211,6 +211,16 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
+    /// The thread ends although the joints that the driver commands, or the arm, do not come to rest at
+    /// the last setpoint.
+    NotSettled {
+        /// The joint that is furthest away, from 0.
+        joint: u32,
+        /// How far it is (rad, m).
+        error: f64,
+        /// The period.
+        tick: u64,
+    },
     /// The thread ended; nothing follows.
     Ended {
         /// The period.

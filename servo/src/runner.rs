@@ -2,6 +2,7 @@
 
 mod arrival;
 mod guards;
+mod leaving;
 mod message;
 mod splices;
 mod states;
@@ -25,6 +26,7 @@ use super::remote::{Remote, Shared};
 use super::segment_sender::{Item, SegmentSender, ToolOrder, Work};
 
 use arrival::{Awaited, WAITING};
+use leaving::Leaving;
 use message::first;
 
 /// Number of planned segments in the cycle's buffer.
@@ -102,7 +104,7 @@ pub struct Runner<const N: usize> {
     slowed: bool,
     asked: Asked,
     aborting: Option<StopCategory>,
-    leaving: bool,
+    leaving: Option<Leaving<N>>,
     stopped: bool,
     fault: Option<Fault>,
     tool: Option<Working>,
@@ -153,7 +155,7 @@ impl<const N: usize> Runner<N> {
             slowed: false,
             asked: shared.orders.asked(),
             aborting: None,
-            leaving: false,
+            leaving: None,
             stopped: false,
             fault: None,
             tool: None,
@@ -238,16 +240,6 @@ impl<const N: usize> Runner<N> {
         self.shared.orders.wants_recovery() && self.cycle.is_resting()
     }
 
-    /// Comes to rest on the path, whatever is asked for, because the thread will end.
-    pub(super) fn leave(&mut self) {
-        self.leaving = true;
-    }
-
-    /// Whether the driver follows and the arm rests, so that the thread may end.
-    pub(super) fn may_leave(&self) -> bool {
-        self.cycle.is_resting()
-    }
-
     /// Whether the reader of samples must catch up before the next period; only lock-step waits.
     pub(super) fn samples_wait(&self) -> bool {
         self.samples
@@ -317,6 +309,7 @@ impl<const N: usize> Runner<N> {
         self.watch_arrival();
         self.watch_tool();
         self.tell_stopped();
+        self.watch_leaving();
         self.shared.published.fetch_add(1, Ordering::Relaxed);
         self.shared
             .skipped
@@ -405,7 +398,7 @@ impl<const N: usize> Runner<N> {
         match (self.asked.demand(), self.aborting) {
             (Demand::Stop(StopCategory::Fast), _) => Demand::Stop(StopCategory::Fast),
             (_, Some(category)) => Demand::Stop(category),
-            (Demand::Run(_), None) if self.leaving || !self.ready => {
+            (Demand::Run(_), None) if self.leaving.is_some() || !self.ready => {
                 Demand::Stop(StopCategory::Gentle)
             }
             // Along the path, so within the limits of the joints.

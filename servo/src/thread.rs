@@ -20,7 +20,7 @@ const LOCK_STEP_PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two signs of life while virtual time is stopped.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 
-/// How long the thread tries to come to rest before it leaves anyway.
+/// How long the thread tries to come to rest, driver included, before it leaves anyway.
 const LEAVE: Duration = Duration::from_secs(5);
 
 /// What the thread sends when it has started.
@@ -168,7 +168,7 @@ impl<const N: usize> Loop<'_, N> {
         self.runner.fail(Fault::NoSession { reason });
     }
 
-    /// Whether the thread should end now: it was asked to before this period, and the arm rests.
+    /// Whether the thread should end now: it was asked to before this period, and arm and driver rest.
     fn leaves(&mut self) -> bool {
         if !self.shared.orders.is_shutting_down() {
             return false;

@@ -90,9 +90,15 @@ impl Controller {
         line.trim().to_owned()
     }
 
+    /// The answer to a question; between them RSIPI says on the same output which answers came late.
     fn ask(&mut self, words: &str) -> String {
         writeln!(self.input, "{words}").unwrap();
-        self.line()
+        loop {
+            let line = self.line();
+            if !line.starts_with('[') {
+                return line;
+            }
+        }
     }
 
     /// Late or invalid answers, and cycles.

@@ -30,7 +30,7 @@ use libtest_mimic::{Arguments, Trial};
 type Test = (&'static str, fn());
 
 /// The driver of Franka arms.
-const FRANKA: [Test; 6] = [
+const FRANKA: [Test; 7] = [
     (
         "franka::the_simulated_servo_is_stable",
         franka::the_simulated_servo_is_stable,
@@ -41,6 +41,7 @@ const FRANKA: [Test; 6] = [
     ),
     ("franka::pick_and_place", franka::pick_and_place),
     ("franka::kills_and_restarts", franka::kills_and_restarts),
+    ("franka::fast_to_the_ends", franka::fast_to_the_ends),
     ("franka::the_driver_conforms", franka::the_driver_conforms),
     (
         "franka::the_controller_is_told_the_payload",

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 mod conformance;
+mod goodbyes;
 mod hostile;
 mod lock_step;
 mod processes;

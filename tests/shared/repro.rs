@@ -45,17 +45,7 @@ fn whole(name: &str, robot: &str) -> Plan {
 
 /// Every row of a plan at 1 kHz, as `canter verify` reads it.
 fn rows(plan: &Plan) -> Vec<RecordedSample> {
-    plan.samples(1e-3)
-        .map(|sample| RecordedSample {
-            t_s: sample.t_s,
-            command: sample.command,
-            joints: sample.q,
-            rates: sample.dq,
-            accelerations: sample.ddq,
-            pose: sample.workstation_from_tool,
-            run: None,
-        })
-        .collect()
+    plan.samples(1e-3).map(RecordedSample::from).collect()
 }
 
 /// No limit is broken, no passing time goes back, no number is NaN, and the checker agrees.

@@ -18,6 +18,7 @@ pub fn limits() -> JointLimits<JOINTS> {
         velocity: Joints::from_element(3.1),
         acceleration: Joints::from_element(15.0),
         jerk: Joints::from_element(200.0),
+        ends: None,
     }
 }
 

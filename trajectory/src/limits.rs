@@ -1,10 +1,11 @@
 //! Limits of joints and tool.
 
-pub use realtime::JointLimits;
+pub use realtime::{EndSpeeds, JointLimits};
 
 use crate::TimingError;
 
-/// Checks that every velocity, acceleration and jerk limit is positive.
+/// Checks that every velocity, acceleration and jerk limit is positive, and the decelerations near the ends of
+/// the ranges, and that the offsets there are not negative.
 ///
 /// # Errors
 /// [`TimingError::BadJointLimit`] with the first joint whose limit is not.
@@ -23,6 +24,30 @@ pub(crate) fn check_joints<const N: usize>(limits: &JointLimits<N>) -> Result<()
                     value,
                 });
             }
+        }
+    }
+    let ends = limits.ends.iter();
+    let pairs = ends.flat_map(|ends| ends.deceleration.iter().zip(&ends.offset).enumerate());
+    for (joint, (&deceleration, &offset)) in pairs {
+        let bad = |value: f64, least: f64| value.is_nan() || value < least;
+        let rows = [
+            (
+                "deceleration near the ends of the range",
+                deceleration,
+                bad(deceleration, f64::MIN_POSITIVE),
+            ),
+            (
+                "offset of the speed near the ends of the range",
+                offset,
+                bad(offset, 0.0),
+            ),
+        ];
+        if let Some(&(quantity, value, _)) = rows.iter().find(|row| row.2) {
+            return Err(TimingError::BadJointLimit {
+                joint,
+                quantity,
+                value,
+            });
         }
     }
     Ok(())
@@ -56,6 +81,30 @@ impl ToolLimits {
         angular_acceleration: f64::INFINITY,
         angular_jerk: f64::INFINITY,
     };
+
+    /// A share of the limits along the path and one of those about an axis.
+    ///
+    /// ```
+    /// use trajectory::ToolLimits;
+    /// let limits = ToolLimits {
+    ///     speed: 2.0,
+    ///     angular_jerk: 8.0,
+    ///     ..ToolLimits::UNLIMITED
+    /// };
+    /// let slower = limits.scaled(0.5, 0.25);
+    /// assert_eq!((slower.speed, slower.angular_jerk), (1.0, 2.0));
+    /// ```
+    #[must_use]
+    pub fn scaled(&self, along: f64, about: f64) -> Self {
+        Self {
+            speed: self.speed * along,
+            acceleration: self.acceleration * along,
+            jerk: self.jerk * along,
+            angular_speed: self.angular_speed * about,
+            angular_acceleration: self.angular_acceleration * about,
+            angular_jerk: self.angular_jerk * about,
+        }
+    }
 
     /// Whether there is any limit.
     pub(crate) fn limited(&self) -> bool {

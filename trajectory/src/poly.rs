@@ -117,6 +117,21 @@ where
     ]
 }
 
+/// Upper bound of the norm of a Bernstein form over `limit`, refined by halving while it is above
+/// the limit and above the values at the ends.
+pub(crate) fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> f64 {
+    let norms = control.map(|c| c.norm() / limit);
+    let bound = norms
+        .iter()
+        .fold(0.0, |worst: f64, n| if *n <= worst { worst } else { *n });
+    let ends = norms[0].max(norms[M - 1]);
+    if depth == 0 || bound <= 0.9 || bound <= ends * (1.0 + 1e-4) {
+        return bound;
+    }
+    let (left, right) = halve(control);
+    hull(&left, limit, depth - 1).max(hull(&right, limit, depth - 1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

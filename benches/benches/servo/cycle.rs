@@ -17,6 +17,7 @@ pub(crate) fn governor() {
         velocity: seven(3.1),
         acceleration: seven(15.0),
         jerk: seven(200.0),
+        ends: None,
     };
     let mut cycle = Box::new(Cycle::<7, 512>::new(seven(0.0), limits, 0.001));
     let (from, to) = (Sample::rest(seven(0.0)), Sample::rest(seven(0.5)));

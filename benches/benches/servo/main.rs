@@ -99,6 +99,7 @@ fn limits() -> JointLimits<N> {
         velocity: Joints::from_element(3.1),
         acceleration: Joints::from_element(15.0),
         jerk: Joints::from_element(200.0),
+        ends: None,
     }
 }
 

@@ -99,14 +99,7 @@ pub fn read(source: &str, options: &ReadOptions) -> Reading {
 ///
 /// Bytes that are not UTF-8 text give one finding; [`crate::Source::from_bytes`] fits its span.
 pub fn read_bytes(bytes: &[u8], options: &ReadOptions) -> Reading {
-    match text::decode(bytes) {
-        Ok(source) => read(source, options),
-        Err(finding) => {
-            let mut findings = Findings::new(options.max_findings);
-            findings.push(*finding);
-            findings.into_reading(Program::default())
-        }
-    }
+    text::decoded(bytes, options, read)
 }
 
 /// Whether a file is XML, by its first character.

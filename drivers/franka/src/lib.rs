@@ -19,7 +19,7 @@ mod taken;
 use std::sync::atomic::AtomicBool;
 
 pub use arrivals::{Arrivals, Sockets};
-pub use driver_kit::{About, DriverError, DriverReport, RunOptions, host};
+pub use driver_kit::{About, DriverError, DriverReport, EndSpeeds, RunOptions, host};
 pub use options::{Collision, FrankaOptions, GripperOptions};
 pub use robot::Franka;
 pub use taken::Taken;

@@ -55,7 +55,7 @@ def main():
         enforce_motion_limits=True,
     )
 
-    if os.environ.get("CANTER_FRANKA_LATE") == "dropped":
+    if os.environ.get("CANTER_FRANKA_LATE") != "applied":
         drop_late_answers()
     record = Record(FOLDER)
     keep_time()

@@ -14,6 +14,9 @@ const FIRST: f64 = 1e-3;
 /// Tolerance of a setpoint's position beyond what speed and time allow (rad).
 const ROOM: f64 = 2e-3;
 
+/// Tolerance of a setpoint's speed where little is allowed (rad/s).
+const SLOW: f64 = 1e-3;
+
 /// Largest velocity and acceleration of a setpoint, as a multiple of the joint's limit: tolerance
 /// for rounding.
 const MARGIN: f64 = 1.001;
@@ -299,6 +302,7 @@ impl<R: Robot> Driver<R> {
         (0..self.joints()).find(|&joint| {
             let (at, speed) = (setpoint.position[joint], setpoint.velocity[joint]);
             let most = self.about.velocity[joint] * MARGIN;
+            let here = most.min(self.about.speed(joint, at, speed) * MARGIN + SLOW);
             let force = self.about.acceleration[joint] * MARGIN;
             // A late setpoint continues the last one, not the extrapolation meanwhile.
             let before = if first {
@@ -309,7 +313,7 @@ impl<R: Robot> Driver<R> {
             let room = if first { FIRST } else { ROOM + most * elapsed };
             at < self.about.lower[joint] - ROOM
                 || at > self.about.upper[joint] + ROOM
-                || speed.abs() > most
+                || speed.abs() > here
                 || setpoint.acceleration[joint].abs() > force
                 || (at - before).abs() > room
         })

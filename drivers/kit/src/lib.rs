@@ -16,6 +16,7 @@
 mod address;
 mod command;
 mod driver;
+mod end_speeds;
 mod error;
 mod greeting;
 mod limiter;
@@ -33,6 +34,8 @@ mod robot;
 pub use address::host;
 pub use command::{Command, TimedReferences};
 pub use driver::Driver;
+pub use end_speeds::EndSpeeds;
+use end_speeds::NearEnds;
 pub use error::DriverError;
 use limiter::Limiter;
 pub use measured::{Inputs, Measured, Measurement, Outputs, RobotFault, Sensors};

@@ -5,6 +5,8 @@
 //! largest upward speed. Each mixture of the two keeps speed, acceleration and jerk limits. So one
 //! number per period is chosen: the share of the mixture. A share is refused if even the hardest
 //! braking after it would pass an end of the range; the hardest braking itself is always possible.
+//! Where less speed is allowed near the ends of the range, a share is refused too if the hardest braking
+//! after it would be too fast there.
 //! A setpoint that continues the last reference within the limits is used as it is, bit for bit.
 //!
 //! # Source
@@ -13,7 +15,7 @@
 //! law, as in R. Zanasi, C. Guarino Lo Bianco, A. Tonielli, "Nonlinear filters for the generation
 //! of smooth trajectories", Automatica 36(3), 2000.
 
-use crate::{Ramp, Reference};
+use crate::{NearEnds, Ramp, Reference};
 
 /// Room for rounding, as a share of a limit.
 const ROUNDING: f64 = 1e-3;
@@ -35,6 +37,9 @@ const CLOSING: [f64; 2] = [0.3, 0.2];
 const COARSE: u32 = 16;
 const FINE: u32 = 44;
 
+/// Places at which braking is compared with the speed that is allowed, in each of its two parts.
+const PARTS: usize = 8;
+
 /// The limits of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Limiter {
@@ -46,6 +51,8 @@ pub(crate) struct Limiter {
     pub(crate) acceleration: f64,
     /// Largest jerk (rad/s³).
     pub(crate) jerk: f64,
+    /// Less speed near the ends of the range.
+    pub(crate) near_ends: Option<NearEnds>,
 }
 
 impl Limiter {
@@ -200,15 +207,43 @@ impl Limiter {
         let speed = from.velocity.abs() + from.acceleration * from.acceleration / (2.0 * jerk);
         let most = speed * (speed / (2.0 * acceleration) + 2.0 * acceleration / jerk);
         let end = self.range[1];
-        from.position + most <= end
-            || Ramp::new(from, -self.velocity, bounds).top(from) <= end + room
+        let inside = from.position + most <= end
+            || Ramp::new(from, -self.velocity, bounds).top(from) <= end + room;
+        inside && self.is_slow_enough(from, (speed, most))
+    }
+
+    /// Whether the hardest braking from `from` keeps the speed that is allowed near the upper end; it is
+    /// not faster than `speed` (rad/s), and does not go farther than `most` (rad).
+    fn is_slow_enough(&self, from: &Reference, (speed, most): (f64, f64)) -> bool {
+        let Some(near) = &self.near_ends else {
+            return true;
+        };
+        if speed <= near.upwards(from.position + most) {
+            return true;
+        }
+        let [acceleration, jerk] = self.bounds();
+        let ramp = Ramp::new(from, -self.velocity, [acceleration, jerk]);
+        let turns = 2.0 * acceleration / jerk;
+        let braked = turns + speed / acceleration;
+        // First where the braking builds up, then where it lasts.
+        let part = |number: usize, time: f64| time * number as f64 / PARTS as f64;
+        let times = (0..PARTS).map(|number| part(number, turns));
+        let times = times.chain((0..=PARTS).map(|number| turns + part(number, braked - turns)));
+        let slow = |at: Reference| at.velocity <= near.upwards(at.position) + SMALL;
+        times.into_iter().all(|time| slow(ramp.sample(from, time)))
     }
 
     /// Whether the hardest braking from `from` stays above the lower end minus `room` (rad).
     fn stays_above(&self, from: &Reference, room: f64) -> bool {
         let [lower, upper] = self.range;
         let range = [-upper, -lower];
-        Self { range, ..*self }.stays_below(&from.mirrored(), room)
+        let near_ends = self.near_ends.map(NearEnds::mirrored);
+        let mirrored = Self {
+            range,
+            near_ends,
+            ..*self
+        };
+        mirrored.stays_below(&from.mirrored(), room)
     }
 }
 

@@ -4,6 +4,10 @@ use std::collections::VecDeque;
 
 use crate::{About, DriverError, Limiter, Reference};
 
+/// Share of the speed near the ends of the ranges that commands have at most: a controller stops at the
+/// first step beyond it, and the braking is looked at only at some places.
+const NEAR_ENDS: f64 = 0.97;
+
 /// How many references are kept.
 const RING: usize = 256;
 
@@ -160,6 +164,7 @@ impl Resampler {
             velocity: options.velocity.clone(),
             acceleration: options.acceleration.clone(),
             jerk: options.jerk.clone(),
+            end_speeds: about.end_speeds.as_ref().map(|ends| ends.scaled(NEAR_ENDS)),
             ..about.clone()
         };
         maker.check()?;

@@ -3,7 +3,8 @@
 use ipc::{MAX_JOINTS, Payload, ToolCommand, ToolFeedback, ToolStatus};
 
 use crate::{
-    Command, DriverError, Inputs, Limiter, Measured, Measurement, Outputs, RobotFault, Sensors,
+    Command, DriverError, EndSpeeds, Inputs, Limiter, Measured, Measurement, Outputs, RobotFault,
+    Sensors,
 };
 
 /// Description of a robot. Lists have one value per joint, root first.
@@ -25,6 +26,8 @@ pub struct About {
     /// Largest jerks (rad/s³), also of the driver's own stop; the reference that follows setpoints
     /// keeps them.
     pub jerk: Vec<f64>,
+    /// Less speed near the ends of the range, if the arm asks for it: references and stops keep it.
+    pub end_speeds: Option<EndSpeeds>,
     /// Whether it can be driven in lock-step: simulations can, a real arm cannot.
     pub lock_step: bool,
     /// The shortest and the longest period that it can serve (ns).
@@ -49,6 +52,7 @@ impl Default for About {
             velocity: Vec::new(),
             acceleration: Vec::new(),
             jerk: Vec::new(),
+            end_speeds: None,
             lock_step: true,
             periods_ns: [100_000, 1_000_000_000],
             own_clock: false,
@@ -80,6 +84,20 @@ impl About {
         })
     }
 
+    /// The largest speed (rad/s) of a joint at a position (rad) in the direction of `velocity`.
+    pub(crate) fn speed(&self, joint: usize, position: f64, velocity: f64) -> f64 {
+        let most = self.velocity[joint];
+        let Some(ends) = &self.end_speeds else {
+            return most;
+        };
+        let near = ends.of(joint);
+        most.min(if velocity < 0.0 {
+            near.mirrored().upwards(-position)
+        } else {
+            near.upwards(position)
+        })
+    }
+
     /// A limiter a joint.
     pub(crate) fn limiters(&self) -> Vec<Limiter> {
         let limiter = |joint: usize| Limiter {
@@ -87,6 +105,7 @@ impl About {
             velocity: self.velocity[joint],
             acceleration: self.acceleration[joint],
             jerk: self.jerk[joint],
+            near_ends: self.end_speeds.as_ref().map(|ends| ends.of(joint)),
         };
         (0..self.joints()).map(limiter).collect()
     }
@@ -104,13 +123,21 @@ impl About {
                 most: MAX_JOINTS,
             });
         }
-        let lists = [
+        let mut lists = vec![
             ("lower", &self.lower, false),
             ("upper", &self.upper, false),
             ("velocity", &self.velocity, true),
             ("acceleration", &self.acceleration, true),
             ("jerk", &self.jerk, true),
         ];
+        if let Some(ends) = &self.end_speeds {
+            lists.extend([
+                ("end_speeds.lower", &ends.lower, false),
+                ("end_speeds.upper", &ends.upper, false),
+                ("end_speeds.deceleration", &ends.deceleration, true),
+                ("end_speeds.offset", &ends.offset, false),
+            ]);
+        }
         for (option, list, positive) in lists {
             if list.len() != joints {
                 return Err(DriverError::Count {

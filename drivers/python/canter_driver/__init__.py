@@ -12,8 +12,9 @@ import time
 
 from . import messages as m
 from .driver import Driver
+from .limiter import NearEnds
 
-__all__ = ["READY", "Robot", "not_ready", "run", "wait"]
+__all__ = ["READY", "NearEnds", "Robot", "not_ready", "run", "wait"]
 
 # How many times lock-step polls for a setpoint before it sleeps between polls, and how long it
 # waits until the engine counts as gone.
@@ -35,6 +36,8 @@ class Robot:
     velocity = []
     acceleration = []
     jerk = []
+    # Less speed near the ends of the range, where the arm asks for it: a `NearEnds` for each joint.
+    near_ends = None
 
     # Whether it can be driven in lock-step (simulations can, a real arm cannot), the shortest and
     # longest period that it can serve (s), and whether it is a real arm.

@@ -14,6 +14,9 @@ FIRST, ROOM = 1e-3, 2e-3
 # How long a robot that is getting ready waits for the next request of its engine (ns).
 BEGINNING_NS = 2_000_000_000
 
+# Tolerance of a setpoint's speed where little is allowed (rad/s).
+SLOW = 1e-3
+
 # Largest velocity and acceleration of a setpoint, as a multiple of the limit.
 MARGIN = 1.001
 
@@ -46,7 +49,10 @@ class Driver:
         self.received_ns = self.heard_ns = self.newest_ns = self.stepped_ns = 0
         self.leaving = False
         limits = robot.lower, robot.upper, robot.velocity, robot.acceleration, robot.jerk
-        self.limiters = [Limiter(*values) for values in zip(*limits)]
+        near_ends = robot.near_ends or [None] * self.joints
+        if len(near_ends) != self.joints:
+            raise ValueError(f"near_ends has {len(near_ends)} entries, the robot has {self.joints} joints")
+        self.limiters = [Limiter(*values) for values in zip(*limits, near_ends)]
         self.at_ns = 0
         self.rest()
         self.forget_orders()
@@ -199,6 +205,7 @@ class Driver:
         for joint, ((at, speed, rate), limits) in enumerate(zip(target, self.limiters)):
             most = limits.velocity * MARGIN
             before, room = last[joint], ROOM + most * elapsed
+            most = min(most, limits.speed(at, speed) * MARGIN + SLOW)
             if first:
                 before, room = self.reference[joint][0], FIRST
             inside = limits.lower - ROOM <= at <= limits.upper + ROOM

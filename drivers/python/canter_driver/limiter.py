@@ -13,6 +13,9 @@ ROUNDING, SMALL, AT_END = 1e-3, 1e-9, 1e-6
 # target; the rest is for the motion of the target itself.
 CLOSING = 0.3, 0.2
 
+# Places at which braking is compared with the speed that is allowed near an end, in each of its two parts.
+PARTS = 8
+
 # Bisection steps for an end of the range; steps for a target, and its precision (rad).
 COARSE, STEPS, CLOSE = 16, 12, 1e-11
 
@@ -128,12 +131,42 @@ def before_share(is_beyond):
     return low
 
 
+class NearEnds:
+    """Less speed near the ends of the range of one joint: towards an end (rad) at the distance `x` it may
+    have the speed `sqrt(2 deceleration x) - offset` (rad/s2, rad/s). The ends may lie beyond the range."""
+
+    def __init__(self, lower, upper, deceleration, offset):
+        self.lower, self.upper = lower, upper
+        self.deceleration, self.offset = deceleration, offset
+
+    def upwards(self, position):
+        """The largest speed (rad/s) upwards at a position (rad)."""
+        return self.allowed(self.upper - position)
+
+    def downwards(self, position):
+        """The largest speed (rad/s) downwards at a position (rad)."""
+        return self.allowed(position - self.lower)
+
+    def allowed(self, room):
+        """The largest speed (rad/s) towards an end that is `room` (rad) away; at least 0."""
+        return max(sqrt(2 * self.deceleration * max(room, 0.0)) - self.offset, 0.0)
+
+
 class Limiter:
     """The limits of one joint."""
 
-    def __init__(self, lower, upper, velocity, acceleration, jerk):
+    def __init__(self, lower, upper, velocity, acceleration, jerk, near_ends=None):
         self.lower, self.upper = lower, upper
+        self.near_ends = near_ends
         self.velocity, self.acceleration, self.jerk = velocity, acceleration, jerk
+
+    def speed(self, position, velocity):
+        """The largest speed (rad/s) at a position (rad) in the direction of `velocity`."""
+        if self.near_ends is None:
+            return self.velocity
+        near = self.near_ends
+        allowed = near.downwards(position) if velocity < 0 else near.upwards(position)
+        return min(self.velocity, allowed)
 
     def approach(self, reference, target, period):
         """One period (s) towards `target`, the wanted state at its end."""
@@ -222,16 +255,40 @@ class Limiter:
         return speed * (speed / (2 * self.acceleration) + 2 * self.acceleration / self.jerk)
 
     def stays_below(self, reference, room):
-        """Whether the hardest braking stays below the upper end plus `room` (rad)."""
+        """Whether the hardest braking stays below the upper end plus `room` (rad), and slow enough before it."""
         p, v, a = reference
-        if p + self.most(v, a) <= self.upper:
-            return True
-        return top(reference, -self.velocity, self.acceleration, self.jerk) <= self.upper + room
+        most = self.most(v, a)
+        inside = p + most <= self.upper or (
+            top(reference, -self.velocity, self.acceleration, self.jerk) <= self.upper + room
+        )
+        near = self.near_ends
+        return inside and (near is None or self.slow_enough(reference, most, near.upwards))
 
     def stays_above(self, reference, room):
-        """Whether the hardest braking stays above the lower end minus `room` (rad)."""
+        """Whether the hardest braking stays above the lower end minus `room` (rad), and slow enough before it."""
         p, v, a = reference
-        if p - self.most(v, a) >= self.lower:
+        most, mirror = self.most(v, a), (-p, -v, -a)
+        inside = p - most >= self.lower or (
+            top(mirror, -self.velocity, self.acceleration, self.jerk) <= room - self.lower
+        )
+        near = self.near_ends
+        return inside and (near is None or self.slow_enough(mirror, most, lambda p: near.downwards(-p)))
+
+    def slow_enough(self, reference, most, allowed):
+        """Whether the hardest braking, which goes no farther than `most` (rad), keeps the speed that is
+        `allowed` (rad/s) at each place above."""
+        p, v, a = reference
+        speed = abs(v) + a * a / (2 * self.jerk)
+        if speed <= allowed(p + most):
             return True
-        mirror = -p, -v, -a
-        return top(mirror, -self.velocity, self.acceleration, self.jerk) <= room - self.lower
+        turns = 2 * self.acceleration / self.jerk
+        braked = turns + speed / self.acceleration
+        # First where the braking builds up, then where it lasts.
+        times = [turns * part / PARTS for part in range(PARTS)]
+        times += [turns + (braked - turns) * part / PARTS for part in range(PARTS + 1)]
+        bounds = -self.velocity, self.acceleration, self.jerk
+        for time in times:
+            q, w, _ = sample(reference, *bounds, time)
+            if w > allowed(q) + SMALL:
+                return False
+        return True

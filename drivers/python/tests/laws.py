@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from canter_driver import Robot, messages as m  # noqa: E402
+from canter_driver import NearEnds, Robot, messages as m  # noqa: E402
 from canter_driver.driver import Driver  # noqa: E402
 
 PERIOD, WATCHDOG = 1_000_000, 50_000_000
@@ -130,6 +130,61 @@ class Pair:
         assert rest[1:] == (0.0, 0.0), rest
         self.both(50)
         assert self.driver.robot.now == rest
+
+
+class Slow(Strict):
+    """The same joint, slower near the ends of its range, which lie a little beyond it. Braking is compared
+    with the limit at some places: half a percent is left for what lies between them."""
+
+    near_ends = [NearEnds(-UPPER - 0.008, UPPER + 0.008, 2.585, 0.2)]
+
+    def move(self, position, velocity, acceleration, at_ns, period):
+        super().move(position, velocity, acceleration, at_ns, period)
+        q, w = self.now[:2]
+        room = max(UPPER + 0.008 - (q if w > 0 else -q), 0.0)
+        allowed = max((2 * 2.585 * room) ** 0.5 - 0.2, 0.0)
+        assert abs(w) <= allowed * 1.005 + 1e-3, f"{q} {w} {allowed}"
+
+
+class NearTheEnds(unittest.TestCase):
+    def test_what_is_followed_is_slower_there(self):
+        """References that jump from end to end."""
+        for goals in ([0.99, -0.99], [0.5, 0.99, 0.2, -0.98]):
+            limiter = Driver(Slow()).limiters[0]
+            robot, reference, fastest = Slow(), (0.0, 0.0, 0.0), 0.0
+            for goal in goals:
+                for _ in range(3000):
+                    reference = limiter.approach(reference, (goal, 0.0, 0.0), PERIOD * 1e-9)
+                    robot.move(*([value] for value in reference), 0, PERIOD * 1e-9)
+                    fastest = max(fastest, abs(reference[1]))
+                self.assertAlmostEqual(reference[0], goal, 6)
+            self.assertGreater(fastest, 1.0)
+
+    def test_a_stop_is_slow_enough_too(self):
+        limiter = Driver(Slow()).limiters[0]
+        for moment in range(100, 1500, 70):
+            robot, reference = Slow(), (-0.9, 0.0, 0.0)
+            robot.now = reference
+            for period in range(3000):
+                if period < moment:
+                    reference = limiter.approach(reference, (0.99, 0.0, 0.0), PERIOD * 1e-9)
+                else:
+                    reference = limiter.go_on(reference, PERIOD * 1e-9)
+                robot.move(*([value] for value in reference), 0, PERIOD * 1e-9)
+
+    def test_a_setpoint_that_is_too_fast_there_is_refused(self):
+        for position, speed, refused in (0.9, 0.7, True), (0.9, 0.5, False), (-0.9, 0.7, False):
+            driver = Driver(Slow())
+            driver.state, driver.hello = m.ACTIVE, m.Hello(period_ns=PERIOD, watchdog_ns=WATCHDOG)
+            driver.last.position[0] = position
+            joint = driver.unreachable([(position, speed, 0.0)], 1, driver.received_ns)
+            self.assertEqual(joint == 0, refused)
+
+    def test_there_is_one_for_each_joint(self):
+        robot = Slow()
+        robot.near_ends = robot.near_ends * 2
+        with self.assertRaises(ValueError):
+            Driver(robot)
 
 
 class Laws(unittest.TestCase):

@@ -123,6 +123,13 @@ pub enum Note {
         /// How far it is (rad, m).
         error: f64,
     },
+    /// The session ends although what the driver commands does not come to rest at the last setpoint.
+    NotSettled {
+        /// The joint that is furthest away, from 1.
+        joint: u32,
+        /// How far it is (rad, m).
+        error: f64,
+    },
     /// The arm asks for less speed, or no longer does; the motion keeps its path.
     SpeedAsked {
         /// Share of the planned speed, 0..=1.
@@ -167,6 +174,11 @@ impl fmt::Display for Note {
             Self::NotArrived { id, joint, error } => write!(
                 f,
                 "warning: command {id}: joint {joint} is {error:.4} from its end and does not arrive"
+            ),
+            Self::NotSettled { joint, error } => write!(
+                f,
+                "warning: the session ends while the driver does not come to rest: joint {joint} is {error:.6} \
+                 from the last setpoint; look at the driver's messages"
             ),
             Self::SpeedAsked { share } if *share > 0.98 => {
                 f.write_str("the arm asks for full speed again")

@@ -88,7 +88,7 @@ fn header() -> String {
         "/* The messages of Canter's driver protocol; see docs/driver-protocol.md.\n \
          * Generated from the Rust types by ipc/tests/c_header: do not edit. */\n\
          #ifndef CANTER_DRIVER_H\n#define CANTER_DRIVER_H\n\n\
-         #include <stddef.h>\n#include <stdint.h>\n\n",
+         #include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n\n",
     );
     for (name, value) in constants() {
         if value > u64::from(u32::MAX) {
@@ -115,9 +115,25 @@ fn header() -> String {
         )
         .unwrap();
     }
+    text.push_str(END_SPEED);
     text.push_str("\n#endif\n");
     text
 }
+
+/// The speed near the ends of a range, for drivers in C: no message has it.
+const END_SPEED: &str = "
+/* The largest speed (rad/s) of a joint at `position` (rad) in the direction of `velocity`, for an arm that
+ * allows less speed near the ends of a range: towards an end at the distance x it is
+ * sqrt(2 deceleration x) - offset, at most `top`, at least 0. `ends` are the lower and the upper end
+ * (rad); they may lie beyond the range. As [joints.near_ends] in robot.toml. Link with -lm. */
+static inline double canter_end_speed(double top, const double ends[2], double deceleration, double offset,
+                                      double position, double velocity) {
+    double room = velocity < 0.0 ? position - ends[0] : ends[1] - position;
+    double speed = sqrt(2.0 * deceleration * (room > 0.0 ? room : 0.0)) - offset;
+    speed = speed > 0.0 ? speed : 0.0;
+    return speed < top ? speed : top;
+}
+";
 
 fn drivers() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../drivers")
@@ -151,6 +167,14 @@ fn the_header_is_that_of_the_types() {
     );
 }
 
+/// Prints speeds near an end at 3 rad, with 2 rad/s2 and 0.2 rad/s: 0.04 rad before it, away from it,
+/// behind it, and the same before the other end.
+const SPEEDS: &str = "    const double ends[2] = {-3.0, 3.0};
+    const double at[4][2] = {{2.96, 1.0}, {2.96, -1.0}, {3.01, 1.0}, {-2.96, -1.0}};
+    for (int i = 0; i < 4; i++)
+        printf(\"%.3f%s\", canter_end_speed(2.0, ends, 2.0, 0.2, at[i][0], at[i][1]), i < 3 ? \" \" : \"\\n\");
+";
+
 #[test]
 fn a_c_compiler_agrees() {
     let folder = std::env::temp_dir().join(format!("canter-header-{}", std::process::id()));
@@ -167,6 +191,7 @@ fn a_c_compiler_agrees() {
             writeln!(source, "    SHOW({}, {});", message.name, field.name).unwrap();
         }
     }
+    source.push_str(SPEEDS);
     source.push_str("    return 0;\n}\n");
     let (file, program) = (folder.join("layout.c"), folder.join("layout"));
     std::fs::write(&file, source).unwrap();
@@ -175,6 +200,7 @@ fn a_c_compiler_agrees() {
         .arg(&file)
         .arg("-o")
         .arg(&program)
+        .arg("-lm")
         .output();
     match compiled {
         Err(error) => println!("skipped: no C compiler ({error})"),
@@ -183,7 +209,8 @@ fn a_c_compiler_agrees() {
             assert!(output.status.success(), "{said}");
             let shown = Command::new(&program).output().unwrap();
             let shown = String::from_utf8(shown.stdout).unwrap();
-            assert_eq!(shown, layout(|message| message.name.to_owned()));
+            let speeds = "0.200 2.000 0.000 0.200\n";
+            assert_eq!(shown, layout(|message| message.name.to_owned()) + speeds);
         }
     }
     std::fs::remove_dir_all(&folder).unwrap();

@@ -12,8 +12,11 @@ const ROOM: f64 = 0.1;
 /// Smallest singular value that counts as well away from singular poses.
 const NIMBLE: f64 = 0.05;
 
-/// A joint path with its quality, or why there is none.
-type Attempt<const N: usize> = (f64, Result<Vec<FollowPoint<N>>, FollowError>);
+/// A joint path and its null-space motion.
+pub(super) type Resolved<const N: usize> = (Vec<FollowPoint<N>>, NullSpace<N>);
+
+/// The same with its quality, or why there is none.
+type Attempt<const N: usize> = (f64, Result<Resolved<N>, FollowError>);
 
 /// Follows without null-space motion if the quality is good, otherwise along the polynomial that a
 /// search over the whole path finds. The null-space motion is measured along the direction in which
@@ -22,7 +25,7 @@ type Attempt<const N: usize> = (f64, Result<Vec<FollowPoint<N>>, FollowError>);
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-) -> Result<Vec<FollowPoint<N>>, FollowError> {
+) -> Result<Resolved<N>, FollowError> {
     let (_, jacobian) = task.solver.chain().jacobian(start);
     let directions = null_space(&jacobian);
     let (mut best, mut answer) = along(task, start, &directions);
@@ -72,17 +75,17 @@ fn along<const N: usize>(
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
     // A path cannot be expected to be better than its start.
-    if (first.is_ok() && best >= 1.0) || is_beyond(&first) {
-        return (best, first);
+    let mut answer = first.map(|points| (points, still));
+    if (answer.is_ok() && best >= 1.0) || is_beyond(&answer) {
+        return (best, answer);
     }
-    let mut answer = first;
     for null_space_path in null_space_path::search(task, start, &still) {
         let mut moving = still;
         moving.polynomials[0] = null_space_path;
         if let Ok(points) = task.trace(start, &moving) {
             let found = quality(&points);
             if found > best {
-                (best, answer) = (found, Ok(points));
+                (best, answer) = (found, Ok((points, moving)));
             }
             if best >= 1.0 {
                 break;

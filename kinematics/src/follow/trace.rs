@@ -22,6 +22,9 @@ pub(super) struct Task<'a, const N: usize> {
 const START: f64 = 1e-6;
 /// Distance at which a point counts as exactly reached.
 const EXACT: f64 = 1e-12;
+/// Largest distance of the tool (m) that Newton's step leaves, over the square of the step (rad): half the reach
+/// of a large arm times the number of joints.
+const BEND: f64 = 20.0;
 /// Largest acceptable distance where rounding prevents a smaller one.
 const ENOUGH: f64 = 1e-10;
 /// Largest difference from the predicted joint positions, rad: more is another branch.
@@ -196,9 +199,14 @@ impl<const N: usize> Task<'_, N> {
             }
             reached = error;
             let x = linear::solve::<N>(&rows, &b, &[0.0; 8]);
-            q += SVector::from_fn(|i, _| x[i]);
+            let step = SVector::from_fn(|i, _| x[i]);
+            q += step;
             if (q - *guess.q).amax() > guess.within {
                 return None;
+            }
+            // What is left then is of second order in the step, and need not be computed.
+            if BEND * step.norm_squared() <= guess.exact {
+                return Some(q);
             }
         }
         None

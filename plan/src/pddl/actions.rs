@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::plan_file::PlanStep;
 use crate::PlanError;
 use crate::run::{Batch, Robot, RobotOptions};
-use crate::world::{Change, Class, Location, Model, Object, Scalar};
+use crate::world::{Change, Class, Location, Model, Object};
 
 /// The table of actions that comes with the crate.
 const OWN_TABLE: &str = include_str!("actions.toml");
@@ -354,13 +354,7 @@ impl Work<'_> {
         })?;
         let (design, tray, location) = (design.id.clone(), tray.id, tray.location);
         let id = self.model.fresh();
-        let mut object = Object::new(id, name, Class::KitInstance, location);
-        object
-            .properties
-            .insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
-        object
-            .properties
-            .insert("isKitInstance_Finished".into(), Scalar::Truth(false));
+        let object = Object::kit(id, name, location, design);
         let location = Location::pose(id, Isometry3::identity());
         let changes = vec![
             Change::Create(object),

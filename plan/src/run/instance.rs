@@ -9,7 +9,7 @@ use crate::PlanError;
 use crate::kitting::ast::{Name, Span};
 use crate::kitting::types::Type;
 use crate::world::class::derived_property;
-use crate::world::{Change, Class, Location, Object, Scalar};
+use crate::world::{Change, Class, Location, Object};
 
 impl Machine<'_> {
     /// The new object takes the place of its first component, which becomes relative to it.
@@ -31,16 +31,11 @@ impl Machine<'_> {
         let mut fresh = self.model.clone();
         let name = fresh.free_name(class.name());
         let id = fresh.fresh();
-        let mut object = Object::new(id, name, class, part.location);
-        if class == Class::KitInstance {
-            let design = self.design_for(part)?;
-            object
-                .properties
-                .insert("hasKitInstance_DesignRef".into(), Scalar::Text(design));
-            object
-                .properties
-                .insert("isKitInstance_Finished".into(), Scalar::Truth(false));
-        }
+        let object = if class == Class::KitInstance {
+            Object::kit(id, name, part.location, self.design_for(part)?)
+        } else {
+            Object::new(id, name, class, part.location)
+        };
         let location = Location::pose(id, Isometry3::identity());
         let changes = vec![
             Change::Create(object),

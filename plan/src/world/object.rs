@@ -76,6 +76,24 @@ impl Object {
         }
     }
 
+    /// A new kit of a design, not finished.
+    #[must_use]
+    pub fn kit(
+        id: ObjectId,
+        name: impl Into<String>,
+        location: Location,
+        design: impl Into<String>,
+    ) -> Self {
+        let properties = [
+            ("hasKitInstance_DesignRef", Scalar::Text(design.into())),
+            ("isKitInstance_Finished", Scalar::Truth(false)),
+        ];
+        Self {
+            properties: properties.map(|(name, value)| (name.into(), value)).into(),
+            ..Self::new(id, name, Class::KitInstance, location)
+        }
+    }
+
     /// Text of a stored property.
     #[must_use]
     pub fn text(&self, property: &str) -> Option<&str> {

@@ -9,7 +9,7 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{Blend, BlockedCause, Draft, MotionError, MoveCertificate, Planner};
+use super::{Blend, BlockedCause, Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest distance of the tool between two solved points, m.
@@ -220,33 +220,42 @@ impl<const N: usize> Planner<N> {
         way: &Way<'_, N>,
         start: &SVector<f64, N>,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let mut points = self.solved(way, &first_grid(way.curve), start)?;
+        let (mut points, chosen) = self.solved(way, &first_grid(way.curve), start)?;
         for _ in 0..REFINEMENTS {
             let finer = refined(self.chain(), &points, way.curve);
             if finer.len() == points.len() || finer.len() > MOST_POINTS {
                 break;
             }
-            points = self.solved(way, &finer, start)?;
+            let spare = Some(&chosen);
+            let found = self.solved(&Way { spare, ..*way }, &finer, start);
+            // Another null-space motion can be searched only where there is one and it was not given.
+            let searched = N > 6 && way.spare.is_none();
+            (points, _) = match found {
+                Err(_) if searched => self.solved(way, &finer, start)?,
+                found => found?,
+            };
         }
         Ok(points)
     }
 
+    /// The joints at the points of a grid and between them, and the null-space motion that was followed.
     fn solved(
         &self,
         way: &Way<'_, N>,
         grid: &[f64],
         start: &SVector<f64, N>,
-    ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let tool = way.tool();
+    ) -> Result<(Vec<FollowPoint<N>>, NullMotion<N>), MotionError> {
+        let (tool, at) = (way.tool(), (grid, start));
         let options = follow::FollowOptions {
             still_ends: way.still_ends,
             ..Default::default()
         };
-        let points = match way.spare {
-            Some(spare) => follow::follow_with(&self.solver, &tool, (grid, start), &options, spare),
-            None => follow::follow(&self.solver, &tool, grid, start, &options),
+        let found = match way.spare {
+            Some(spare) => follow::follow_with(&self.solver, &tool, at, &options, spare)
+                .map(|points| (points, *spare)),
+            None => follow::follow_choosing(&self.solver, &tool, at, &options),
         };
-        points.map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
+        found.map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
     /// Why the path is blocked. If the pose ahead is out of reach by more than the tolerance, that
@@ -320,11 +329,6 @@ impl SmoothPath {
     /// Whether it is along a curve fitted through a dense list.
     pub(super) fn is_fitted(&self) -> bool {
         self.plan.method() == smooth::Method::Fit
-    }
-
-    /// Says in a certificate at which poses it rests, and why.
-    pub(super) fn name_rests(&self, certificate: &mut MoveCertificate) {
-        certificate.name_rests(self.plan.rests());
     }
 
     /// What it promises, planned with this tolerance (m).

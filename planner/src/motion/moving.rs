@@ -267,23 +267,11 @@ mod tests {
     use crate::robot::{load, vector};
     use nalgebra::{Isometry3, Translation3};
 
-    /// A share of the limits of the tool.
-    fn lower(limits: &ToolLimits, share: f64) -> ToolLimits {
-        ToolLimits {
-            speed: limits.speed * share,
-            acceleration: limits.acceleration * share,
-            jerk: limits.jerk * share,
-            angular_speed: limits.angular_speed * share,
-            angular_acceleration: limits.angular_acceleration * share,
-            angular_jerk: limits.angular_jerk * share,
-        }
-    }
-
     fn ur5e() -> (Planner<6>, SVector<f64, 6>, ToolLimits) {
         let robot = load("ur5e").unwrap();
         let controller = Controller::<6>::new(&robot, 1000.0, crcl::LengthUnit::default()).unwrap();
         let mut most = robot.motion_limits();
-        most = lower(&most, 0.3);
+        most = most.scaled(0.3, 0.3);
         (controller.planner().clone(), vector(&robot.home), most)
     }
 

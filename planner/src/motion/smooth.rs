@@ -97,22 +97,10 @@ impl<const N: usize> Planner<N> {
             return best;
         }
         for [along, about] in SLOWER {
-            let mut slower = motion.clone();
-            let limits = &mut slower.limits;
-            for limit in [
-                &mut limits.speed,
-                &mut limits.acceleration,
-                &mut limits.jerk,
-            ] {
-                *limit *= along;
-            }
-            for limit in [
-                &mut limits.angular_speed,
-                &mut limits.angular_acceleration,
-                &mut limits.angular_jerk,
-            ] {
-                *limit *= about;
-            }
+            let slower = Move {
+                limits: motion.limits.scaled(along, about),
+                ..motion.clone()
+            };
             if let Ok(other) = self.blended(motion, start, &slower)
                 && other.planned.trajectory.duration() < best.trajectory.duration()
             {
@@ -198,7 +186,7 @@ impl<const N: usize> Planner<N> {
                 }
             }
             let mut planned = planned?;
-            path.name_rests(&mut planned.certificate);
+            planned.certificate.name_rests(path.plan.rests());
             Ok(Along {
                 planned: PlannedMove {
                     blend: Some(path.blend(curve.tolerance)),

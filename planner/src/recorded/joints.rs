@@ -23,7 +23,7 @@ pub(super) fn limits(recording: &Recording<'_>, span: &Span<'_>, report: &mut Ru
             let lower = Measure::at_least(q, limits.lower[joint] - 1e-9, place);
             report.hold(Rule::JointRange, subject, time, upper);
             report.hold(Rule::JointRange, subject, time, lower);
-            let most = limits.velocity[joint] * ALLOWED;
+            let most = limits.speed(joint, q, row.rates[joint]) * ALLOWED;
             let measure = Measure::at_most(row.rates[joint].abs(), most, speed);
             report.hold(Rule::JointVelocity, subject, time, measure);
             let most = limits.acceleration[joint] * ALLOWED;

@@ -203,16 +203,7 @@ mod tests {
         let robot = crate::robot::load("ur5e").unwrap();
         let program = crcl::text::read(PROGRAM, &crcl::ReadOptions::default()).program;
         let plan = plan_program(&robot, &program, &PlanOptions::default()).unwrap();
-        let rows = plan.samples(1e-3).map(|sample| RecordedSample {
-            t_s: sample.t_s,
-            command: sample.command,
-            joints: sample.q,
-            rates: sample.dq,
-            accelerations: sample.ddq,
-            run: None,
-            pose: sample.workstation_from_tool,
-        });
-        let rows = rows.collect();
+        let rows = plan.samples(1e-3).map(RecordedSample::from).collect();
         (robot, program, rows)
     }
 

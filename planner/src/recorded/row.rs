@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::dry_run::PlanSample;
+
 /// One row of a recorded motion, as `canter plan --samples` and `canter run --samples` write it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedSample {
@@ -30,6 +32,21 @@ pub struct RunColumns {
     pub measured: Vec<f64>,
     /// The controlled point at the measured joints, in the workstation, m.
     pub measured_point: Vector3<f64>,
+}
+
+/// A sample of a plan as a recording of it has it.
+impl From<PlanSample> for RecordedSample {
+    fn from(sample: PlanSample) -> Self {
+        Self {
+            t_s: sample.t_s,
+            command: sample.command,
+            joints: sample.q,
+            rates: sample.dq,
+            accelerations: sample.ddq,
+            pose: sample.workstation_from_tool,
+            run: None,
+        }
+    }
 }
 
 impl RecordedSample {

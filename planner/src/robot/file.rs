@@ -1,6 +1,7 @@
 //! Reads `robot.toml` and combines it with the URDF.
 
 use super::effort::{Limits, Payload};
+use super::ends::NearEnds;
 use super::error::RobotError;
 use super::files::Files;
 use super::{EndEffector, Gripper, JointLimits, Margin, Robot, ToolChanger, ToolLimits};
@@ -41,6 +42,7 @@ struct Joints {
     acceleration_per_s2: Option<Spanned<Vec<f64>>>,
     jerk_per_s3: Option<Spanned<Vec<f64>>>,
     margin: Option<Shares>,
+    near_ends: Option<NearEnds>,
 }
 
 /// Shares of the limits that are planned with.
@@ -122,7 +124,7 @@ impl Files<'_> {
             }
         })?;
         let file = self.place.join("robot.urdf").display().to_string();
-        let model = urdf::read(self.urdf, document.tip_link.as_deref()).map_err(|source| {
+        let mut model = urdf::read(self.urdf, document.tip_link.as_deref()).map_err(|source| {
             RobotError::Urdf {
                 file: file.clone(),
                 source,
@@ -141,9 +143,10 @@ impl Files<'_> {
             .transpose()?;
         let efforts = self.efforts(&model, document.limits.as_ref())?;
         let margin = self.margin(document.joints.get_ref().margin.as_ref())?;
-        let joints = self
-            .joint_limits(&model, &document.joints)?
-            .with_margin(margin);
+        let mut joints = self.joint_limits(&model, &document.joints)?;
+        let near_ends = document.joints.get_ref().near_ends.as_ref();
+        self.near_ends(near_ends, &mut model, &mut joints)?;
+        let joints = joints.with_margin(margin);
         let home = self.home(&document.home, &model)?;
         let end_effectors = self.end_effectors(&document.end_effector)?;
         Ok(Robot {
@@ -251,6 +254,7 @@ impl Files<'_> {
             })?,
             source: given.source.clone(),
             margin: Margin::default(),
+            ends: None,
         })
     }
 
@@ -306,7 +310,7 @@ impl Files<'_> {
         model.joints.iter().enumerate().map(one).collect()
     }
 
-    fn check_count(
+    pub(super) fn check_count(
         &self,
         key: &str,
         values: &Spanned<Vec<f64>>,

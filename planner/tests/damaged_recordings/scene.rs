@@ -60,16 +60,7 @@ impl Scene {
         if !plan.refusals.is_empty() {
             return None;
         }
-        let row = |sample: planner::dry_run::PlanSample| RecordedSample {
-            t_s: sample.t_s,
-            command: sample.command,
-            joints: sample.q,
-            rates: sample.dq,
-            accelerations: sample.ddq,
-            pose: sample.workstation_from_tool,
-            run: None,
-        };
-        Some(plan.samples(period).map(row).collect())
+        Some(plan.samples(period).map(RecordedSample::from).collect())
     }
 
     /// A pose `way` (mm) and `turn` (rotation vector, rad) from home, in the tool's axes.

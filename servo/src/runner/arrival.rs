@@ -115,7 +115,10 @@ impl<const N: usize> Runner<N> {
 }
 
 /// The joint that is furthest from `end`, and how far it is (rad, m).
-fn distance<const N: usize>(measured: &SVector<f64, N>, end: &SVector<f64, N>) -> (u32, f64) {
+pub(super) fn distance<const N: usize>(
+    measured: &SVector<f64, N>,
+    end: &SVector<f64, N>,
+) -> (u32, f64) {
     let joints = measured.iter().zip(end.iter()).enumerate();
     joints.fold((0, 0.0), |(worst, most), (joint, (at, end))| {
         let error = (at - end).abs();

@@ -5,9 +5,10 @@ use std::ops::Range;
 use nalgebra::SVector;
 use realtime::Piece;
 
-use super::found::Found;
 use crate::extrema;
+use crate::found::Found;
 use crate::limit::Limit;
+use crate::near_ends;
 use crate::poly::bernstein;
 use crate::{JointLimits, Trajectory};
 
@@ -123,6 +124,7 @@ pub(super) fn bound<const N: usize>(
             derivatives.search(*column, limit, starts[i]..starts[i + 1], found);
         }
     }
+    raise_near_ends(trajectory, limits, (&columns, &mut found, &mut rows));
     let limits = columns
         .iter()
         .map(|column| names[column.order](column.joint));
@@ -130,6 +132,29 @@ pub(super) fn bound<const N: usize>(
         found: limits.zip(found).collect(),
         positions: positions(trajectory),
         rows,
+    }
+}
+
+/// Raises the ratios of speeds where less is allowed near the ends of the range.
+fn raise_near_ends<const N: usize>(
+    trajectory: &Trajectory<N>,
+    limits: &JointLimits<N>,
+    (columns, found, rows): (&[Column], &mut [Found], &mut [f64]),
+) {
+    if limits.ends.is_none() {
+        return;
+    }
+    let starts = trajectory.times();
+    for (i, piece) in trajectory.pieces().iter().enumerate() {
+        for (c, column) in columns.iter().enumerate().filter(|(_, c)| c.order == 0) {
+            let Some(near) = near_ends::over(piece, starts[i], (limits, column.joint)) else {
+                continue;
+            };
+            let row = &mut rows[i * columns.len() + c];
+            *row = row.max(near.bound);
+            found[c].reached = found[c].reached.max(near.reached);
+            found[c].raise(near.bound, near.time);
+        }
     }
 }
 

@@ -5,7 +5,6 @@
 //! its values at five times, plus an error that is bounded by derivatives of higher order. Only
 //! intervals that may contain the largest value are refined.
 
-mod found;
 mod joints;
 mod stretch;
 mod way;
@@ -13,9 +12,9 @@ mod way;
 use nalgebra::SVector;
 
 use crate::active::Active;
+use crate::found::Found;
 use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
 use crate::{JointLimits, JointPoint, ToolLimits, ToolPoint, Trajectory};
-use found::Found;
 use stretch::Stretch;
 
 pub use way::Leg;

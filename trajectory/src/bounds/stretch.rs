@@ -3,8 +3,8 @@
 use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
-use super::found::{Found, TOLERANCE};
 use super::{Held, JointsToTool};
+use crate::found::{Found, TOLERANCE};
 use crate::limit::Limit;
 use crate::{JointPoint, Trajectory};
 

@@ -5,8 +5,8 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::MotionBounds;
-use super::found::Found;
 use super::stretch::Stretch;
+use crate::found::Found;
 use crate::poly::halve;
 use crate::smooth::to_segment;
 

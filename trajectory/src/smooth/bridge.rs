@@ -43,6 +43,8 @@ struct Bridges<'a> {
     rests: Vec<Rest>,
     /// Times of the passes, s.
     passes: Vec<f64>,
+    /// Whether a part was found only at a further attempt.
+    retried: bool,
 }
 
 /// The motion through `poses` without those of its rests for which a faster way past is found, with which
@@ -67,6 +69,7 @@ pub(super) fn bridged(
             .flat_map(|(method, count)| std::iter::repeat_n(*method, *count))
             .collect(),
         spans,
+        retried: motion.retried,
         rests: motion
             .rests
             .iter()
@@ -246,7 +249,7 @@ impl Bridges<'_> {
             parts,
             rests: self.rests,
             eased: true,
-            retried: false,
+            retried: self.retried,
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::angular_bounds::angular_bounds;
 use super::crossing::{self, Crossing, RESOLUTION};
 use super::options::SmoothOptions;
-use super::poly::{bernstein, halve};
+use super::poly::{halve, hull};
 use super::span::Span;
 use crate::ToolPoint;
 use crate::active::Active;
@@ -241,121 +242,6 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
     }
     let [a, b, c] = angular;
     [bounds[0], bounds[1], bounds[2], a, b, c]
-}
-
-/// Upper bound of the norm of a Bernstein form over `limit`, refined by halving while it is above
-/// the limit and above the values at the ends.
-fn hull<const M: usize>(control: &[Vector3<f64>; M], limit: f64, depth: u32) -> f64 {
-    let norms = control.map(|c| c.norm() / limit);
-    let bound = norms
-        .iter()
-        .fold(0.0, |worst: f64, n| if *n <= worst { worst } else { *n });
-    let ends = norms[0].max(norms[M - 1]);
-    if depth == 0 || bound <= 0.9 || bound <= ends * (1.0 + 1e-4) {
-        return bound;
-    }
-    let (left, right) = halve(control);
-    hull(&left, limit, depth - 1).max(hull(&right, limit, depth - 1))
-}
-
-/// Upper bounds of angular speed, acceleration and jerk over their limits.
-///
-/// On each of a few intervals the world axes of the rotations are fixed at the middle, which leaves
-/// a polynomial, bounded by its hull. The effect of the moving axes is bounded by norms and added.
-fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
-    let parts: u32 = if span.turns.len() == 1 { 1 } else { 4 };
-    let width = span.duration / f64::from(parts);
-    let limits = &options.limits;
-    let caps = [
-        limits.angular_speed,
-        limits.angular_acceleration,
-        limits.angular_jerk,
-    ];
-    let mut worst = [0.0_f64; 3];
-    for part in 0..parts {
-        let from = width * f64::from(part);
-        let bound = angular_stretch(span, from, from + width);
-        for k in 0..3 {
-            worst[k] = worst[k].max(bound[k] / caps[k]);
-        }
-    }
-    worst
-}
-
-/// Bounds of the norms of angular velocity and its two derivatives on the
-/// local interval `[from, to]`, rad/s, rad/s2, rad/s3.
-fn angular_stretch(span: &Span, from: f64, to: f64) -> [f64; 3] {
-    let half = (to - from) / 2.0;
-    let mut rotation = span.base;
-    let (mut rate, mut rate2, mut rate3) = (
-        [Vector3::zeros(); 4],
-        [Vector3::zeros(); 3],
-        [Vector3::zeros(); 2],
-    );
-    // Bounds of the angular velocity of the factors before, and of both parts of its derivative:
-    // along their axes, and from the turning of these.
-    let (mut before, mut along, mut across, mut rest) = (0.0, 0.0, 0.0, [0.0_f64; 3]);
-    let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(span.turns.len());
-    for turn in &span.turns {
-        let [c0, c1, c2, c3, c4] = turn.angle;
-        let middle = super::poly::quartic(&turn.angle, from + half)[0];
-        let axis = rotation * turn.axis;
-        let length = axis.norm();
-        let first = bernstein(&[c1, 2.0 * c2, 3.0 * c3, 4.0 * c4], from, to);
-        let second = bernstein(&[2.0 * c2, 6.0 * c3, 12.0 * c4], from, to);
-        let third = bernstein(&[6.0 * c3, 24.0 * c4], from, to);
-        let _ = c0;
-        let (m1, m2, m3) = (largest(&first), largest(&second), largest(&third));
-        // The axis turns with the factors before it; if they have the same direction, it does not
-        // turn.
-        let skew = axes
-            .iter()
-            .fold(0.0_f64, |worst, other| worst.max(sine(other, &axis)));
-        let skew = if skew < 1e-12 {
-            0.0
-        } else {
-            (skew + 2.0 * before * half).min(1.0)
-        };
-        let axis1 = length * before * skew;
-        let axis2 = length * (along * skew + across) + before * axis1;
-        let drift = axis1 * half;
-        for (sum, c) in rate.iter_mut().zip(first) {
-            *sum += axis * c;
-        }
-        for (sum, c) in rate2.iter_mut().zip(second) {
-            *sum += axis * c;
-        }
-        for (sum, c) in rate3.iter_mut().zip(third) {
-            *sum += axis * c;
-        }
-        rest[0] += m1 * drift;
-        rest[1] += m2 * drift + m1 * axis1;
-        rest[2] += m3 * drift + 2.0 * m2 * axis1 + m1 * axis2;
-        along += length * m2;
-        across += axis1 * m1;
-        before += length * m1;
-        axes.push(axis);
-        rotation *= nalgebra::UnitQuaternion::from_scaled_axis(turn.axis * middle);
-    }
-    [
-        hull(&rate, 1.0, 4) + rest[0],
-        hull(&rate2, 1.0, 4) + rest[1],
-        hull(&rate3, 1.0, 0) + rest[2],
-    ]
-}
-
-fn largest<const M: usize>(control: &[f64; M]) -> f64 {
-    control.iter().fold(0.0, |worst: f64, c| worst.max(c.abs()))
-}
-
-/// Sine of the angle between two vectors; 0 when either vanishes.
-fn sine(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    let product = a.norm() * b.norm();
-    if product > 0.0 {
-        a.cross(b).norm() / product
-    } else {
-        0.0
-    }
 }
 
 /// Greatest distance from the leg being travelled over the half width.

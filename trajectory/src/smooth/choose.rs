@@ -26,6 +26,9 @@ const EFFORT: Effort = Effort {
 /// is not followed by another.
 const HOPELESS: [f64; 2] = [10.0, 3.5];
 
+/// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
+const FAR: f64 = 1.2;
+
 /// Spread of a start in motion that was too fast.
 const SPREAD: f64 = 1.2;
 
@@ -149,15 +152,19 @@ impl<'a> Window<'a> {
             effort: Effort { most, ..EFFORT },
             coupled: None,
         };
-        let spans = attempts.run()?;
+        let (spans, retried) = attempts.run()?;
         let soon = spans.last()?.end() <= most;
-        soon.then(|| Motion::new(spans, Method::Spline))
+        soon.then(|| Motion {
+            retried,
+            ..Motion::new(spans, Method::Spline)
+        })
     }
 }
 
 impl Attempts<'_> {
-    /// A certified spline; bounds that one attempt breaks are narrowed for the next one.
-    fn run(mut self) -> Option<Vec<Span>> {
+    /// A certified spline, and whether an attempt before it failed by far; bounds that one attempt breaks are
+    /// narrowed for the next one.
+    fn run(mut self) -> Option<(Vec<Span>, bool)> {
         let Window {
             poses,
             options,
@@ -166,6 +173,7 @@ impl Attempts<'_> {
             then,
         } = self.window;
         let whole = self.inner.clone();
+        let mut retried = false;
         for attempt in 0..5_usize {
             let narrowed = self.inner.clone();
             let mut request = Request {
@@ -181,6 +189,7 @@ impl Attempts<'_> {
             let turns = request.moves()[1];
             let Some(mut spans) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
+                retried = true;
                 continue;
             };
             let (mut certificate, mut crossings) = certify(&spans, poses, options);
@@ -191,7 +200,7 @@ impl Attempts<'_> {
             }
             let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
             if certificate.holds() && settled {
-                return Some(spans);
+                return Some((spans, retried));
             }
             // Narrower bounds make it slower still.
             let slow = spans.last().map_or(0.0, Span::end) > self.most;
@@ -206,6 +215,7 @@ impl Attempts<'_> {
                 self.inner = whole.clone();
                 continue;
             }
+            retried |= broken(&certificate, &crossings) > FAR;
             narrow(&mut self.inner, &certificate, &crossings, request.coupled);
             if certificate.in_order && !settled {
                 self.inner.tolerance *= 0.5;
@@ -269,21 +279,8 @@ fn narrow(
     }
     let over = certificate.worst_limit();
     if over > 1.0 {
-        let limits = &mut options.limits;
-        for limit in [
-            &mut limits.angular_speed,
-            &mut limits.angular_acceleration,
-            &mut limits.angular_jerk,
-        ] {
-            *limit *= 0.99 / over.min(4.0);
-        }
-        for limit in [
-            &mut limits.speed,
-            &mut limits.acceleration,
-            &mut limits.jerk,
-        ] {
-            *limit *= 0.99 / over.min(4.0);
-        }
+        let share = 0.99 / over.min(4.0);
+        options.limits = options.limits.scaled(share, share);
     }
 }
 

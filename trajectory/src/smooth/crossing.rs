@@ -34,8 +34,13 @@ impl Crossing {
     /// True when the pose is passed within both tolerances.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.deviation <= self.tolerance + RESOLUTION
-            && self.angle <= self.angular_tolerance + 1e3 * RESOLUTION
+        let [place, turn] = Self::accepted(self.tolerance, self.angular_tolerance);
+        self.deviation <= place && self.angle <= turn
+    }
+
+    /// Largest deviation (m) and angle (rad) with which a pose is passed within these tolerances.
+    pub(super) fn accepted(tolerance: f64, angular_tolerance: f64) -> [f64; 2] {
+        [tolerance + RESOLUTION, angular_tolerance + 1e3 * RESOLUTION]
     }
 }
 

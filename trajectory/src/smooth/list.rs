@@ -3,12 +3,14 @@
 use nalgebra::Isometry3;
 
 use super::certificate::certify_whole;
+use super::fit::Fit;
 use super::lower_bound::lower_bound;
 use super::method::Method;
 use super::motion::Motion;
+use super::narrower::{narrower, within};
 use super::normal_form::NormalForm;
 use super::options::{SmoothError, SmoothOptions};
-use super::plan::SmoothPlan;
+use super::plan::{SmoothPlan, faster};
 use super::rest::RestCause;
 use super::windows::{self, Windows};
 use super::{bridge, dense, exact_stop};
@@ -42,10 +44,10 @@ use super::{bridge, dense, exact_stop};
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
     let finite = options.finite();
-    let planned = List::new(poses, &finite).fastest();
-    match planned {
+    let list = List::new(poses, &finite);
+    match list.fastest() {
         Some(mut plan) => {
-            plan.certificate.lower_bound = lower_bound(poses, &finite);
+            plan.certificate.lower_bound = list.least;
             Ok(plan)
         }
         // Without a tolerance, or if the form was too coarse.
@@ -53,11 +55,13 @@ pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothP
     }
 }
 
-/// A list as it was given, with finite options, and the time with a stop at each pose (s).
+/// A list as it was given, with finite options, and the times (s) with a stop at each pose and of the bound.
 struct List<'a> {
     poses: &'a [Isometry3<f64>],
     options: &'a SmoothOptions,
     exact_stop: f64,
+    /// Lower bound of the time of all motions, s.
+    least: f64,
 }
 
 impl<'a> List<'a> {
@@ -67,6 +71,7 @@ impl<'a> List<'a> {
             poses,
             options,
             exact_stop: exact_stop::duration(poses, &options.limits),
+            least: lower_bound(poses, options),
         }
     }
 
@@ -74,6 +79,41 @@ impl<'a> List<'a> {
     /// tolerance, and where no certificate holds.
     fn fastest(&self) -> Option<SmoothPlan> {
         let form = &NormalForm::new(self.poses, self.options)?;
+        let best = self.within_all(form)?;
+        self.within_less(form, best)
+    }
+
+    /// The fastest of a motion and of those within less of the tolerance: what holds there holds here. A search
+    /// does not find the optimum for sure, and one in narrower balls may come nearer to it.
+    fn within_less(&self, form: &NormalForm, mut best: SmoothPlan) -> Option<SmoothPlan> {
+        let over = best.duration() / self.least;
+        let doubtful = best.retried || over > DOUBTFUL;
+        if !doubtful || self.poses.len() <= FEW || over <= NEAR {
+            return Some(best);
+        }
+        let fitted = best.method() == Method::Fit;
+        let fit = self.options.fit && dense::may_be_fitted(&form.poses, &form.options);
+        let spline = !fitted && (best.retried || !self.is_costly(&best));
+        let mut left = if best.retried { PATIENCE } else { 1 };
+        for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
+            let options = within(&form.options, tolerance / form.options.tolerance);
+            let before = best.duration();
+            if fit {
+                best = faster(Some(best), self.fit(form, &options).map(|fit| fit.plan))?;
+            }
+            if spline {
+                best = faster(Some(best), self.by_windows(form, &options))?;
+            }
+            left -= usize::from(best.duration() > GAIN * before);
+            if left == 0 {
+                break;
+            }
+        }
+        Some(best)
+    }
+
+    /// The fastest certified motion within the whole tolerance.
+    fn within_all(&self, form: &NormalForm) -> Option<SmoothPlan> {
         let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
         let fitted = if dense { self.fitted(form) } else { None };
         match fitted {
@@ -85,8 +125,13 @@ impl<'a> List<'a> {
                 let spline =
                     spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
                 let mut best = faster(fitted.map(|fit| fit.plan), spline);
-                if best.as_ref().is_some_and(|plan| self.is_slow(plan)) {
-                    best = self.again(form, best, dense);
+                let slow = best.as_ref().is_some_and(|plan| self.is_slow(plan));
+                if slow
+                    && self.options.fit
+                    && !dense
+                    && dense::may_be_fitted(&form.poses, &form.options)
+                {
+                    best = faster(best, self.fitted(form).map(|fit| fit.plan));
                 }
                 match best {
                     Some(plan) if plan.is_divided() => self.without_rests(form, plan),
@@ -98,21 +143,7 @@ impl<'a> List<'a> {
 
     /// Whether a motion may be much slower than another: it rests on its way, or is far above the bound.
     fn is_slow(&self, plan: &SmoothPlan) -> bool {
-        plan.is_divided() || plan.duration() > SLOW * lower_bound(self.poses, self.options)
-    }
-
-    /// The fastest motion of one that may be slow, of a fitted curve if none was tried, and of those within
-    /// less of the tolerance.
-    fn again(
-        &self,
-        form: &NormalForm,
-        mut best: Option<SmoothPlan>,
-        fitted: bool,
-    ) -> Option<SmoothPlan> {
-        if self.options.fit && !fitted && dense::may_be_fitted(&form.poses, &form.options) {
-            best = faster(best, self.fitted(form).map(|fit| fit.plan));
-        }
-        best
+        plan.is_divided() || plan.duration() > SLOW * self.least
     }
 
     /// The motion along a fitted curve: the faster one from both ends if that from the first is
@@ -130,7 +161,7 @@ impl<'a> List<'a> {
     /// half of the tolerance.
     fn fitted_from(&self, form: &NormalForm) -> Option<Fit> {
         let first = self.fit(form, &form.options);
-        if !first.as_ref().is_some_and(|fit| fit.retried) {
+        if !first.as_ref().is_some_and(|fit| fit.plan.retried) {
             return first;
         }
         let half = self.fit(form, &within(&form.options, 0.5));
@@ -141,13 +172,8 @@ impl<'a> List<'a> {
     fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Fit> {
         let motion = dense::plan(&form.poses, options)?;
         let eased = motion.eased || !motion.rests.is_empty();
-        let retried = motion.retried;
         let plan = self.certified(form, motion)?;
-        Some(Fit {
-            plan,
-            eased,
-            retried,
-        })
+        Some(Fit { plan, eased })
     }
 
     /// The fastest motion of a plan with rests that the way does not ask for, of the splines from the
@@ -172,7 +198,7 @@ impl<'a> List<'a> {
         let plan = self.by_windows(form, &form.options)?;
         // A motion within half of the tolerance is within all of it. A second motion is cheap if
         // poses are close to each other and fit in one window.
-        let costly = plan.spans.len() > SPANS_PER_POSE * self.poses.len() || plan.parts.len() > 1;
+        let costly = self.is_costly(&plan) || plan.parts.len() > 1;
         if costly || self.poses.len() <= SHORT || plan.method() != Method::Spline {
             return Some(plan);
         }
@@ -184,6 +210,11 @@ impl<'a> List<'a> {
             best.before = before;
         }
         Some(best)
+    }
+
+    /// Whether another spline takes long: poses are far apart.
+    fn is_costly(&self, plan: &SmoothPlan) -> bool {
+        plan.spans.len() > SPANS_PER_POSE * self.poses.len()
     }
 
     /// The same under options of the form, once.
@@ -221,72 +252,31 @@ impl<'a> List<'a> {
     }
 }
 
-/// A motion along a fitted curve.
-struct Fit {
-    plan: SmoothPlan,
-    /// Whether another way of planning may be faster.
-    eased: bool,
-    /// Whether a curve within less of the tolerance may be faster.
-    retried: bool,
-}
-
-impl Fit {
-    /// The faster of two, the first if they are equal.
-    fn faster(first: Option<Self>, second: Option<Self>) -> Option<Self> {
-        let (first, second) = match (first, second) {
-            (Some(first), Some(second)) => (first, second),
-            (first, second) => return first.or(second),
-        };
-        let better = second.plan.duration() < first.plan.duration();
-        let eased = if better { second.eased } else { first.eased };
-        Some(Self {
-            plan: faster(Some(first.plan), Some(second.plan))?,
-            eased,
-            retried: false,
-        })
-    }
-
-    /// Whether no other way of planning is faster by much: it is not slower than it might be, and
-    /// rests nowhere. A motion that turns back without a rest saves up to the time of a ramp.
-    fn suffices(&self) -> bool {
-        !self.eased && self.plan.rests().is_empty()
-    }
-}
-
-/// The options with a share of all tolerances.
-fn within(options: &SmoothOptions, share: f64) -> SmoothOptions {
-    SmoothOptions {
-        tolerance: share * options.tolerance,
-        corridor: Some(share * options.corridor()),
-        angular_tolerance: Some(share * options.angular_tolerance()),
-        ..options.clone()
-    }
-}
-
-/// The faster of two plans, the first if they are equal.
-fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<SmoothPlan> {
-    let (mut first, mut second) = match (first, second) {
-        (Some(first), Some(second)) => (first, second),
-        (first, second) => return first.or(second),
-    };
-    let later = second.before.0 < first.before.0;
-    let before = if later { second.before } else { first.before };
-    (first.before, second.before) = (before, before);
-    Some(if second.duration() < first.duration() {
-        second
-    } else {
-        first
-    })
-}
-
 /// Shares of the tolerance within which a list is planned that rests within all of it.
 const SHARES: [f64; 3] = [0.7, 0.5, 0.35];
+
+/// Most narrower tolerances that are tried, and how many of them without a gain where an attempt failed.
+const MOST_NARROWER: usize = 5;
+const PATIENCE: usize = 2;
+
+/// A motion within less has gained something if it takes less than this share.
+const GAIN: f64 = 0.998;
+
+/// A motion that takes no more than so many times the lower bound, found at the first attempt, is rarely slower than
+/// one within less of the tolerance.
+const DOUBTFUL: f64 = 1.25;
+
+/// A motion that takes no more than so many times the lower bound cannot be much slower than another.
+const NEAR: f64 = 1.02;
 
 /// A motion that takes so many times the lower bound may be slow: three in four splines take less.
 const SLOW: f64 = 1.4;
 
 /// Lists up to this length are planned once.
 const SHORT: usize = 5;
+
+/// Lists up to this length are not planned within less: a curve of a few poses is one of many that a move may try.
+const FEW: usize = 12;
 
 /// Longer lists are planned twice if they need no more than this many spans per pose.
 const SPANS_PER_POSE: usize = 24;

@@ -1,9 +1,10 @@
 //! A lower bound of the time of all motions through the poses within the limits.
 //!
-//! With tolerance and corridor zero the motion is known: straight legs from stop to stop, with the
-//! rotation in proportion. Each takes the time of its tightest limit.
+//! With tolerance and corridor zero every pose is a stop, and the way is straight legs. Each takes the time of
+//! its tightest limit; a leg without length and turn is none.
 //!
-//! Otherwise two bounds that hold for every motion from rest to rest, whatever its shape:
+//! Otherwise two bounds that hold for every motion from rest to rest, whatever its shape, within balls as
+//! wide as the certificate takes them:
 //!
 //! - **Length.** The limits bound the speed at any time after the start and before the end, so the
 //!   distance covered in a given time is bounded; the distance is at least the legs, less the
@@ -13,11 +14,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::crossing::RESOLUTION;
+use super::crossing::{Crossing, RESOLUTION};
 use super::options::{SmoothError, SmoothOptions};
 use super::ramp::{self, Caps};
 use crate::ToolLimits;
-use crate::line::body_turn;
+use crate::line::{Line, body_turn};
 use crate::timing::least_time as rest_to_rest;
 
 /// Largest number of legs whose directions are used.
@@ -74,15 +75,19 @@ pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> 
     let turn = |a: &Isometry3<f64>, b: &Isometry3<f64>| body_turn(&a.rotation, &b.rotation).norm();
     if options.tolerance <= RESOLUTION && options.corridor() <= RESOLUTION {
         let leg = |pair: &[Isometry3<f64>]| {
+            // Rounding of a leg that is none would take microseconds: time goes with its cube root.
+            if Line::new(pair[0], pair[1]).is_still() {
+                return 0.0;
+            }
             rest_to_rest(way(&pair[0], &pair[1]), linear.values())
                 .max(rest_to_rest(turn(&pair[0], &pair[1]), angular.values()))
         };
         return poses.windows(2).map(leg).sum();
     }
-    let turned = length(poses, options.angular_tolerance(), turn);
-    shortest(length(poses, options.tolerance, way), &linear)
-        .max(shortest(turned, &angular))
-        .max(turning_back(poses, options.tolerance, &linear))
+    let [place, angle] = Crossing::accepted(options.tolerance, options.angular_tolerance());
+    shortest(length(poses, place, way), &linear)
+        .max(shortest(length(poses, angle, turn), &angular))
+        .max(turning_back(poses, place, &linear))
 }
 
 /// Least length of a path that passes the poses, by one measure of distance.
@@ -231,6 +236,19 @@ mod tests {
     fn exact_with_stops() {
         let stops = bound(&[[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]], 0.0);
         assert!((stops - 0.7).abs() < 1e-9);
+    }
+
+    /// A repeated pose adds nothing, though its orientation may differ in the last digit.
+    #[test]
+    fn a_repeated_pose_is_no_leg() {
+        let mut limits = ToolLimits::UNLIMITED;
+        (limits.speed, limits.angular_jerk) = (0.5, 150.0);
+        let options = SmoothOptions::new(0.0, limits).finite();
+        let [start, goal] = [0.0, 0.1].map(|x| Isometry3::translation(x, 0.0, 0.0));
+        let again = Isometry3::new(goal.translation.vector, Vector3::z() * 1e-17);
+        let [once, twice] =
+            [&[start, goal][..], &[start, goal, again]].map(|poses| lower_bound(poses, &options));
+        assert_eq!(once, twice);
     }
 
     /// Back and forth: two distances of 99 mm between times at rest.

@@ -11,6 +11,7 @@
 //! [`ToolCurve`](crate::ToolCurve) whose parameter is time; if joints need more time, the path
 //! timing stretches time, which does not change the geometry.
 
+mod angular_bounds;
 mod approach;
 mod bridge;
 mod certificate;
@@ -18,10 +19,12 @@ mod choose;
 mod crossing;
 mod dense;
 mod exact_stop;
+mod fit;
 mod list;
 mod lower_bound;
 mod method;
 mod motion;
+mod narrower;
 mod normal_form;
 mod options;
 mod plan;

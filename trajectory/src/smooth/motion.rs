@@ -14,8 +14,8 @@ pub(crate) struct Motion {
     pub(crate) rests: Vec<Rest>,
     /// Whether a part is slower than its way of planning usually is: another way may be faster.
     pub(crate) eased: bool,
-    /// Whether a curve was found only with smaller balls or more knots: within less of the tolerance there may
-    /// be a faster one.
+    /// Whether a part was found only at a further attempt, with smaller balls or more knots: within less of the
+    /// tolerance there may be a faster motion.
     pub(crate) retried: bool,
 }
 

@@ -10,7 +10,8 @@ use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
 use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
-use crate::{Path, ToolLimits, ToolPoint};
+use crate::near_ends;
+use crate::{JointLimits, Path, ToolLimits, ToolPoint};
 use simd::Build;
 
 /// A limit counts as active from this ratio on.
@@ -59,7 +60,9 @@ impl Audit {
         });
         let mut seen = Seen::at(bounded.path, 0.0);
         for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
+            let row = audit.ratios.len();
             joint.push(piece, &mut audit.ratios);
+            raise_near_ends(piece, bounded.joint, &mut audit.ratios[row..]);
             if bounded.tool.limited() {
                 audit.push_tool(bounded.path, law, (&tool, &mut seen));
             }
@@ -175,6 +178,18 @@ fn joint_limits<const N: usize>(values: &[SVector<f64, N>; 3]) -> Vec<Limit> {
         limits.extend(finite.map(name));
     }
     limits
+}
+
+/// Raises the ratios of speeds over a piece, joints with a finite limit first, where less is allowed
+/// near the ends of the range.
+fn raise_near_ends<const N: usize>(piece: &Piece<N>, limits: &JointLimits<N>, ratios: &mut [f64]) {
+    if limits.ends.is_none() {
+        return;
+    }
+    let finite = (0..N).filter(|j| limits.velocity[*j].is_finite());
+    for (ratio, joint) in ratios.iter_mut().zip(finite) {
+        *ratio = ratio.max(near_ends::ratio(piece, limits, joint));
+    }
 }
 
 /// The finite limits of the tool, in the order of [`tool_norms`].

@@ -4,7 +4,7 @@
 use nalgebra::{SVector, Vector3};
 
 use super::reach::{self, ReachGrid};
-use super::rise::{Rise, joint_ratio};
+use super::rise::{Rise, joint_ratio, speed_ratio};
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
@@ -178,6 +178,7 @@ fn places<const N: usize>(path: &dyn Path<N>) -> Result<Vec<f64>, TimingError> {
 
 /// The first two derivatives of a path at many places.
 struct Bends<const N: usize> {
+    positions: Vec<SVector<f64, N>>,
     joints: Vec<[SVector<f64, N>; 2]>,
     /// Of the tool, of its position and then of its orientation; empty if nothing limits it.
     tools: Vec<[[Vector3<f64>; 2]; 2]>,
@@ -190,6 +191,7 @@ impl<const N: usize> Bends<N> {
     fn new(path: &dyn Path<N>, at: &[f64], limits: &ToolLimits) -> Result<Self, TimingError> {
         let limited = limits.limited();
         let mut bends = Self {
+            positions: Vec::with_capacity(at.len()),
             joints: Vec::with_capacity(at.len()),
             tools: Vec::with_capacity(if limited { at.len() } else { 0 }),
             sizes: [0.0; 4],
@@ -199,6 +201,7 @@ impl<const N: usize> Bends<N> {
             for (size, d) in bends.sizes.iter_mut().zip(&joint.q) {
                 *size = size.max(d.amax());
             }
+            bends.positions.push(joint.q[0]);
             bends.joints.push([joint.q[1], joint.q[2]]);
             if limited {
                 let two = |[p, q, _]: [Vector3<f64>; 3]| [p, q];
@@ -311,7 +314,7 @@ impl<const N: usize> Rows<'_, N> {
     fn cap(&self, bends: &Bends<N>, i: usize) -> f64 {
         let [linear, angular] = bends.tool(i);
         let speeds = [
-            joint_ratio(&bends.joints[i][0], &self.joint.velocity),
+            speed_ratio(&bends.positions[i], &bends.joints[i][0], self.joint),
             linear[0].norm(),
             angular[0].norm(),
         ];

@@ -9,6 +9,27 @@ pub(super) fn joint_ratio<const N: usize>(d: &SVector<f64, N>, limit: &SVector<f
     d.component_div(limit).amax()
 }
 
+/// The same for speeds at a position (rad), whose limits may fall towards the ends of the range. A path
+/// keeps this share of its largest speed at least, so that the law stays finite: bounds of the motion
+/// refuse what is too fast then.
+pub(super) fn speed_ratio<const N: usize>(
+    position: &SVector<f64, N>,
+    d: &SVector<f64, N>,
+    limits: &JointLimits<N>,
+) -> f64 {
+    if limits.ends.is_none() {
+        return joint_ratio(d, &limits.velocity);
+    }
+    let one = |j: usize| {
+        let most = limits.speed(j, position[j], d[j]);
+        d[j].abs() / most.max(LEAST * limits.velocity[j])
+    };
+    (0..N).map(one).fold(0.0, f64::max)
+}
+
+/// Least share of the largest speed.
+const LEAST: f64 = 1e-4;
+
 /// Bounds of the second and third derivative of `u(t)` along a path that is straight in joint space
 /// and even in `u`: there `q'` is constant, so that each limit of a joint bounds `u` alone.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use super::grid::Bounded;
 use super::gridpoints::{Gridpoint, Gridpoints, ToolGridpoint};
 use super::problem::Problem;
 use super::reachability::{leading, speed_cap};
-use super::rise::joint_ratio;
+use super::rise::speed_ratio;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, ToolLimits};
 
@@ -149,7 +149,7 @@ impl<const N: usize> Rows<'_, N> {
             set(&mut row[1], l, q / *limit);
         }
         let speeds = [
-            joint_ratio(first, &self.joint.velocity),
+            speed_ratio(&gridpoint.position, first, self.joint),
             tool.linear[0].norm(),
             tool.angular[0].norm(),
         ];

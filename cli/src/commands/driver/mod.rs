@@ -15,7 +15,7 @@ use std::thread;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
-use driver_franka::{About, RunOptions};
+use driver_franka::{About, EndSpeeds, RunOptions};
 use driver_sim::{DriverError, DriverReport};
 use ipc::IpcError;
 use planner::robot::Robot;
@@ -104,6 +104,12 @@ fn about(robot: &Robot) -> About {
         velocity: joints.velocity,
         acceleration: joints.acceleration,
         jerk: joints.jerk,
+        end_speeds: joints.ends.map(|ends| EndSpeeds {
+            lower: ends.lower,
+            upper: ends.upper,
+            deceleration: ends.deceleration,
+            offset: ends.offset,
+        }),
         ..About::default()
     }
 }

@@ -56,6 +56,10 @@ impl<const N: usize> Worker<'_, N> {
                 joint: joint + 1,
                 error,
             }),
+            Event::NotSettled { joint, error, .. } => self.say(Note::NotSettled {
+                joint: joint + 1,
+                error,
+            }),
             Event::Spliced { by, accepted, .. } => self.spliced = Some((by, accepted)),
             Event::SpeedAsked { share, .. } => self.say(Note::SpeedAsked { share }),
             Event::Stopped { .. } => self.say(Note::Stopped),

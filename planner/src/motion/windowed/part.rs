@@ -69,19 +69,10 @@ pub(super) fn lowered<const N: usize>(
     tool: &ToolLimits,
     share: f64,
 ) -> (JointLimits<N>, ToolLimits) {
-    let mut joints = *joints;
-    joints.velocity *= share;
-    joints.acceleration *= share;
-    joints.jerk *= share;
-    let tool = ToolLimits {
-        speed: tool.speed * share,
-        acceleration: tool.acceleration * share,
-        jerk: tool.jerk * share,
-        angular_speed: tool.angular_speed * share,
-        angular_acceleration: tool.angular_acceleration * share,
-        angular_jerk: tool.angular_jerk * share,
-    };
-    (joints, tool)
+    (
+        joints.scaled(share, share, share),
+        tool.scaled(share, share),
+    )
 }
 
 /// How many pieces of a law may be executed before a longer one takes its place: behind them, the

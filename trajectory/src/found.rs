@@ -5,13 +5,13 @@ use std::ops::{Add, Mul, Range};
 use crate::poly::halve;
 
 /// Largest relative distance of a bound from a value that is reached.
-pub(super) const TOLERANCE: f64 = 1e-3;
+pub(crate) const TOLERANCE: f64 = 1e-3;
 /// A stretch is halved at most this often.
 const DEPTH: u32 = 12;
 
 /// The largest value found so far.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Found {
+pub(crate) struct Found {
     /// No value is higher.
     pub bound: f64,
     /// When (s) it is about attained.
@@ -24,12 +24,12 @@ pub(super) struct Found {
 
 impl Found {
     /// Whether a bound is near enough to a value that is reached.
-    pub(super) fn enough(&self, bound: f64) -> bool {
+    pub(crate) fn enough(&self, bound: f64) -> bool {
         bound <= (self.reached * (1.0 + TOLERANCE)).max(self.floor)
     }
 
     /// Adds a bound; NaN counts as the highest.
-    pub(super) fn raise(&mut self, bound: f64, time: f64) {
+    pub(crate) fn raise(&mut self, bound: f64, time: f64) {
         if bound > self.bound || bound.is_nan() {
             (self.bound, self.time) = (bound, time);
         }
@@ -37,7 +37,7 @@ impl Found {
 
     /// Adds a quantity over a range of time (s) in which it is within `error` of a polynomial in
     /// Bernstein form; its size is `norm` of the vector, which must be convex.
-    pub(super) fn take<T, const M: usize>(
+    pub(crate) fn take<T, const M: usize>(
         &mut self,
         control: &[T; M],
         when: Range<f64>,
