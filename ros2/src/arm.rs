@@ -78,10 +78,12 @@ impl ArmReader {
         })
     }
 
-    /// Whether the last setpoint moves.
-    pub(crate) fn moves(&self) -> bool {
+    /// Whether the last setpoint rests because the speed along the path is 0: a pause, a stop or an override of 0.
+    pub(crate) fn is_held(&self) -> bool {
         let setpoint = self.setpoint.as_ref();
-        setpoint.is_some_and(|setpoint| setpoint.flags & SetpointFlags::HOLD == 0)
+        setpoint.is_some_and(|setpoint| {
+            setpoint.flags & SetpointFlags::HOLD != 0 && setpoint.time_scaling == 0.0
+        })
     }
 
     /// Planned time since the start of the command (s).

@@ -77,8 +77,6 @@ pub(crate) struct Bridge {
     serial: u64,
     published: Instant,
     lost: bool,
-    /// A pause or stop has brought the arm to rest, and it has not moved since.
-    held: bool,
 }
 
 /// What a bridge does for its options.
@@ -110,7 +108,6 @@ impl Bridge {
             serial: 0,
             published: Instant::now(),
             lost: false,
-            held: false,
         }
     }
 
@@ -130,7 +127,6 @@ impl Bridge {
     /// Everything once.
     fn turn(&mut self) {
         self.arm.look();
-        self.held &= !self.arm.moves();
         self.read_goals();
         self.read_cancels();
         self.read_results();
@@ -170,7 +166,7 @@ impl Bridge {
 
     /// Why the arm takes nothing new now; nothing where it does.
     pub(crate) fn busy(&self) -> Option<&'static str> {
-        let why = if self.held {
+        let why = if self.arm.is_held() {
             "a pause or stop holds the arm in the middle of a motion; canter resume goes on with it"
         } else {
             "the arm is executing something else"
@@ -248,7 +244,6 @@ impl Bridge {
                 self.lost = false;
                 let (level, text) = words(&note);
                 self.ends.say(level, &text);
-                self.held |= note["event"] == "stopped";
                 let fate = Fate::of(&note);
                 self.program_fate(&fate);
                 self.goal_fate(fate);
