@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use planner::motion::Planner;
 use planner::robot::{Robot, load, vector};
 use planner::task::{Move, Shape};
-use trajectory::smooth::angular_tolerance;
+use trajectory::smooth::{RestCause, angular_tolerance};
 
 /// Numbers from -1 to 1, the same each time.
 ///
@@ -163,7 +163,7 @@ fn rests_are_named_in_the_certificate() {
     let (planner, home) = planner_at_home::<6>(&robot);
     let start = planner.chain().forward(&home);
     let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0) * start;
-    let rests = |tolerance: f64, poses: Vec<_>| -> Vec<Option<&'static str>> {
+    let rests = |tolerance: f64, poses: Vec<_>| -> Vec<Option<RestCause>> {
         let motion = Move {
             shape: Shape::Smooth,
             poses,
@@ -175,6 +175,6 @@ fn rests_are_named_in_the_certificate() {
         passes.map(|pass| pass.rests).collect()
     };
     let corner = || vec![at(0.05, 0.0), at(0.05, 0.05)];
-    assert_eq!(rests(0.0, corner()), [Some("exact stop")]);
+    assert_eq!(rests(0.0, corner()), [Some(RestCause::Stop)]);
     assert_eq!(rests(1e-3, corner()), [None]);
 }

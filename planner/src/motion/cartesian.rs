@@ -9,7 +9,8 @@ use trajectory::{
     smooth, time_path,
 };
 
-use super::{Blend, BlockedCause, Draft, MotionError, Planner};
+use super::draft::{Crossing, Draft};
+use super::{Blend, BlockedCause, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest distance of the tool between two solved points, m.
@@ -81,9 +82,9 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Result<Vec<Draft<N>>, MotionError> {
         let plan = &path.plan;
-        let crossings: Vec<f64> = plan.crossings().iter().map(|pass| pass.time).collect();
+        let crossings = Crossing::of(plan);
         if path.still || plan.duration() <= 0.0 {
-            let at_once = vec![0.0; crossings.len()];
+            let at_once = Crossing::at(&crossings, |_| 0.0);
             return Ok(vec![passing(Trajectory::new(Vec::new()), at_once)]);
         }
         let towards = |u: f64| {
@@ -123,7 +124,7 @@ impl<const N: usize> Planner<N> {
         &self,
         plan: &smooth::SmoothPlan,
         points: &[FollowPoint<N>],
-        (crossings, motion): (&[f64], &Move),
+        (crossings, motion): (&[Crossing], &Move),
     ) -> Result<Draft<N>, MotionError> {
         let direct = Trajectory::new(pieces(points));
         let free = direct.duration();
@@ -195,11 +196,11 @@ impl<const N: usize> Planner<N> {
     }
 
     /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
-    /// `crossings` are the times at which the smooth motion passes its poses (s).
+    /// `crossings` are those of the smooth motion.
     fn retimed(
         &self,
         path: &HermitePath<N, &dyn ToolCurve>,
-        crossings: &[f64],
+        crossings: &[Crossing],
         motion: &Move,
     ) -> Result<Draft<N>, MotionError> {
         let options = TimingOptions {
@@ -209,7 +210,7 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let timed = time_path(path, &self.limits, &motion.limits, &options)?;
-        let times = crossings.iter().map(|u| moment(&timed.law, *u)).collect();
+        let times = Crossing::at(crossings, |u| moment(&timed.law, u));
         Ok(self.slowed(passing(timed.trajectory, times), motion))
     }
 
@@ -344,8 +345,8 @@ impl SmoothPath {
     }
 }
 
-/// A draft that passes its poses at these times (s).
-fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<f64>) -> Draft<N> {
+/// A draft that passes its poses so.
+fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<Crossing>) -> Draft<N> {
     Draft {
         crossings,
         ..Draft::of(trajectory)

@@ -4,13 +4,14 @@ use std::ops::Range;
 
 use kinematics::Chain;
 use nalgebra::{Isometry3, SVector};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use trajectory::bounds::{JointsToTool, Leg};
-use trajectory::smooth::{Rest, angular_tolerance};
+use trajectory::smooth::{RestCause, angular_tolerance};
 use trajectory::timing::Limit;
 use trajectory::{JointPoint, MotionBounds, ToolPoint, Trajectory};
 
 use super::active::ActiveLimit;
+use super::draft::Crossing;
 use super::{Draft, Fault};
 use crate::task::{Move, Shape};
 
@@ -30,8 +31,23 @@ pub struct CrossingReport {
     /// Time of the pass after the start of the move, s.
     pub time_s: f64,
     /// Why the motion rests at the pose, if it does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rests: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "in_words")]
+    pub rests: Option<RestCause>,
+}
+
+impl CrossingReport {
+    /// The same pass before it was looked at.
+    pub(super) fn crossing(&self) -> Crossing {
+        Crossing {
+            time: self.time_s,
+            rests: self.rests,
+        }
+    }
+}
+
+/// Writes a cause as its words.
+fn in_words<S: Serializer>(cause: &Option<RestCause>, serializer: S) -> Result<S::Ok, S::Error> {
+    cause.map(RestCause::as_str).serialize(serializer)
 }
 
 /// Peak of each limited quantity, divided by its limit: bounds for all times, at most one percent
@@ -145,22 +161,6 @@ pub struct MoveCertificate {
     pub joint_margin: f64,
 }
 
-impl MoveCertificate {
-    /// Says at which poses the motion rests, and why.
-    pub(super) fn name_rests(&mut self, rests: &[Rest]) {
-        for rest in rests {
-            // The start of the list is pose 0.
-            let pass = rest
-                .pose
-                .checked_sub(1)
-                .and_then(|at| self.poses.get_mut(at));
-            if let Some(pass) = pass {
-                pass.rests = Some(rest.cause.as_str());
-            }
-        }
-    }
-}
-
 /// The kinematics of an arm, for bounds of its tool's motion.
 pub(super) struct Arm<'a, const N: usize>(pub &'a Chain<N>);
 
@@ -252,23 +252,23 @@ fn crossings<const N: usize>(
     motion: &Move,
     chain: &Chain<N>,
     trajectory: &Trajectory<N>,
-    times: &[f64],
+    passes: &[Crossing],
 ) -> (Vec<CrossingReport>, bool) {
     let intermediate = &motion.poses[..motion.poses.len() - 1];
     let angular_tolerance_rad = angular_tolerance(motion.tolerance);
-    let (mut since, mut in_order) = (0.0, times.len() == intermediate.len());
+    let (mut since, mut in_order) = (0.0, passes.len() == intermediate.len());
     let mut reports = Vec::with_capacity(intermediate.len());
-    for (index, (pose, time)) in intermediate.iter().zip(times).enumerate() {
+    for (index, (pose, planned)) in intermediate.iter().zip(passes).enumerate() {
         let seen = |t: f64| {
             let gap = pose.inv_mul(&chain.forward(&trajectory.sample(t).position));
             (gap.translation.vector.norm(), gap.rotation.angle())
         };
-        let mut time_s = time.clamp(since, trajectory.duration().max(since));
+        let mut time_s = planned.time.clamp(since, trajectory.duration().max(since));
         let (mut deviation_m, mut angle_rad) = seen(time_s);
         if deviation_m > motion.tolerance {
-            let after = times
+            let after = passes
                 .get(index + 1)
-                .map_or(trajectory.duration(), |next| *next);
+                .map_or(trajectory.duration(), |next| next.time);
             let window = since.max(time_s - NEAR)..(time_s + NEAR).min(after.max(time_s));
             let (closest_s, least) = closest(window, |t| seen(t).0);
             if least < deviation_m {
@@ -283,7 +283,7 @@ fn crossings<const N: usize>(
             angle_rad,
             angular_tolerance_rad,
             time_s,
-            rests: None,
+            rests: planned.rests,
         };
         in_order &= holds(&pass, since);
         reports.push(pass);

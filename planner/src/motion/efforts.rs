@@ -174,12 +174,7 @@ impl<const N: usize> Planner<N> {
         if stretch.is_nan() || stretch <= 1.0 {
             return (draft, bounds);
         }
-        let slow = Draft {
-            trajectory: draft.trajectory.stretched(stretch),
-            crossings: draft.crossings.iter().map(|time| time * stretch).collect(),
-            ..draft
-        };
-        (slow, bounds.stretched(stretch))
+        (draft.stretched(stretch), bounds.stretched(stretch))
     }
 
     /// The efforts of a motion over their limits; nothing without limits.
@@ -247,17 +242,12 @@ impl<const N: usize> Planner<N> {
     ) -> Result<PlannedMove<N>, MotionError> {
         let poses = planned.certificate.poses.iter();
         let draft = Draft {
-            crossings: poses.map(|pass| pass.time_s).collect(),
+            crossings: poses.map(|pass| pass.crossing()).collect(),
             ..Draft::of(planned.trajectory)
         };
-        let mut certified = self.certify(motion, start, draft)?;
-        let passes = certified.certificate.poses.iter_mut();
-        for (pass, before) in passes.zip(&planned.certificate.poses) {
-            pass.rests = before.rests;
-        }
         Ok(PlannedMove {
             blend: planned.blend,
-            ..certified
+            ..self.certify(motion, start, draft)?
         })
     }
 }

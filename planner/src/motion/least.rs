@@ -65,7 +65,7 @@ impl<const N: usize> Planner<N> {
     ) -> f64 {
         let options = SmoothOptions::new(0.0, motion.limits);
         let stops = draft.crossings.iter();
-        let stops = stops.map(|time| draft.trajectory.sample(*time).position);
+        let stops = stops.map(|pass| draft.trajectory.sample(pass.time).position);
         let (mut from, mut pose, mut sum) = (*start, self.chain().forward(start), 0.0);
         for (to, next) in stops.chain([*end]).zip(&motion.poses) {
             let tool = smooth::least_time(&[pose, *next], &options).unwrap_or(0.0);

@@ -6,7 +6,7 @@ use trajectory::{Boundary, MotionBounds, PacedPath, TimingOptions, Trajectory, s
 
 use super::cartesian::{Way, is_still, joint_path, moment};
 use super::certificate::Arm;
-use super::draft::Draft;
+use super::draft::{Crossing, Draft};
 use super::{Blend, MotionError, PlannedMove, Planner};
 use crate::task::LegsMove;
 
@@ -87,22 +87,21 @@ impl<const N: usize> Planner<N> {
         };
         let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
         let draft = Draft {
-            crossings: at.iter().map(|u| moment(&timed.law, *u)).collect(),
+            crossings: Crossing::at(&Crossing::of(&plan), |u| moment(&timed.law, u)),
             ..Draft::of(timed.trajectory)
         };
         let draft = self.within_legs(self.slowed(draft, motion), legs);
-        let mut planned = self.certify(motion, start, draft)?;
-        planned.certificate.name_rests(plan.rests());
         Ok(PlannedMove {
             blend: Some(blend),
-            ..planned
+            ..self.certify(motion, start, draft)?
         })
     }
 
     /// Slows a motion down, uniformly and by as little as needed, until the limits of every leg hold
     /// at all times.
     fn within_legs(&self, draft: Draft<N>, legs: &LegsMove) -> Draft<N> {
-        let ends = draft.crossings.iter().copied().chain([f64::INFINITY]);
+        let ends = draft.crossings.iter().map(|pass| pass.time);
+        let ends = ends.chain([f64::INFINITY]);
         let mut start = 0.0;
         let mut slower = 1.0_f64;
         for (end, limits) in ends.zip(&legs.limits) {
@@ -130,10 +129,8 @@ impl<const N: usize> Planner<N> {
         }
         let slower = slower * (1.0 + 1e-9);
         Draft {
-            trajectory: draft.trajectory.stretched(slower),
-            crossings: draft.crossings.iter().map(|time| time * slower).collect(),
             bounds: None,
-            ..draft
+            ..draft.stretched(slower)
         }
     }
 }

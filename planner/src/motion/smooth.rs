@@ -5,7 +5,7 @@ use trajectory::smooth::{RestCause, SmoothOptions, least_time};
 use trajectory::{Line, Trajectory};
 
 use super::cartesian::{SmoothPath, Way, is_still};
-use super::draft::Draft;
+use super::draft::{Crossing, Draft};
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
 use crate::task::{Move, Shape};
 
@@ -185,12 +185,10 @@ impl<const N: usize> Planner<N> {
                     break;
                 }
             }
-            let mut planned = planned?;
-            planned.certificate.name_rests(path.plan.rests());
             Ok(Along {
                 planned: PlannedMove {
                     blend: Some(path.blend(curve.tolerance)),
-                    ..planned
+                    ..planned?
                 },
                 tool: path.plan.duration(),
                 spans: path.plan.spans(),
@@ -223,17 +221,16 @@ impl<const N: usize> Planner<N> {
                 joints = last.sample(last.duration).position;
                 pieces.extend_from_slice(leg.pieces());
             }
-            crossings.push(time);
+            crossings.push(Crossing {
+                time,
+                rests: Some(RestCause::Stop),
+            });
         }
         crossings.pop();
         let draft = Draft {
             crossings,
             ..Draft::of(Trajectory::new(pieces))
         };
-        let mut planned = self.certify(motion, start, draft)?;
-        for pass in &mut planned.certificate.poses {
-            pass.rests = Some(RestCause::Stop.as_str());
-        }
-        Ok(planned)
+        self.certify(motion, start, draft)
     }
 }

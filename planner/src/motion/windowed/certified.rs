@@ -4,6 +4,7 @@ use trajectory::timing::Timed;
 use trajectory::{Boundary, MotionBounds, TimingOptions, Trajectory, time_path};
 
 use super::super::cartesian::moment;
+use super::super::draft::Crossing;
 use super::super::{
     Draft, Fault, MotionError, MoveCertificate, Planner, ROUNDING, certificate, check,
 };
@@ -168,9 +169,12 @@ impl<const N: usize> Planner<N> {
         let passes = windowed.path.tool().passes();
         let ahead = &passes[windowed.passed..];
         let count = ahead.partition_point(|u| *u <= at);
-        let times = |range: &[f64], since: f64| -> Vec<f64> {
-            let time = |u: &f64| moment(&divided.law, u - divided.from) - since;
-            range.iter().map(time).collect()
+        let times = |range: &[f64], since: f64| -> Vec<Crossing> {
+            let pass = |u: &f64| Crossing {
+                time: moment(&divided.law, u - divided.from) - since,
+                rests: None,
+            };
+            range.iter().map(pass).collect()
         };
         let draft = Draft {
             crossings: times(&ahead[..count], 0.0),
