@@ -92,8 +92,8 @@ fn random_lists_are_certified() {
 /// Lists that were slow or rested on their way, with the time that they may take (s): a list that is
 /// not quite dense, whose windows of splines do not join, is fitted all the same; one whose tolerance
 /// shows every corner is planned as a spline, too; one that turns back need not rest there; sharp corners
-/// between sparse and dense parts are passed in motion; and a spline far above the bound is compared with a
-/// fitted curve.
+/// between sparse and dense parts are passed in motion; a spline far above the bound is compared with a
+/// fitted curve; and a fit that turns fast is not slowed down for a bound that is too wide.
 #[test]
 fn the_way_of_planning_suits_the_list() {
     for (seed, most) in [
@@ -104,6 +104,8 @@ fn the_way_of_planning_suits_the_list() {
         (201, 1.6),
         (37, 1.87),
         (92, 1.95),
+        (123, 1.85),
+        (99, 2.25),
     ] {
         let (poses, tolerance) = lists::random(seed, 400.0);
         let plan = plan(
