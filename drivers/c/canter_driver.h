@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #define CANTER_PROTOCOL 2u
-#define CANTER_SCHEMA_CHECKSUM UINT64_C(0x21293f96d30c668c)
+#define CANTER_SCHEMA_CHECKSUM UINT64_C(0x5ea685e67ca2cb2c)
 #define CANTER_MAX_JOINTS 16u
 #define CANTER_MAX_TOOLS 2u
 #define CANTER_MAX_SENSORS 16u
@@ -113,28 +113,28 @@ typedef struct {
     uint64_t tick;
     uint64_t published_ns;
     uint64_t tick_ns;
+    uint64_t state_sequence;
     uint64_t period_ns;
     uint64_t watchdog_ns;
-    uint64_t state_sequence;
     uint32_t command;
     uint32_t flags;
     uint32_t valid;
     uint32_t revision;
     double path_time;
     double time_scaling;
+    uint64_t digital_outputs;
+    uint64_t digital_mask;
+    uint64_t analogue_mask;
     double position[16];
     double velocity[16];
     double acceleration[16];
     double effort[16];
     canter_tool_command tools[2];
-    uint64_t digital_outputs;
-    uint64_t digital_mask;
     double analogue_outputs[8];
-    uint64_t analogue_mask;
     canter_payload payload;
-    uint64_t reserved[8];
+    uint64_t reserved[4];
 } canter_setpoint;
-_Static_assert(sizeof(canter_setpoint) == 992, "canter_setpoint");
+_Static_assert(sizeof(canter_setpoint) == 960, "canter_setpoint");
 
 #define CANTER_STATE_TYPE "canter.State.2"
 typedef struct {
@@ -152,22 +152,23 @@ typedef struct {
     uint32_t fault_joint;
     uint32_t fault_code;
     uint64_t missed;
+    uint32_t flags;
+    uint32_t sensor_count;
+    double speed_scaling;
+    uint64_t hardware_ns;
+    uint64_t digital_inputs;
+    uint64_t revision;
     double position[16];
     double velocity[16];
     double effort[16];
     double commanded[16];
     canter_tool_feedback tools[2];
-    uint64_t digital_inputs;
     double analogue_inputs[8];
-    uint64_t hardware_ns;
-    double speed_scaling;
-    uint32_t flags;
-    uint32_t sensor_count;
     canter_sensor sensors[16];
     uint8_t text[96];
-    uint64_t reserved[8];
+    uint64_t reserved[4];
 } canter_state;
-_Static_assert(sizeof(canter_state) == 1432, "canter_state");
+_Static_assert(sizeof(canter_state) == 1408, "canter_state");
 
 #define CANTER_HELLO_TYPE "canter.Hello.2"
 typedef struct {

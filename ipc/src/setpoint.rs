@@ -26,7 +26,8 @@ impl SetpointFlags {
 /// The wanted state of the joints at one time. The engine sends it once per period.
 ///
 /// Arrays hold [`MAX_JOINTS`] numbers; the first `joints` are used, the rest has no meaning. Times are
-/// nanoseconds of `CLOCK_MONOTONIC`.
+/// nanoseconds of `CLOCK_MONOTONIC`. What changes in each period is in the first two lines of 64 bytes,
+/// and in lists that begin a line: the numbers of up to 8 joints are in one.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("canter.Setpoint.2")]
@@ -46,25 +47,31 @@ pub struct Setpoint {
     /// The time of the setpoint (ns): when the arm shall be there, by the engine's plan. It is when
     /// the period began in which it was made; the driver runs 0.4 periods later.
     pub tick_ns: u64,
+    /// Sequence of the last state that the engine received.
+    pub state_sequence: u64,
     /// Length of a period (ns).
     pub period_ns: u64,
     /// After this time without setpoints the driver stops by itself and latches (ns).
     pub watchdog_ns: u64,
-    /// Sequence of the last state that the engine received.
-    pub state_sequence: u64,
     /// Index of the current canonical command.
     pub command: u32,
     /// Bits of [`SetpointFlags`].
     pub flags: u32,
     /// One bit for each joint whose numbers are valid.
     pub valid: u32,
-    /// Counts the changes of what follows the efforts: tools, outputs, payload. In a session, setpoints
+    /// Counts the changes of tools, outputs and payload. In a session, setpoints
     /// of the same revision are equal there; 0 where the sender does not count.
     pub revision: u32,
     /// Planned time since the command's start (s).
     pub path_time: f64,
     /// Speed along the path as a fraction of the planned speed, 0..=1.
     pub time_scaling: f64,
+    /// Digital outputs, one bit each.
+    pub digital_outputs: u64,
+    /// Which digital outputs the engine sets; the others stay as they are.
+    pub digital_mask: u64,
+    /// Which analogue outputs the engine sets, one bit each; the others stay as they are.
+    pub analogue_mask: u64,
     /// Joint positions (rad, m).
     pub position: [f64; MAX_JOINTS],
     /// Joint velocities (rad/s, m/s).
@@ -75,18 +82,12 @@ pub struct Setpoint {
     pub effort: [f64; MAX_JOINTS],
     /// Orders to gripper and tool changer.
     pub tools: [ToolCommand; MAX_TOOLS],
-    /// Digital outputs, one bit each.
-    pub digital_outputs: u64,
-    /// Which digital outputs the engine sets; the others stay as they are.
-    pub digital_mask: u64,
     /// Analogue outputs, in the unit of the arm (V, A).
     pub analogue_outputs: [f64; MAX_ANALOGUE],
-    /// Which analogue outputs the engine sets, one bit each; the others stay as they are.
-    pub analogue_mask: u64,
     /// What the arm carries.
     pub payload: Payload,
     /// For later; 0.
-    pub reserved: [u64; 8],
+    pub reserved: [u64; 4],
 }
 
 impl Default for Setpoint {
@@ -99,26 +100,26 @@ impl Default for Setpoint {
             tick: 0,
             published_ns: 0,
             tick_ns: 0,
+            state_sequence: 0,
             period_ns: 0,
             watchdog_ns: 0,
-            state_sequence: 0,
             command: 0,
             flags: 0,
             valid: 0,
             revision: 0,
             path_time: 0.0,
             time_scaling: 0.0,
+            digital_outputs: 0,
+            digital_mask: 0,
+            analogue_mask: 0,
             position: [0.0; MAX_JOINTS],
             velocity: [0.0; MAX_JOINTS],
             acceleration: [0.0; MAX_JOINTS],
             effort: [0.0; MAX_JOINTS],
             tools: [ToolCommand::default(); MAX_TOOLS],
-            digital_outputs: 0,
-            digital_mask: 0,
             analogue_outputs: [0.0; MAX_ANALOGUE],
-            analogue_mask: 0,
             payload: Payload::default(),
-            reserved: [0; 8],
+            reserved: [0; 4],
         }
     }
 }
@@ -197,7 +198,9 @@ pub(crate) fn check_range(
     Ok(())
 }
 
-/// Whether the first `count` values are finite.
+/// Whether the first `count` values are finite. Compiled once: in a period each line of code may come from another
+/// cache too.
+#[inline(never)]
 pub(crate) fn check_finite(
     quantity: &'static str,
     values: &[f64],

@@ -130,6 +130,8 @@ impl StateFlags {
 }
 
 /// The measured state of the joints. The driver sends it once per period, also without a session.
+/// What changes in each period is in the first two lines of 64 bytes, and in lists that begin a line: the
+/// numbers of up to 8 joints are in one.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("canter.State.2")]
@@ -162,6 +164,19 @@ pub struct State {
     pub fault_code: u32,
     /// Periods without a new setpoint in this session.
     pub missed: u64,
+    /// Bits of [`StateFlags`].
+    pub flags: u32,
+    /// How many of `sensors` are used.
+    pub sensor_count: u32,
+    /// Share of the planned speed that the arm asks for, 0..=1; 1 without a wish.
+    pub speed_scaling: f64,
+    /// The hardware's own clock (ns); 0 if there is none.
+    pub hardware_ns: u64,
+    /// Digital inputs, one bit each.
+    pub digital_inputs: u64,
+    /// Counts the changes of tools and analogue inputs. In a session, states of the same revision are equal
+    /// there; 0 where the sender does not count.
+    pub revision: u64,
     /// Joint positions (rad, m).
     pub position: [f64; MAX_JOINTS],
     /// Joint velocities (rad/s, m/s).
@@ -172,24 +187,14 @@ pub struct State {
     pub commanded: [f64; MAX_JOINTS],
     /// Gripper and tool changer.
     pub tools: [ToolFeedback; MAX_TOOLS],
-    /// Digital inputs, one bit each.
-    pub digital_inputs: u64,
     /// Analogue inputs, in the unit of the arm (V, A).
     pub analogue_inputs: [f64; MAX_ANALOGUE],
-    /// The hardware's own clock (ns); 0 if there is none.
-    pub hardware_ns: u64,
-    /// Share of the planned speed that the arm asks for, 0..=1; 1 without a wish.
-    pub speed_scaling: f64,
-    /// Bits of [`StateFlags`].
-    pub flags: u32,
-    /// How many of `sensors` are used.
-    pub sensor_count: u32,
     /// Named values of sensors.
     pub sensors: [Sensor; MAX_SENSORS],
     /// What the fault is, as the arm's maker says it; UTF-8, filled up with 0.
     pub text: [u8; 96],
     /// For later; 0.
-    pub reserved: [u64; 8],
+    pub reserved: [u64; 4],
 }
 
 impl Default for State {
@@ -209,20 +214,21 @@ impl Default for State {
             fault_joint: u32::MAX,
             fault_code: 0,
             missed: 0,
+            flags: 0,
+            sensor_count: 0,
+            speed_scaling: 1.0,
+            hardware_ns: 0,
+            digital_inputs: 0,
+            revision: 0,
             position: [0.0; MAX_JOINTS],
             velocity: [0.0; MAX_JOINTS],
             effort: [0.0; MAX_JOINTS],
             commanded: [0.0; MAX_JOINTS],
             tools: [ToolFeedback::default(); MAX_TOOLS],
-            digital_inputs: 0,
             analogue_inputs: [0.0; MAX_ANALOGUE],
-            hardware_ns: 0,
-            speed_scaling: 1.0,
-            flags: 0,
-            sensor_count: 0,
             sensors: [Sensor::default(); MAX_SENSORS],
             text: [0; 96],
-            reserved: [0; 8],
+            reserved: [0; 4],
         }
     }
 }
@@ -285,7 +291,15 @@ impl State {
 
     /// What the fault is, as the arm's maker says it; empty when the driver says nothing.
     pub fn fault_text(&self) -> String {
-        text_of(&self.text)
+        text_of(&self.fault_bytes())
+    }
+
+    /// The bytes of [`Self::fault_text`]: without a fault there may be an old text in the message.
+    pub fn fault_bytes(&self) -> [u8; 96] {
+        match self.fault {
+            0 => [0; 96],
+            _ => self.text,
+        }
     }
 
     /// The driver state; [`DriverState::Fault`] if the number is unknown.

@@ -6,7 +6,7 @@ use ipc::{Hello, HelloAck, Payload, Sensor, Setpoint, State, ToolCommand, ToolFe
 
 #[test]
 fn setpoint() {
-    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (992, 8));
+    assert_eq!((size_of::<Setpoint>(), align_of::<Setpoint>()), (960, 8));
     let offsets = [
         (offset_of!(Setpoint, protocol), 0),
         (offset_of!(Setpoint, joints), 4),
@@ -15,23 +15,26 @@ fn setpoint() {
         (offset_of!(Setpoint, tick), 24),
         (offset_of!(Setpoint, published_ns), 32),
         (offset_of!(Setpoint, tick_ns), 40),
-        (offset_of!(Setpoint, period_ns), 48),
-        (offset_of!(Setpoint, watchdog_ns), 56),
-        (offset_of!(Setpoint, state_sequence), 64),
+        (offset_of!(Setpoint, state_sequence), 48),
+        (offset_of!(Setpoint, period_ns), 56),
+        (offset_of!(Setpoint, watchdog_ns), 64),
         (offset_of!(Setpoint, command), 72),
         (offset_of!(Setpoint, flags), 76),
         (offset_of!(Setpoint, valid), 80),
+        (offset_of!(Setpoint, revision), 84),
         (offset_of!(Setpoint, path_time), 88),
         (offset_of!(Setpoint, time_scaling), 96),
-        (offset_of!(Setpoint, position), 104),
-        (offset_of!(Setpoint, velocity), 232),
-        (offset_of!(Setpoint, acceleration), 360),
-        (offset_of!(Setpoint, effort), 488),
-        (offset_of!(Setpoint, tools), 616),
-        (offset_of!(Setpoint, digital_outputs), 696),
-        (offset_of!(Setpoint, digital_mask), 704),
-        (offset_of!(Setpoint, analogue_outputs), 712),
+        (offset_of!(Setpoint, digital_outputs), 104),
+        (offset_of!(Setpoint, digital_mask), 112),
+        (offset_of!(Setpoint, analogue_mask), 120),
+        (offset_of!(Setpoint, position), 128),
+        (offset_of!(Setpoint, velocity), 256),
+        (offset_of!(Setpoint, acceleration), 384),
+        (offset_of!(Setpoint, effort), 512),
+        (offset_of!(Setpoint, tools), 640),
+        (offset_of!(Setpoint, analogue_outputs), 720),
         (offset_of!(Setpoint, payload), 784),
+        (offset_of!(Setpoint, reserved), 928),
     ];
     for (found, promised) in offsets {
         assert_eq!(found, promised);
@@ -40,8 +43,10 @@ fn setpoint() {
 
 #[test]
 fn state() {
-    assert_eq!((size_of::<State>(), align_of::<State>()), (1432, 8));
+    assert_eq!((size_of::<State>(), align_of::<State>()), (1408, 8));
     let offsets = [
+        (offset_of!(State, protocol), 0),
+        (offset_of!(State, joints), 4),
         (offset_of!(State, session), 8),
         (offset_of!(State, sequence), 16),
         (offset_of!(State, measured_ns), 24),
@@ -52,24 +57,43 @@ fn state() {
         (offset_of!(State, driver_state), 64),
         (offset_of!(State, fault), 68),
         (offset_of!(State, fault_joint), 72),
-        (offset_of!(State, missed), 80),
-        (offset_of!(State, position), 88),
-        (offset_of!(State, velocity), 216),
-        (offset_of!(State, effort), 344),
         (offset_of!(State, fault_code), 76),
-        (offset_of!(State, commanded), 472),
-        (offset_of!(State, tools), 600),
-        (offset_of!(State, digital_inputs), 664),
-        (offset_of!(State, analogue_inputs), 672),
-        (offset_of!(State, hardware_ns), 736),
-        (offset_of!(State, speed_scaling), 744),
-        (offset_of!(State, flags), 752),
-        (offset_of!(State, sensors), 760),
-        (offset_of!(State, text), 1272),
+        (offset_of!(State, missed), 80),
+        (offset_of!(State, flags), 88),
+        (offset_of!(State, sensor_count), 92),
+        (offset_of!(State, speed_scaling), 96),
+        (offset_of!(State, hardware_ns), 104),
+        (offset_of!(State, digital_inputs), 112),
+        (offset_of!(State, revision), 120),
+        (offset_of!(State, position), 128),
+        (offset_of!(State, velocity), 256),
+        (offset_of!(State, effort), 384),
+        (offset_of!(State, commanded), 512),
+        (offset_of!(State, tools), 640),
+        (offset_of!(State, analogue_inputs), 704),
+        (offset_of!(State, sensors), 768),
+        (offset_of!(State, text), 1280),
+        (offset_of!(State, reserved), 1376),
     ];
     for (found, promised) in offsets {
         assert_eq!(found, promised);
     }
+}
+
+/// What a period writes and reads of an arm of up to 8 joints: the first two lines of 64 bytes, and one for each list.
+#[test]
+fn lists_begin_a_line() {
+    let lists = [
+        offset_of!(Setpoint, position),
+        offset_of!(Setpoint, velocity),
+        offset_of!(Setpoint, acceleration),
+        offset_of!(Setpoint, effort),
+        offset_of!(State, position),
+        offset_of!(State, velocity),
+        offset_of!(State, effort),
+        offset_of!(State, commanded),
+    ];
+    assert!(lists.iter().all(|offset| offset % 64 == 0), "{lists:?}");
 }
 
 #[test]

@@ -97,9 +97,11 @@ fn state_in_use(of: &State) -> State {
 fn next_state(last: &State, random: &mut Random) -> State {
     let mut next = *last;
     next.sequence += 1;
-    if random.below(50) == 0 {
+    let begins = random.below(50) == 0;
+    if begins {
         next.joints = 5 + random.below(3) as u32;
         next.session += 1;
+        next.revision = random.below(2);
     }
     next.measured_ns = random.below(99);
     (next.published_ns, next.setpoint_sequence) = (random.below(99), random.below(99));
@@ -114,9 +116,10 @@ fn next_state(last: &State, random: &mut Random) -> State {
         next.effort[joint] = random.number();
         next.commanded[joint] = random.number();
     }
-    if random.below(10) == 0 {
+    if begins || next.revision == 0 || random.below(10) == 0 {
         next.tools[1].position = random.number();
         next.analogue_inputs[3] = random.number();
+        next.revision += u64::from(!begins && next.revision != 0);
     }
     next.sensor_count = random.below(4) as u32;
     for sensor in next.sensors.iter_mut().take(3) {
@@ -146,6 +149,7 @@ fn what_has_a_meaning_arrives() {
     };
     let mut state = State {
         joints: 6,
+        revision: 1,
         ..State::default()
     };
     let (mut got_setpoint, mut got_state) = (Setpoint::default(), State::default());

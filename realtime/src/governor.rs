@@ -186,12 +186,13 @@ impl Governor {
     ) -> Bounds {
         let (mut bounds, share) = aim.category.bounds();
         if let Some(plan) = outlook.buffer.sample(outlook.at) {
-            let limits = outlook
-                .limits
+            let limits = outlook.limits;
+            let limits = limits
                 .acceleration
+                .as_slice()
                 .iter()
-                .zip(outlook.limits.jerk.iter());
-            for (speed, (acceleration, jerk)) in plan.velocity.iter().zip(limits) {
+                .zip(limits.jerk.as_slice());
+            for (speed, (acceleration, jerk)) in plan.velocity.as_slice().iter().zip(limits) {
                 let speed = libm::fabs(*speed).max(1e-9);
                 bounds.rate = bounds.rate.min(share * acceleration / speed);
                 bounds.change = bounds.change.min(share * jerk / speed);

@@ -163,6 +163,7 @@ impl Following {
     /// let moving = allowed.check(&wanted, &found, &vector![0.0, 1.0]);
     /// assert_eq!(moving, None);
     /// ```
+    #[inline(never)]
     pub fn check<const N: usize>(
         self,
         wanted: &SVector<f64, N>,

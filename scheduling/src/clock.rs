@@ -1,6 +1,7 @@
 //! The clock that times in messages use, and sleeping until a time of it.
 
 /// The time of `CLOCK_MONOTONIC` (ns). All times in messages use this clock. It never jumps.
+#[inline]
 pub fn now_ns() -> u64 {
     let mut time = libc::timespec {
         tv_sec: 0,
@@ -37,6 +38,7 @@ pub fn thread_time_ns() -> u64 {
 
 /// Sleeps until `deadline_ns` of `CLOCK_MONOTONIC`; returns at once if it has passed. A signal
 /// does not end the sleep.
+#[inline]
 pub fn sleep_until_ns(deadline_ns: u64) {
     let deadline = libc::timespec {
         tv_sec: (deadline_ns / 1_000_000_000).cast_signed(),

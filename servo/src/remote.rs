@@ -146,11 +146,6 @@ impl<const N: usize> Shared<N> {
         self.version
             .store(version.wrapping_add(1), Ordering::Relaxed);
         core::sync::atomic::fence(Ordering::Release);
-        let store = |to: &[AtomicU64; N], from: &SVector<f64, N>| {
-            for (to, from) in to.iter().zip(from.iter()) {
-                to.store(from.to_bits(), Ordering::Relaxed);
-            }
-        };
         store(&self.position, &now.position);
         store(&self.velocity, &now.velocity);
         store(&self.setpoint, &now.setpoint);
@@ -210,6 +205,14 @@ impl<const N: usize> Shared<N> {
             }
             std::thread::yield_now();
         }
+    }
+}
+
+/// Stores the numbers of the joints. Compiled once: in a period each line of code may come from another cache.
+#[inline(never)]
+fn store<const N: usize>(to: &[AtomicU64; N], from: &SVector<f64, N>) {
+    for (to, from) in to.iter().zip(from.as_slice()) {
+        to.store(from.to_bits(), Ordering::Relaxed);
     }
 }
 

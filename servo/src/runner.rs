@@ -12,7 +12,7 @@ use core::sync::atomic::Ordering;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use ipc::{HelloAck, MAX_TOOLS, Payload, Setpoint, State, ToolCommand};
+use ipc::{HelloAck, Payload, Setpoint, State};
 use nalgebra::SVector;
 use realtime::{Cycle, Demand, Pushed, Sample, Step, StopCategory};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -115,7 +115,6 @@ pub struct Runner<const N: usize> {
     /// A command that came too late to take the place of another: its segments are dropped.
     refused: Option<u32>,
     orders: u32,
-    tools: [ToolCommand; MAX_TOOLS],
     /// What the arm carries, with its number in this session; number 0 where it is not known.
     payload: Payload,
     published: Sample<N>,
@@ -163,7 +162,6 @@ impl<const N: usize> Runner<N> {
             dropping: None,
             refused: None,
             orders: 0,
-            tools: [ToolCommand::default(); MAX_TOOLS],
             payload: Payload {
                 number: u32::from(config.payload.is_some()),
                 ..config.payload.unwrap_or_default()
@@ -194,6 +192,8 @@ impl<const N: usize> Runner<N> {
             position: ack.position,
             ..State::default()
         };
+        // Nothing of another driver, which counts its revisions anew.
+        *self.incoming = State::default();
         (self.quiet, self.blind) = (0, 0);
         self.ready = false;
         self.delay = (ack.delay_ns as f64 * 1e-9).min(LARGEST_DELAY);
@@ -204,7 +204,6 @@ impl<const N: usize> Runner<N> {
         self.tool = None;
         self.forget_guards();
         self.orders = 0;
-        self.tools = [ToolCommand::default(); MAX_TOOLS];
         // A session begins without any.
         self.payload.number = self.payload.number.min(1);
         self.begin_messages();
@@ -423,8 +422,11 @@ impl<const N: usize> Runner<N> {
         let made = self.cycle.step(self.demand());
         self.tell(&made, self.tick);
         self.published = made.setpoint;
-        let fading = self.speed * (1.0 - self.period / MEMORY);
-        self.speed = made.setpoint.velocity.abs().sup(&fading);
+        let fading = 1.0 - self.period / MEMORY;
+        let speeds = self.speed.as_mut_slice().iter_mut();
+        for (speed, now) in speeds.zip(made.setpoint.velocity.as_slice()) {
+            *speed = now.abs().max(*speed * fading);
+        }
         self.pending = self.samples.is_some().then_some(Recorded {
             tick: self.tick,
             command: made.command,

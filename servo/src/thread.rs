@@ -366,7 +366,7 @@ impl<const N: usize> Loop<'_, N> {
 /// Waits until a time: sleeps until a little earlier, by the usual wake-up delay, and waits
 /// actively for the rest.
 struct PeriodicTimer {
-    /// How much earlier (ns): the median of the wake-up delay.
+    /// How much earlier (ns): three of four wake-up delays are shorter.
     early: u64,
     /// The most of it (ns).
     most: u64,
@@ -376,8 +376,8 @@ impl PeriodicTimer {
     /// Divisor of the period: the longest active wait is this part of it.
     const AWAKE: u64 = 50;
 
-    /// Change of the estimated median (ns per period).
-    const STEP: u64 = 50;
+    /// Change of the estimate (ns per period) after a shorter delay; after a longer one three times that.
+    const STEP: u64 = 25;
 
     fn new(period: u64) -> Self {
         Self {
@@ -391,9 +391,9 @@ impl PeriodicTimer {
         let bed = begin.saturating_sub(self.early);
         sleep_until_ns(bed);
         let mut now = now_ns();
-        // Half of the delays are longer, half shorter: the median.
+        // It stands where three are shorter for each one that is longer.
         self.early = if now.saturating_sub(bed) > self.early {
-            (self.early + Self::STEP).min(self.most)
+            (self.early + 3 * Self::STEP).min(self.most)
         } else {
             self.early.saturating_sub(Self::STEP)
         };

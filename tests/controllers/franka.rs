@@ -288,12 +288,14 @@ pub(crate) fn fast_to_the_ends() {
     let mut reached = 0;
     for axis in if every { all } else { few } {
         let ran = canter(["jog", &axis, "--seconds", "3", "--arm", &arm]);
-        let refused = "joint_motion_generator_velocity_limits_violation";
-        assert!(
-            !controller.log().contains(refused),
-            "{axis}: {ran:?}\n{}",
-            controller.log()
-        );
+        // By the command, or by the motion of the arm.
+        let refusals = [
+            "joint_motion_generator_velocity_limits_violation",
+            "joint_velocity_violation",
+        ];
+        let log = controller.log();
+        let refused = refusals.iter().find(|name| log.contains(*name));
+        assert_eq!(refused, None, "{axis}: {ran:?}\n{log}");
         reached += usize::from(ran.code == 0);
         if ran.code != 0 {
             // A busy machine misses cycles: that ends a jog, and is not what this is about.

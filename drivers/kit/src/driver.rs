@@ -76,7 +76,9 @@ pub struct Driver<R> {
     pub(crate) outputs: Outputs,
     pub(crate) sensors: Sensors,
     pub(crate) last: Setpoint,
-    /// Setpoints that came since the last period.
+    /// Whether a setpoint came since the last period.
+    pub(crate) came: bool,
+    /// All that came since the last period, for a robot whose controller has a clock of its own.
     pub(crate) waiting: VecDeque<Setpoint>,
     pub(crate) received_ns: u64,
     /// When the newest setpoint was sent, by its own time stamp.
@@ -119,6 +121,7 @@ impl<R: Robot> Driver<R> {
             fault_text: [0; 96],
             lost: false,
             begun_ns: None,
+            came: false,
             waiting: VecDeque::with_capacity(WAITING),
             limiters: about.limiters(),
             state: DriverState::Disconnected,
@@ -255,7 +258,7 @@ impl<R: Robot> Driver<R> {
             return;
         }
         self.newest_ns = newest_ns;
-        self.last = *setpoint;
+        setpoint.write_over(&mut self.last);
         self.received_ns = now_ns;
         if setpoint.flags & SetpointFlags::STOP_REQUEST != 0 {
             self.stop(FaultCode::StopRequest, u32::MAX);
@@ -271,10 +274,13 @@ impl<R: Robot> Driver<R> {
             DriverState::Synced => DriverState::Armed,
             _ => DriverState::Active,
         };
-        if self.waiting.len() == WAITING {
-            self.waiting.pop_front();
+        self.came = true;
+        if self.about.own_clock {
+            if self.waiting.len() == WAITING {
+                self.waiting.pop_front();
+            }
+            self.waiting.push_back(*setpoint);
         }
-        self.waiting.push_back(*setpoint);
     }
 
     /// Answers a sign of life: in lock-step, a setpoint that repeats the last period. Nothing
@@ -389,7 +395,7 @@ impl<R: Robot> Driver<R> {
         let silence = now_ns.saturating_sub(self.newest_ns);
         match self.state {
             DriverState::Armed | DriverState::Active => {
-                if self.waiting.is_empty() {
+                if !self.came {
                     self.missed += 1;
                     self.missed_ever += 1;
                 }

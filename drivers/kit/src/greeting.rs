@@ -41,6 +41,7 @@ impl<R: Robot> Driver<R> {
         self.fault_text = [0; 96];
         self.lost = false;
         self.waiting.clear();
+        self.came = false;
         self.last = Setpoint::default();
         self.missed = 0;
         self.received_ns = now_ns;

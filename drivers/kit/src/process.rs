@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ipc::{Arm, Clock, DriverLink};
+use ipc::{Arm, Clock, DriverLink, Setpoint};
 use scheduling::{RealTimeRequest, Turns, now_ns, request_real_time, sleep_until_ns};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -103,6 +103,7 @@ pub fn run<R: Robot>(
         warning: locked.warning(),
         ..DriverReport::default()
     };
+    let mut incoming = Setpoint::default();
     // In lock-step the driver may spin, which a real-time thread must not do.
     let mut granted = None;
     while !stop.load(Ordering::Relaxed) {
@@ -121,18 +122,23 @@ pub fn run<R: Robot>(
                     granted = Some(given);
                 }
                 report.periods += 1;
-                wall_period(&link, &mut driver, &mut log);
+                wall_period(&link, &mut driver, &mut log, &mut incoming);
             }
         }
     }
-    report.braked = end(&link, &mut driver, &mut log);
+    report.braked = end(&link, &mut driver, &mut log, &mut incoming);
     report.missed = driver.missed_in_all();
     report.sessions = driver.sessions();
     Ok(report)
 }
 
 /// Brings the arm to rest and informs the engine; returns what was done if the arm moved.
-fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Option<String> {
+fn end<R: Robot>(
+    link: &DriverLink,
+    driver: &mut Driver<R>,
+    log: &mut Log,
+    incoming: &mut Setpoint,
+) -> Option<String> {
     let period = driver.period_ns().unwrap_or(IDLE_NS);
     let paced = driver.clock() == Some(Clock::LockStep);
     let told = driver.clock().is_some();
@@ -153,7 +159,7 @@ fn end<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) -> Op
                 thread::sleep(Duration::from_millis(1));
             }
         } else {
-            wall_period(link, driver, log);
+            wall_period(link, driver, log, incoming);
         }
     }
     driver.close();
@@ -173,8 +179,13 @@ fn answer_greeting<R: Robot>(link: &DriverLink, driver: &mut Driver<R>) {
     }
 }
 
-/// One period by the clock: 0.4 periods after the engine's.
-fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Log) {
+/// One period by the clock: 0.4 periods after the engine's. Setpoints are received in `incoming`.
+fn wall_period<R: Robot>(
+    link: &DriverLink,
+    driver: &mut Driver<R>,
+    log: &mut Log,
+    incoming: &mut Setpoint,
+) {
     let period = driver.period_ns().unwrap_or(IDLE_NS);
     let phase = match driver.last_setpoint().tick_ns {
         0 => 0,
@@ -187,13 +198,12 @@ fn wall_period<R: Robot>(link: &DriverLink, driver: &mut Driver<R>, log: &mut Lo
     if driver.clock() == Some(Clock::LockStep) {
         return;
     }
-    let mut setpoint = *driver.last_setpoint();
-    while link.take_setpoint(&mut setpoint) {
+    while link.take_setpoint(incoming) {
         // Read again each time: a process may be stopped anywhere, and the age of a setpoint
         // counts.
         let now = now_ns();
-        driver.receive(&setpoint, now);
-        log.write(&setpoint, driver, now);
+        driver.receive(incoming, now);
+        log.write(incoming, driver, now);
     }
     link.send(driver.step(now_ns(), period));
 }
@@ -243,7 +253,7 @@ fn wait_for_setpoint<R: Robot>(
     link: &DriverLink,
     driver: &mut Driver<R>,
     (turns, stop): (&mut Turns, &AtomicBool),
-) -> Option<ipc::Setpoint> {
+) -> Option<Setpoint> {
     let start = Instant::now();
     loop {
         if let Some(setpoint) = link.next_setpoint() {

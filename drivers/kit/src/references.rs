@@ -8,6 +8,14 @@ use crate::{Command, Driver, Outputs, Reference, Robot};
 /// Time in which a feed-forward effort fades where the engine sends none (s).
 const FADE: f64 = 0.02;
 
+/// The setpoint of a period.
+enum Heard<'a> {
+    Nothing,
+    /// The newest one.
+    Last,
+    One(&'a Setpoint),
+}
+
 impl<R: Robot> Driver<R> {
     /// The references of this period of `period_ns`, which ends at `now_ns`. A robot whose
     /// controller has a clock of its own gets one for each period since the last, any other robot
@@ -16,18 +24,19 @@ impl<R: Robot> Driver<R> {
         let wall = self.clock() != Some(Clock::LockStep);
         if !self.is_following() {
             self.waiting.clear();
+            self.came = false;
             return self.rest_or_stop(now_ns, period_ns, wall);
         }
+        let came = core::mem::take(&mut self.came);
         if self.about.own_clock && wall {
             return self.refer_each(now_ns, period_ns);
         }
-        let newest = self.waiting.pop_back();
         self.waiting.clear();
-        let label = newest.map(|setpoint| self.label(&setpoint, now_ns));
+        let label = came.then(|| self.label(&self.last, now_ns));
         let next = self.at_ns.saturating_add(period_ns);
         let at_ns = label.filter(|label| self.at_ns == 0 || *label > self.at_ns + period_ns / 2);
         self.at_ns = at_ns.unwrap_or(next);
-        self.approach(newest.as_ref(), period_ns);
+        self.approach(if came { Heard::Last } else { Heard::Nothing }, period_ns);
     }
 
     /// One reference for each period since the last one.
@@ -49,17 +58,17 @@ impl<R: Robot> Driver<R> {
             }
             for _ in 1..periods {
                 self.at_ns += period_ns;
-                self.approach(None, period_ns);
+                self.approach(Heard::Nothing, period_ns);
             }
             self.at_ns = label.max(self.at_ns + 1);
-            self.approach(Some(&setpoint), period_ns);
+            self.approach(Heard::One(&setpoint), period_ns);
             made = true;
         }
         if !made {
             let late = now_ns.saturating_sub(self.at_ns) / period_ns;
             for _ in 0..late.min(most) {
                 self.at_ns += period_ns;
-                self.approach(None, period_ns);
+                self.approach(Heard::Nothing, period_ns);
             }
         }
     }
@@ -92,8 +101,13 @@ impl<R: Robot> Driver<R> {
     }
 
     /// One period towards a setpoint, or towards the continuation of the last one.
-    fn approach(&mut self, setpoint: Option<&Setpoint>, period_ns: u64) {
+    fn approach(&mut self, heard: Heard<'_>, period_ns: u64) {
         let period = period_ns as f64 * 1e-9;
+        let setpoint = match heard {
+            Heard::Nothing => None,
+            Heard::Last => Some(&self.last),
+            Heard::One(setpoint) => Some(setpoint),
+        };
         let joints = self.references.iter_mut().zip(&mut self.targets);
         for (joint, (limiter, (reference, target))) in self.limiters.iter().zip(joints).enumerate()
         {

@@ -27,16 +27,30 @@ impl<R: Robot> Driver<R> {
         state.text = self.fault_text;
         state.missed = self.missed;
         state.speed_scaling = speed_scaling;
-        for (tool, feedback) in state.tools.iter_mut().enumerate() {
-            *feedback = self.robot.tool(tool);
+        self.report_tools();
+        self.report_joints(now_ns);
+    }
+
+    /// Tools, inputs and sensors, with a new revision where tools or analogue inputs have changed.
+    fn report_tools(&mut self) {
+        let state = &mut self.reported;
+        let mut changed = state.revision == 0;
+        for (tool, place) in state.tools.iter_mut().enumerate() {
+            let mut feedback = self.robot.tool(tool);
             feedback.order = self.orders[tool];
+            if *place != feedback {
+                (*place, changed) = (feedback, true);
+            }
         }
         let inputs = self.robot.inputs();
-        (state.digital_inputs, state.analogue_inputs) = (inputs.digital, inputs.analogue);
+        state.digital_inputs = inputs.digital;
+        if state.analogue_inputs != inputs.analogue {
+            (state.analogue_inputs, changed) = (inputs.analogue, true);
+        }
+        state.revision += u64::from(changed);
         self.sensors.clear();
         self.robot.sensors(&mut self.sensors);
         state.sensor_count = self.sensors.write(&mut state.sensors);
-        self.report_joints(now_ns);
     }
 
     /// How far what the robot follows is behind the setpoints, as the time that the last joint needs at its

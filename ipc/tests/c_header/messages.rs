@@ -158,10 +158,10 @@ fn setpoint() -> Message {
         Setpoint,
         "canter_setpoint",
         "canter.Setpoint.2",
-            protocol joints session sequence tick published_ns tick_ns period_ns watchdog_ns
-            state_sequence command flags valid revision path_time time_scaling position
-            velocity acceleration effort tools digital_outputs digital_mask analogue_outputs
-            analogue_mask payload reserved
+            protocol joints session sequence tick published_ns tick_ns state_sequence period_ns
+            watchdog_ns command flags valid revision path_time time_scaling digital_outputs
+            digital_mask analogue_mask position velocity acceleration effort tools
+            analogue_outputs payload reserved
     )
 }
 
@@ -172,8 +172,9 @@ fn state() -> Message {
         "canter.State.2",
             protocol joints session sequence measured_ns published_ns setpoint_sequence
             setpoint_published_ns setpoint_received_ns driver_state fault fault_joint
-            fault_code missed position velocity effort commanded tools digital_inputs
-            analogue_inputs hardware_ns speed_scaling flags sensor_count sensors text reserved
+            fault_code missed flags sensor_count speed_scaling hardware_ns digital_inputs
+            revision position velocity effort commanded tools analogue_inputs sensors text
+            reserved
     )
 }
 

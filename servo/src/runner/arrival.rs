@@ -60,6 +60,9 @@ impl<const N: usize> Runner<N> {
 
     /// Reports the commands at whose end the arm has arrived.
     pub(super) fn watch_arrival(&mut self) {
+        if self.awaited.is_empty() {
+            return;
+        }
         let measured = self.measured();
         for awaited in &mut self.awaited {
             if let Awaited::End { end, nearest, .. } = awaited {
@@ -119,7 +122,7 @@ pub(super) fn distance<const N: usize>(
     measured: &SVector<f64, N>,
     end: &SVector<f64, N>,
 ) -> (u32, f64) {
-    let joints = measured.iter().zip(end.iter()).enumerate();
+    let joints = measured.as_slice().iter().zip(end.as_slice()).enumerate();
     joints.fold((0, 0.0), |(worst, most), (joint, (at, end))| {
         let error = (at - end).abs();
         if error > most {

@@ -54,11 +54,16 @@ impl<const N: usize> Runner<N> {
             period_ns: self.config.period_ns(),
             watchdog_ns: self.config.watchdog.as_nanos() as u64,
             valid: (1_u32 << N) - 1,
-            tools: self.tools,
             payload: self.payload,
             revision: 1,
             ..Setpoint::default()
         };
+    }
+
+    /// Tools or payload of the message are others now.
+    pub(super) fn revise(&mut self) {
+        self.message.payload = self.payload;
+        self.message.revision = self.message.revision.wrapping_add(1).max(1);
     }
 
     /// Writes the message of the period over the last one.
@@ -81,10 +86,6 @@ impl<const N: usize> Runner<N> {
         };
         message.path_time = self.cycle.path_time();
         message.time_scaling = self.cycle.time_scaling();
-        if message.tools != self.tools || message.payload != self.payload {
-            (message.tools, message.payload) = (self.tools, self.payload);
-            message.revision = message.revision.wrapping_add(1).max(1);
-        }
         let published = &self.published;
         put(&mut message.position, &published.position);
         put(&mut message.velocity, &published.velocity);
@@ -108,7 +109,7 @@ pub(super) fn first<const N: usize>(all: &[f64; MAX_JOINTS]) -> SVector<f64, N> 
 
 /// Writes the numbers of the arm's joints into a message.
 fn put<const N: usize>(all: &mut [f64; MAX_JOINTS], joints: &SVector<f64, N>) {
-    for (to, from) in all.iter_mut().zip(joints.iter()) {
+    for (to, from) in all.iter_mut().zip(joints.as_slice()) {
         *to = *from;
     }
 }

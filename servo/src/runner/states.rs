@@ -59,7 +59,7 @@ impl<const N: usize> Runner<N> {
                     code: state.fault_code(),
                     joint,
                     number: state.fault_code,
-                    text: ShortText(state.text),
+                    text: ShortText(state.fault_bytes()),
                 };
                 self.latch(fault);
             }

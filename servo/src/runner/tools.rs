@@ -11,7 +11,7 @@ impl<const N: usize> Runner<N> {
     /// Sends a tool order; says whether it may begin now.
     pub(super) fn start_tool(&mut self, order: ToolOrder) -> bool {
         let moving = matches!(self.demand(), Demand::Run(share) if share > 0.0);
-        let Some(command) = self.tools.get_mut(order.tool) else {
+        let Some(command) = self.message.tools.get_mut(order.tool) else {
             self.latch(Fault::Tool {
                 tool: order.tool,
                 timeout: false,
@@ -28,6 +28,7 @@ impl<const N: usize> Runner<N> {
         command.velocity = order.velocity;
         command.force = order.force;
         command.tolerance = order.tolerance;
+        self.revise();
         let left = (order.timeout.max(0.0) / self.period) as u64;
         self.tool = Some(Working {
             order,
@@ -56,6 +57,7 @@ impl<const N: usize> Runner<N> {
                 if let Some(payload) = working.order.payload {
                     let number = self.payload.number.wrapping_add(1).max(1);
                     self.payload = Payload { number, ..payload };
+                    self.revise();
                 }
                 let command = working.order.command;
                 self.report(Event::Finished {
