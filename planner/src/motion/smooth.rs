@@ -15,7 +15,12 @@ const QUARTER: f64 = 0.25;
 const RULED: f64 = 1.3;
 /// Other curves tried then: shares of the linear and of the angular limits under which each is planned, and the gap to
 /// the optimum at which its search ends. Far from its optimum a curve is rounder, which the joints follow faster.
-const OTHERS: [([f64; 2], f64); 3] = [([0.7, 1.0], 1.0), ([0.6, 0.6], 1.0), ([1.0, 0.4], 1.0)];
+const OTHERS: [([f64; 2], f64); 4] = [
+    ([0.7, 1.0], 1.0),
+    ([0.6, 0.6], 1.0),
+    ([1.0, 0.4], 1.0),
+    ([1.0, 1.0], 0.3),
+];
 /// Most spans of a curve that is cheap enough for that.
 const CHEAP: usize = 400;
 
@@ -26,6 +31,14 @@ struct Rough {
     gap: f64,
     /// Time of the motion that it has to be faster than, s.
     most: f64,
+}
+
+/// Whether a curve may be possible for the tool, and only the joints fail on it.
+fn is_of_the_joints(error: &MotionError) -> bool {
+    matches!(
+        error,
+        MotionError::Uncertified(_) | MotionError::Blocked { .. }
+    )
 }
 
 /// A motion along a smooth curve of the tool.
@@ -39,7 +52,7 @@ struct Along<const N: usize> {
 
 impl<const N: usize> Planner<N> {
     /// The smooth motion within the tolerance asked for. If its certificate with the joints fails, or
-    /// if they cannot follow its curve but could follow the straight legs, other curves are tried, then a quarter of the
+    /// if they cannot follow its curve, other curves are tried; then, if they could follow the straight legs, a quarter of the
     /// tolerance, then a stop at each pose. Never slower than straight moves to each pose in turn: these are
     /// tried wherever they may be faster.
     pub(super) fn smooth_move(
@@ -52,19 +65,10 @@ impl<const N: usize> Planner<N> {
         }
         let planned = match self.blended(motion, start, (motion, None)) {
             Ok(first) => self.for_the_joints(motion, start, first),
-            Err(first) if motion.tolerance > 0.0 && self.helps_less(&first, motion, start) => {
-                let within = |share: f64| Move {
-                    tolerance: share * motion.tolerance,
-                    ..motion.clone()
-                };
+            Err(first) if motion.tolerance > 0.0 && is_of_the_joints(&first) => {
                 match self.otherwise(motion, start, f64::INFINITY) {
                     Some(other) => other,
-                    None => {
-                        self.blended(motion, start, (&within(QUARTER), None))
-                            .or_else(|_| self.blended(motion, start, (&within(0.0), None)))
-                            .map_err(|_| first)?
-                            .planned
-                    }
+                    None => self.nearer(motion, start, first)?,
                 }
             }
             Err(first) => return Err(first),
@@ -72,13 +76,25 @@ impl<const N: usize> Planner<N> {
         self.or_straight(motion, start, planned)
     }
 
-    /// Whether a curve nearer to the legs may be possible where one was not.
-    fn helps_less(&self, error: &MotionError, motion: &Move, start: &SVector<f64, N>) -> bool {
-        match error {
-            MotionError::Uncertified(_) => true,
-            MotionError::Blocked { .. } => self.legs_are_free(motion, start),
-            _ => false,
+    /// A motion nearer to the legs than one that failed with the joints: within a quarter of the tolerance, or with stops.
+    /// Not where the joints cannot follow the legs either.
+    fn nearer(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        error: MotionError,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        if matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(motion, start) {
+            return Err(error);
         }
+        let within = |share: f64| Move {
+            tolerance: share * motion.tolerance,
+            ..motion.clone()
+        };
+        self.blended(motion, start, (&within(QUARTER), None))
+            .or_else(|_| self.blended(motion, start, (&within(0.0), None)))
+            .map(|along| along.planned)
+            .map_err(|_| error)
     }
 
     /// Whether the joints can follow straight legs to all poses; much cheaper than a curve.
