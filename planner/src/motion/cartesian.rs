@@ -178,17 +178,18 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The smooth motion of the tool through the poses of a move that starts at `start`; `fit` says
-    /// whether a curve may be fitted through a dense list.
+    /// whether a curve may be fitted through a dense list, `gap` how near to the optimum it ends.
     pub(super) fn smooth_path(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        fit: bool,
+        (fit, gap): (bool, Option<f64>),
     ) -> Result<SmoothPath, MotionError> {
         let mut poses = vec![self.chain().forward(start)];
         poses.extend_from_slice(&motion.poses);
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.fit = fit;
+        options.gap = gap.unwrap_or(options.gap);
         Ok(SmoothPath {
             plan: smooth::plan(&poses, &options)?,
             still: is_still(&poses),

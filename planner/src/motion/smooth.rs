@@ -12,11 +12,34 @@ use crate::task::{Move, Shape};
 /// Share of the tolerance that is tried where all of it fails with the joints.
 const QUARTER: f64 = 0.25;
 /// Time of the motion over that of the tool alone from which on the joints rule.
-const RULED: f64 = 2.2;
-/// Shares of the linear and of the angular limits under which other curves are tried then.
-const SLOWER: [[f64; 2]; 2] = [[0.7, 1.0], [1.0, 0.4]];
+const RULED: f64 = 1.3;
+/// Other curves tried then: shares of the linear and of the angular limits under which each is planned, and the gap to
+/// the optimum at which its search ends. Far from its optimum a curve is rounder, which the joints follow faster.
+const OTHERS: [([f64; 2], f64); 4] = [
+    ([0.7, 1.0], 1.0),
+    ([0.6, 0.6], 1.0),
+    ([1.0, 0.4], 1.0),
+    ([1.0, 1.0], 0.3),
+];
 /// Most spans of a curve that is cheap enough for that.
 const CHEAP: usize = 400;
+
+/// What is wanted of a curve that is tried besides another.
+#[derive(Clone, Copy)]
+struct Rough {
+    /// Gap to the optimum at which its search ends.
+    gap: f64,
+    /// Time of the motion that it has to be faster than, s.
+    most: f64,
+}
+
+/// Whether a curve may be possible for the tool, and only the joints fail on it.
+fn is_of_the_joints(error: &MotionError) -> bool {
+    matches!(
+        error,
+        MotionError::Uncertified(_) | MotionError::Blocked { .. }
+    )
+}
 
 /// A motion along a smooth curve of the tool.
 struct Along<const N: usize> {
@@ -29,8 +52,8 @@ struct Along<const N: usize> {
 
 impl<const N: usize> Planner<N> {
     /// The smooth motion within the tolerance asked for. If its certificate with the joints fails, or
-    /// if they cannot follow its curve but could follow the straight legs, a quarter of the tolerance is
-    /// tried, then a stop at each pose. Never slower than straight moves to each pose in turn: these are
+    /// if they cannot follow its curve, other curves are tried; then, if they could follow the straight legs, a quarter of the
+    /// tolerance, then a stop at each pose. Never slower than straight moves to each pose in turn: these are
     /// tried wherever they may be faster.
     pub(super) fn smooth_move(
         &self,
@@ -40,30 +63,38 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(motion, start) {
             return self.all_windows(windowed);
         }
-        let planned = match self.blended(motion, start, motion) {
+        let planned = match self.blended(motion, start, (motion, None)) {
             Ok(first) => self.for_the_joints(motion, start, first),
-            Err(first) if motion.tolerance > 0.0 && self.helps_less(&first, motion, start) => {
-                let within = |share: f64| Move {
-                    tolerance: share * motion.tolerance,
-                    ..motion.clone()
-                };
-                self.blended(motion, start, &within(QUARTER))
-                    .or_else(|_| self.blended(motion, start, &within(0.0)))
-                    .map_err(|_| first)?
-                    .planned
+            Err(first) if motion.tolerance > 0.0 && is_of_the_joints(&first) => {
+                match self.otherwise(motion, start, f64::INFINITY) {
+                    Some(other) => other,
+                    None => self.nearer(motion, start, first)?,
+                }
             }
             Err(first) => return Err(first),
         };
         self.or_straight(motion, start, planned)
     }
 
-    /// Whether a curve nearer to the legs may be possible where one was not.
-    fn helps_less(&self, error: &MotionError, motion: &Move, start: &SVector<f64, N>) -> bool {
-        match error {
-            MotionError::Uncertified(_) => true,
-            MotionError::Blocked { .. } => self.legs_are_free(motion, start),
-            _ => false,
+    /// A motion nearer to the legs than one that failed with the joints: within a quarter of the tolerance, or with stops.
+    /// Not where the joints cannot follow the legs either.
+    fn nearer(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        error: MotionError,
+    ) -> Result<PlannedMove<N>, MotionError> {
+        if matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(motion, start) {
+            return Err(error);
         }
+        let within = |share: f64| Move {
+            tolerance: share * motion.tolerance,
+            ..motion.clone()
+        };
+        self.blended(motion, start, (&within(QUARTER), None))
+            .or_else(|_| self.blended(motion, start, (&within(0.0), None)))
+            .map(|along| along.planned)
+            .map_err(|_| error)
     }
 
     /// Whether the joints can follow straight legs to all poses; much cheaper than a curve.
@@ -92,19 +123,33 @@ impl<const N: usize> Planner<N> {
         first: Along<N>,
     ) -> PlannedMove<N> {
         let ruled = first.planned.trajectory.duration() > RULED * first.tool;
-        let mut best = first.planned;
         if !ruled || motion.tolerance <= 0.0 || first.spans > CHEAP {
-            return best;
+            return first.planned;
         }
-        for [along, about] in SLOWER {
+        let most = first.planned.trajectory.duration();
+        self.otherwise(motion, start, most).unwrap_or(first.planned)
+    }
+
+    /// The fastest motion along another curve that takes less than `most` seconds.
+    fn otherwise(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        mut most: f64,
+    ) -> Option<PlannedMove<N>> {
+        let mut best = None;
+        for ([along, about], gap) in OTHERS {
             let slower = Move {
                 limits: motion.limits.scaled(along, about),
                 ..motion.clone()
             };
-            if let Ok(other) = self.blended(motion, start, &slower)
-                && other.planned.trajectory.duration() < best.trajectory.duration()
-            {
-                best = other.planned;
+            let rough = Some(Rough { gap, most });
+            let Ok(other) = self.blended(motion, start, (&slower, rough)) else {
+                continue;
+            };
+            let duration = other.planned.trajectory.duration();
+            if duration < most {
+                (most, best) = (duration, Some(other.planned));
             }
         }
         best
@@ -169,13 +214,13 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The motion along the curve of another move through the same poses, of at most the tolerance and the
-    /// limits of this one. An arm that cannot follow the curve fitted through a dense list may follow the
+    /// limits of this one; a rough one only if the tool alone is fast enough on it. An arm that cannot follow the curve fitted through a dense list may follow the
     /// spline.
     fn blended(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        curve: &Move,
+        (curve, rough): (&Move, Option<Rough>),
     ) -> Result<Along<N>, MotionError> {
         let along = |path: &SmoothPath| -> Result<_, MotionError> {
             let mut planned = Err(MotionError::NoWay);
@@ -194,9 +239,13 @@ impl<const N: usize> Planner<N> {
                 spans: path.plan.spans(),
             })
         };
-        let path = self.smooth_path(curve, start, true)?;
+        let gap = rough.map(|rough| rough.gap);
+        let path = self.smooth_path(curve, start, (true, gap))?;
+        if rough.is_some_and(|rough| path.plan.duration() >= rough.most) {
+            return Err(MotionError::NoWay);
+        }
         match along(&path) {
-            Err(_) if path.is_fitted() => along(&self.smooth_path(curve, start, false)?),
+            Err(_) if path.is_fitted() => along(&self.smooth_path(curve, start, (false, gap))?),
             other => other,
         }
     }

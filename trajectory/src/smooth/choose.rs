@@ -13,12 +13,12 @@ use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
 use crate::ToolPoint;
 
-/// Effort of one spline: a time within 0.1 % of the optimum.
+/// Effort of one spline, but for the gap to its optimum.
 const EFFORT: Effort = Effort {
     steps: 90,
     search: 72,
     spread: Some(1.0),
-    gap: 2.4e-3,
+    gap: f64::INFINITY,
     most: f64::INFINITY,
 };
 
@@ -149,7 +149,11 @@ impl<'a> Window<'a> {
             known,
             most,
             inner,
-            effort: Effort { most, ..EFFORT },
+            effort: Effort {
+                most,
+                gap: options.gap,
+                ..EFFORT
+            },
             coupled: None,
         };
         let (spans, retried) = attempts.run()?;
@@ -234,7 +238,15 @@ impl Attempts<'_> {
             return None;
         } else {
             let most = self.most;
-            (self.coupled, self.effort) = (Some(true), Effort { most, ..EFFORT });
+            let gap = self.window.options.gap;
+            (self.coupled, self.effort) = (
+                Some(true),
+                Effort {
+                    most,
+                    gap,
+                    ..EFFORT
+                },
+            );
         }
         Some(())
     }

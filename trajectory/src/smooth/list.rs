@@ -88,7 +88,7 @@ impl<'a> List<'a> {
     fn within_less(&self, form: &NormalForm, mut best: SmoothPlan) -> Option<SmoothPlan> {
         let over = best.duration() / self.least;
         let doubtful = best.retried || over > DOUBTFUL;
-        if !doubtful || self.poses.len() <= FEW || over <= NEAR {
+        if !doubtful || self.poses.len() <= FEW || over <= NEAR || self.options.is_rough() {
             return Some(best);
         }
         let fitted = best.method() == Method::Fit;
@@ -125,6 +125,9 @@ impl<'a> List<'a> {
                 let spline =
                     spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
                 let mut best = faster(fitted.map(|fit| fit.plan), spline);
+                if self.options.is_rough() {
+                    return best;
+                }
                 let slow = best.as_ref().is_some_and(|plan| self.is_slow(plan));
                 if slow
                     && self.options.fit
@@ -230,7 +233,7 @@ impl<'a> List<'a> {
         let divided = rests.any(|rest| rest.cause != RestCause::TurnsBack);
         let before = (motion.duration(), divided);
         let holds = |motion: &Motion| self.placed(form, motion.clone()).is_some();
-        let bridged = if motion.rests.is_empty() {
+        let bridged = if motion.rests.is_empty() || self.options.is_rough() {
             None
         } else {
             bridge::bridged(&motion, &form.poses, &form.options, &holds)

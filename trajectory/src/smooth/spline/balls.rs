@@ -6,7 +6,7 @@ use super::newton::{Iterate, System, outer};
 use super::problem::{Problem, part, square};
 
 /// A ball at one iterate.
-struct Ball<const D: usize> {
+pub(super) struct Ball<const D: usize> {
     /// First control point, and its weights.
     first: usize,
     weights: [f64; 5],
@@ -19,14 +19,29 @@ struct Ball<const D: usize> {
     stiff: f64,
     /// How the place moves with `z`, if the end is in motion.
     slide: Option<[f64; D]>,
+    /// Where the place alone says when it is passed.
+    lead: Option<Lead>,
 }
+
+/// The passing time as a function of the place alone.
+struct Lead {
+    /// By how much it falls with each coordinate of each control point.
+    falls: [[f64; 3]; 5],
+    /// Slope of the barrier along it.
+    slope: f64,
+    /// Weight of a passing time that is another one.
+    tie: f64,
+}
+
+/// Weight of the tie between a passing time and the place, beside the curvature along that time.
+const TIE: f64 = 1e6;
 
 impl<const D: usize> Ball<D> {
     fn new(at: &Iterate<'_, D>, i: usize, goal: &[f64; D]) -> Self {
         let (point, room) = (at.point, at.room);
         let (first, share) = point.locate(point.crossings[i]);
         let [p, v, a] = point.at(point.crossings[i]);
-        let weights = weights(share)[0];
+        let [weights, slopes, _] = weights(share);
         let mut ball = Self {
             first,
             weights,
@@ -35,19 +50,25 @@ impl<const D: usize> Ball<D> {
             bent: [0.0; D],
             stiff: 0.0,
             slide: None,
+            lead: None,
         };
         let mut damping = 0.0;
+        let heavy = at.problem.heavy(point);
         for g in 0..Problem::<D>::GROUPS {
             let y = [0, 1, 2].map(|d| p[3 * g + d] - goal[3 * g + d]);
             let slack = 1.0 / (room.balls[g][i].powi(2) - square(&y));
-            damping += 2.0 * slack * (square(&y) * square(&part(&a, g))).sqrt();
-            ball.blocks[g] = outer(&y, 2.0 * slack, 4.0 * slack * slack);
+            let slope = 2.0 * heavy * slack;
+            damping += slope * (square(&y) * square(&part(&a, g))).sqrt();
+            ball.blocks[g] = outer(&y, slope, 2.0 * slope * slack);
             for d in 0..3 {
-                ball.gradient[3 * g + d] = 2.0 * slack * y[d];
+                ball.gradient[3 * g + d] = slope * y[d];
             }
         }
         ball.bent = ball.times(&v);
         ball.stiff = (0..D).map(|d| ball.bent[d] * v[d]).sum::<f64>() + damping;
+        if at.problem.is_led(i) && ball.stiff > 0.0 {
+            ball.lead(&[p, v, a], goal, &slopes);
+        }
         if !at.slides.is_empty() {
             let mut slide = [0.0; D];
             for (weight, change) in weights.iter().zip(&at.slides[first..]) {
@@ -58,6 +79,60 @@ impl<const D: usize> Ball<D> {
             ball.slide = Some(slide);
         }
         ball
+    }
+
+    /// Ties the passing time to the closest approach of the place.
+    fn lead(&mut self, [p, v, a]: &[[f64; D]; 3], goal: &[f64; D], slopes: &[f64; 5]) {
+        let y = [0, 1, 2].map(|d| p[d] - goal[d]);
+        let speed = square(&part(v, 0));
+        let bent: f64 = (0..3).map(|d| y[d] * a[d]).sum();
+        let curvature = (speed + bent).max(0.5 * speed);
+        if curvature <= 0.0 {
+            return;
+        }
+        let fall =
+            |i: usize| [0, 1, 2].map(|d| (self.weights[i] * v[d] + slopes[i] * y[d]) / curvature);
+        self.lead = Some(Lead {
+            falls: [0, 1, 2, 3, 4].map(fall),
+            slope: (0..D).map(|d| self.gradient[d] * v[d]).sum(),
+            tie: TIE * self.stiff,
+        });
+    }
+
+    /// The slope of the barrier along the passing time.
+    pub(super) fn slope(&self) -> f64 {
+        self.lead.as_ref().map_or(0.0, |lead| lead.slope)
+    }
+
+    /// By how much the passing time moves with a step of the free control points, in knots.
+    pub(super) fn time(&self, step: &[f64]) -> f64 {
+        if self.stiff <= 0.0 {
+            return 0.0;
+        }
+        if let Some(lead) = &self.lead {
+            let mut fall = 0.0;
+            for (i, falls) in lead.falls.iter().enumerate() {
+                if let Some(k) = (self.first + i).checked_sub(4) {
+                    let moved = step.get(k * D..(k + 1) * D).unwrap_or_default();
+                    fall += moved.iter().zip(falls).map(|(a, b)| a * b).sum::<f64>();
+                }
+            }
+            return -fall;
+        }
+        let mut pull = 0.0;
+        for (i, weight) in self.weights.iter().enumerate() {
+            let Some(k) = (self.first + i).checked_sub(4) else {
+                continue;
+            };
+            let moved = step.get(k * D..(k + 1) * D).unwrap_or_default();
+            pull += weight
+                * moved
+                    .iter()
+                    .zip(&self.bent)
+                    .map(|(a, b)| a * b)
+                    .sum::<f64>();
+        }
+        -pull / self.stiff
     }
 
     /// The Hessian times a vector.
@@ -93,18 +168,20 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// Adds all balls.
     pub(super) fn balls(&mut self, at: &Iterate<'_, D>) {
         self.passes.clear();
+        self.around.clear();
         for (i, goal) in at.problem.inner().iter().enumerate() {
             let ball = Ball::new(at, i, goal);
             if Self::APART {
-                self.add_apart(&ball);
+                self.add_apart(&ball, &at.slides);
             } else {
                 self.add_eliminated(&ball);
             }
+            self.around.push(ball);
         }
     }
 
     /// Adds a ball whose passing time stays an unknown, so that the groups are not coupled.
-    fn add_apart(&mut self, ball: &Ball<D>) {
+    fn add_apart(&mut self, ball: &Ball<D>, slides: &[[f64; D]]) {
         let mut border = [0.0; D];
         let mut drawn = 0.0;
         if let Some(slide) = &ball.slide {
@@ -112,6 +189,17 @@ impl<const D: usize, const B: usize> System<D, B> {
             drawn = dot(&ball.bent, slide);
             self.gradient_z += dot(&ball.gradient, slide);
             self.hessian_z += dot(&border, slide);
+        }
+        // How the tie moves with `z`.
+        let mut drift = 0.0;
+        if let Some(lead) = &ball.lead
+            && !slides.is_empty()
+        {
+            for (falls, slide) in lead.falls.iter().zip(&slides[ball.first..]) {
+                drift += falls.iter().zip(slide).map(|(a, b)| a * b).sum::<f64>();
+            }
+            drawn += lead.tie * drift;
+            self.hessian_z += lead.tie * drift * drift;
         }
         let free = self.sides.len() / D;
         let mut first = [0; 2];
@@ -129,20 +217,36 @@ impl<const D: usize, const B: usize> System<D, B> {
                     let both = ball.weights[i] * ball.weights[j];
                     self.add_block(row, (i - j) * Self::STRIDE, both, &ball.blocks[g]);
                 }
+                if let Some(lead) = ball.lead.as_ref().filter(|_| g == 0) {
+                    for d in 0..3 {
+                        self.sides[row + d][1] += lead.tie * drift * lead.falls[i][d];
+                    }
+                    for j in (0..=i).filter(|j| ball.first + j >= 4) {
+                        let (own, other) = (&lead.falls[i], &lead.falls[j]);
+                        let block = own.map(|x| other.map(|y| x * y));
+                        self.add_block(row, (i - j) * Self::STRIDE, lead.tie, &block);
+                    }
+                }
             }
             first[g] = Self::row(free, ball.first.saturating_sub(4), g);
         }
         if ball.stiff <= 0.0 {
             return;
         }
-        let column = self.passes.push(first, ball.stiff, drawn);
+        let tie = ball.lead.as_ref().map_or(0.0, |lead| lead.tie);
+        let column = self
+            .passes
+            .push(first, ball.stiff + tie, [drawn, ball.slope()]);
         for g in 0..Problem::<D>::GROUPS {
             for i in 0..5 {
                 let Some(k) = (ball.first + i).checked_sub(4).filter(|k| *k < free) else {
                     continue;
                 };
                 for d in 0..3 {
-                    column[Self::row(free, k, g) + d] = ball.weights[i] * ball.bent[3 * g + d];
+                    let tied = ball.lead.as_ref().filter(|_| g == 0);
+                    let tied = tied.map_or(0.0, |lead| lead.tie * lead.falls[i][d]);
+                    column[Self::row(free, k, g) + d] =
+                        ball.weights[i] * ball.bent[3 * g + d] + tied;
                 }
             }
         }
@@ -195,7 +299,7 @@ impl<const D: usize, const B: usize> System<D, B> {
 
 #[cfg(test)]
 mod tests {
-    use crate::smooth::spline::newton::System;
+    use crate::smooth::spline::newton::{Barrier, System};
     use crate::smooth::spline::problem::{Group, Problem, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::start;
@@ -223,6 +327,7 @@ mod tests {
             finish: None,
             scale: 1.0,
             anchor: None,
+            led: Vec::new(),
         }
     }
 
@@ -249,6 +354,46 @@ mod tests {
             }
             assert!((whole.z - apart.z).abs() < 1e-7 * whole.z.abs());
             assert!((whole.decrement / apart.decrement - 1.0).abs() < 1e-7);
+        }
+    }
+
+    /// Where the place alone says when a ball is passed, the barrier falls along the Newton step as the decrement says:
+    /// its slope knows how the passing time moves.
+    #[test]
+    fn passes_led_by_the_place_have_the_slope_of_the_barrier() {
+        for led in [false, true] {
+            let mut problem = problem(0.0);
+            problem.led = vec![led; 3];
+            let mut point = start::first(&mut problem, None);
+            problem.pin(&mut point);
+            project(&problem, &mut point, None, 20);
+            let room = Room::new(&problem, &point);
+            let weight = problem.parameter(&point) / point.z;
+            let step = System::<6, 20>::new(&point).step(&problem, &point, &room, weight);
+            let step = step.unwrap();
+            let barrier = Barrier {
+                problem: &problem,
+                room: &room,
+                weight,
+                keep: 0.0,
+            };
+            let value = |share: f64| {
+                let mut moved = point.clone();
+                moved.z += share * step.z;
+                let free = moved.control.iter_mut().skip(4);
+                for (control, change) in free.zip(step.control.chunks_exact(6)) {
+                    for d in 0..6 {
+                        control[d] += share * change[d];
+                    }
+                }
+                project(&problem, &mut moved, Some(&room), 20);
+                let seen = barrier.look(&moved, &[]).unwrap();
+                barrier.value(&moved, &seen)
+            };
+            let share = 1e-5;
+            let slope = (value(share) - value(-share)) / (2.0 * share);
+            let ratio = -slope / step.decrement;
+            assert!((ratio - 1.0).abs() < 1e-3, "led {led}: {ratio}");
         }
     }
 }

@@ -6,7 +6,7 @@ use super::basis;
 use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
-use super::solve::{Effort, solve};
+use super::solve::{Aims, Effort, solve};
 use super::start::{self, KNOTS_PER_RAMP};
 use super::turns::turns;
 use crate::ToolPoint;
@@ -171,6 +171,18 @@ impl Task<'_> {
         result
     }
 
+    /// Whether the place alone says when each inner pose is passed: the legs beside it are not turns on the spot.
+    fn led(&self) -> Vec<bool> {
+        let far = |pair: &[Isometry3<f64>]| {
+            let way = pair[1].translation.vector - pair[0].translation.vector;
+            way.norm() > self.options.tolerance
+        };
+        let around = self.poses.windows(3);
+        around
+            .map(|three| far(&three[..2]) && far(&three[1..]))
+            .collect()
+    }
+
     fn groups(&self, used: [bool; 2]) -> [Group; 2] {
         let limits = &self.options.limits;
         let turn = self.options.angular_tolerance();
@@ -259,6 +271,7 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
             anchor: None,
+            led: if B < 5 * D { self.led() } else { Vec::new() },
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;
@@ -275,8 +288,40 @@ impl Task<'_> {
                 start::first(&mut problem, spread)
             }
         };
-        solve::<D, B>(&mut problem, &mut point, effort)?;
+        let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
+        let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
+        solve::<D, B>(&mut problem, &mut point, effort, aims)?;
         Some(self.spans(&problem, &point, used))
+    }
+
+    /// The inner vertices where the motion of an iterate sees the poses: the rotation vector of a pose is that of
+    /// the iterate at the pass, less the turn from the pose to the motion there.
+    fn aims<const D: usize>(&self, problem: &Problem<D>, point: &Point<D>) -> Vec<[f64; D]> {
+        let h = problem.spacing(point.z);
+        let rotations = self.rotations(problem, point, D - 3, h);
+        let passes = point.crossings.iter().zip(problem.inner());
+        let aim = |(i, (time, vertex)): (usize, (&f64, &[f64; D]))| {
+            let (span, share) = point.locate(*time);
+            let control = &rotations[span..span + 5];
+            let span = Span {
+                start: 0.0,
+                duration: h,
+                point: [Vector3::zeros(); 5],
+                base: control[0],
+                turns: turns(control, h),
+            };
+            let off = body_turn(
+                &self.poses[i + 1].rotation,
+                &span.at(share * h).pose.rotation,
+            );
+            let at = point.at(*time)[0];
+            let mut aim = *vertex;
+            for d in 0..3 {
+                aim[D - 3 + d] = at[D - 3 + d] - off[d];
+            }
+            aim
+        };
+        passes.enumerate().map(aim).collect()
     }
 
     /// First iterate from a known motion.

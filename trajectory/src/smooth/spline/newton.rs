@@ -1,5 +1,6 @@
 //! Barrier value, gradient and Hessian of an iterate, and the Newton step.
 
+use super::balls::Ball;
 use super::band::Band;
 use super::basis::{FIRST, SECOND, THIRD};
 use super::passes::Passes;
@@ -19,12 +20,16 @@ pub(crate) struct System<const D: usize, const B: usize> {
     pub(super) gradient_z: f64,
     pub(super) hessian_z: f64,
     pub(super) passes: Passes,
+    /// The balls of the iterate.
+    pub(super) around: Vec<Ball<D>>,
 }
 
 /// A direction in control points and `z`, and the fall of the barrier along it.
 pub(crate) struct Step {
     pub(crate) control: Vec<f64>,
     pub(crate) z: f64,
+    /// By how much each passing time moves, in knots.
+    pub(crate) times: Vec<f64>,
     /// Square of the Newton decrement.
     pub(crate) decrement: f64,
 }
@@ -107,6 +112,7 @@ impl<const D: usize> Barrier<'_, D> {
             seen,
         };
         let mut bounds = 0.0;
+        let heavy = self.problem.heavy(point);
         for g in 0..Problem::<D>::GROUPS {
             bounds += self.limits(point, g, &mut slacks)?;
             let balls = &self.room.balls[g];
@@ -114,6 +120,9 @@ impl<const D: usize> Barrier<'_, D> {
                 let miss = super::project::miss(self.problem, point, i, g);
                 if !slacks.take(miss * miss, radius * radius) {
                     return None;
+                }
+                if heavy > 1.0 {
+                    slacks.sum += (heavy - 1.0) * slacks.seen[slacks.seen.len() - 1].ln();
                 }
             }
             if self.problem.groups[g].width.is_finite() {
@@ -172,6 +181,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             gradient_z: 0.0,
             hessian_z: 0.0,
             passes: Passes::new(times, size, B),
+            around: Vec::with_capacity(point.crossings.len()),
         }
     }
 
@@ -236,16 +246,20 @@ impl<const D: usize, const B: usize> System<D, B> {
         self.band.upper(&mut along);
         let falls = self.sides.iter().zip(&along);
         let falls: f64 = falls.map(|(side, step)| side[0] * step).sum();
-        let slope = self.gradient_z * z + falls;
         let free = size / D;
         let entry = |i: usize| along[Self::row(free, i / D, i % D / 3) + i % 3];
         let mut control: Vec<f64> = (0..size).map(entry).collect();
         for (step, slide) in control.iter_mut().zip(slides.iter().skip(4).flatten()) {
             *step += slide * z;
         }
+        let times: Vec<f64> = self.around.iter().map(|ball| ball.time(&control)).collect();
+        let passes = self.around.iter().zip(&times);
+        let passing: f64 = passes.map(|(ball, time)| ball.slope() * time).sum();
+        let slope = self.gradient_z * z + falls + passing;
         (slope < 0.0 && slope.is_finite()).then_some(Step {
             control,
             z,
+            times,
             decrement: -slope,
         })
     }

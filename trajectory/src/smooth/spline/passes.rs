@@ -17,6 +17,8 @@ pub(super) struct Passes {
     /// The diagonal, and what couples the times with `z`.
     stiff: Vec<f64>,
     drawn: Vec<f64>,
+    /// Slopes along the times.
+    slopes: Vec<f64>,
 }
 
 /// What is left for `z` when all else is eliminated, and the values of the rest.
@@ -39,6 +41,7 @@ impl Passes {
             first: Vec::with_capacity(count),
             stiff: Vec::with_capacity(count),
             drawn: Vec::with_capacity(count),
+            slopes: Vec::with_capacity(count),
         }
     }
 
@@ -48,15 +51,22 @@ impl Passes {
         self.first.clear();
         self.stiff.clear();
         self.drawn.clear();
+        self.slopes.clear();
     }
 
-    /// Adds one with its diagonal and what couples it with `z`; its column, all zero.
-    pub(super) fn push(&mut self, first: [usize; 2], stiff: f64, drawn: f64) -> &mut [f64] {
+    /// Adds one with its diagonal, what couples it with `z`, and its slope; its column, all zero.
+    pub(super) fn push(
+        &mut self,
+        first: [usize; 2],
+        stiff: f64,
+        [drawn, slope]: [f64; 2],
+    ) -> &mut [f64] {
         let start = self.columns.len();
         self.columns.resize(start + self.length, 0.0);
         self.first.push(first);
         self.stiff.push(stiff);
         self.drawn.push(drawn);
+        self.slopes.push(slope);
         &mut self.columns[start..]
     }
 
@@ -90,7 +100,7 @@ impl Passes {
                 matrix[i * count + j] = -both;
             }
             matrix[i * count + i] += self.stiff[i];
-            let pull = dot(column(i), along);
+            let pull = dot(column(i), along) - self.slopes[i];
             times.push([pull, self.drawn[i] - dot(column(i), border)]);
         }
         factor(&mut matrix, count)?;

@@ -8,6 +8,10 @@
 
 use super::basis::{self, START, weights};
 
+/// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
+/// slack that each step along a ball leaves it.
+const BALLS: f64 = 0.005;
+
 /// Limits of one group of three coordinates (position, or rotation vector).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
@@ -37,6 +41,8 @@ pub(crate) struct Problem<const D: usize> {
     /// While a first iterate from a start in motion breaks limits, its first control points stay
     /// those of this `z`; a greater `z` only widens limits.
     pub(crate) anchor: Option<f64>,
+    /// Whether the place alone says when an inner vertex is passed, by vertex; empty: of none.
+    pub(crate) led: Vec<bool>,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -75,6 +81,11 @@ impl<const D: usize> Problem<D> {
     /// Knot spacing, s.
     pub(crate) fn spacing(&self, z: f64) -> f64 {
         self.scale * z.cbrt()
+    }
+
+    /// Whether the place alone says when inner vertex `i` is passed.
+    pub(crate) fn is_led(&self, i: usize) -> bool {
+        D > 3 && self.led.get(i).copied().unwrap_or(false)
     }
 
     /// Inner vertices: those with a ball.
@@ -206,7 +217,17 @@ impl<const D: usize> Problem<D> {
         } else {
             0.0
         };
-        2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + point.crossings.len() as f64)
+        let balls = self.heavy(point) * point.crossings.len() as f64;
+        2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + balls)
+    }
+
+    /// Weight of a ball beside other constraints.
+    pub(crate) fn heavy(&self, point: &Point<D>) -> f64 {
+        if D == 3 || point.crossings.is_empty() {
+            return 1.0;
+        }
+        let knots = point.control.len() as f64;
+        (BALLS * 5.0 * knots / point.crossings.len() as f64).max(1.0)
     }
 }
 

@@ -56,48 +56,112 @@ pub(crate) fn project<const D: usize>(
 ) {
     let end = point.spans() as f64;
     let scales = [0, 1].map(|g: usize| 1.0 / (problem.groups[g].radius * problem.groups[g].radius));
-    let mut before = 0.0;
+    let mut before = 0.0_f64;
     for i in 0..point.crossings.len() {
-        let goal = &problem.inner()[i];
-        let mut time = point.crossings[i];
+        let radii = |g: usize| room.map_or(0.0, |room| room.balls[g][i].powi(2));
+        let pass = Pass {
+            goal: &problem.inner()[i],
+            squares: [radii(0), radii(1)],
+            scales,
+            led: problem.is_led(i),
+        };
+        let mut time = point.crossings[i].clamp(before, end.max(before));
+        let mut here = pass.strain(point, time);
         for _ in 0..rounds {
-            let [p, v, a] = point.at(time);
-            let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
-            for g in 0..Problem::<D>::GROUPS {
-                let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
-                for d in 3 * g..3 * g + 3 {
-                    let y = p[d] - goal[d];
-                    away += y * y;
-                    along += y * v[d];
-                    bent += y * a[d];
-                    speed += v[d] * v[d];
-                }
-                let slack = room.map_or(0.0, |room| room.balls[g][i].powi(2) - away);
-                let inside = D > 3 && slack > 0.0;
-                let scale = if inside { 1.0 / slack } else { scales[g] };
-                slope += scale * along;
-                bend += scale * bent;
-                fall += scale * speed;
-                if inside {
-                    fall += 2.0 * (scale * along).powi(2);
-                }
-            }
-            let curvature = if bend > -0.5 * fall {
-                fall + bend
-            } else {
-                0.5 * fall
-            };
-            if curvature <= 0.0 {
+            let Some(step) = pass.step(point, time) else {
                 break;
+            };
+            let (mut share, mut moved) = (1.0, false);
+            for _ in 0..if D > 3 { 4 } else { 1 } {
+                let to = (time - share * step).clamp(before, end.max(before));
+                let there = pass.strain(point, to);
+                if D == 3 || there <= here {
+                    (time, here, moved) = (to, there, true);
+                    break;
+                }
+                share *= 0.4;
             }
-            let step = (slope / curvature).clamp(-0.7, 0.7);
-            time = (time - step).clamp(before, end);
-            if step.abs() < 1e-7 {
+            if !moved || step.abs() < 1e-7 {
                 break;
             }
         }
         point.crossings[i] = time.max(before);
         before = point.crossings[i];
+    }
+}
+
+/// What the time of one pass depends on.
+struct Pass<'a, const D: usize> {
+    goal: &'a [f64; D],
+    /// Squares of the radii of the widened balls; zero where none are known.
+    squares: [f64; 2],
+    /// Weight of each group where none are known, or outside.
+    scales: [f64; 2],
+    /// Whether the place alone decides.
+    led: bool,
+}
+
+impl<const D: usize> Pass<'_, D> {
+    /// Strain of a passing time: outside of a ball how far, and inside the barrier, which is less.
+    fn strain(&self, point: &Point<D>, time: f64) -> (f64, f64) {
+        if D == 3 {
+            return (0.0, 0.0);
+        }
+        let [p, ..] = point.at(time);
+        if self.led {
+            return (0.0, (0..3).map(|d| (p[d] - self.goal[d]).powi(2)).sum());
+        }
+        let (mut out, mut inside) = (0.0_f64, 0.0);
+        let mut sum = 0.0;
+        for g in 0..Problem::<D>::GROUPS {
+            let away: f64 = (3 * g..3 * g + 3)
+                .map(|d| (p[d] - self.goal[d]).powi(2))
+                .sum();
+            sum += self.scales[g] * away;
+            if self.squares[g] > 0.0 {
+                let share = away / self.squares[g];
+                out = out.max(share);
+                inside -= (1.0 - share).max(1e-300).ln();
+            }
+        }
+        if out >= 1.0 {
+            (out, sum)
+        } else if self.squares[0] > 0.0 {
+            (0.0, inside)
+        } else {
+            (0.0, sum)
+        }
+    }
+
+    /// The step of Newton's method towards the closest approach, in knots.
+    fn step(&self, point: &Point<D>, time: f64) -> Option<f64> {
+        let [p, v, a] = point.at(time);
+        let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
+        for g in 0..if self.led { 1 } else { Problem::<D>::GROUPS } {
+            let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
+            for d in 3 * g..3 * g + 3 {
+                let y = p[d] - self.goal[d];
+                away += y * y;
+                along += y * v[d];
+                bent += y * a[d];
+                speed += v[d] * v[d];
+            }
+            let slack = self.squares[g] - away;
+            let inside = D > 3 && slack > 0.0 && !self.led;
+            let scale = if inside { 1.0 / slack } else { self.scales[g] };
+            slope += scale * along;
+            bend += scale * bent;
+            fall += scale * speed;
+            if inside {
+                fall += 2.0 * (scale * along).powi(2);
+            }
+        }
+        let curvature = if bend > -0.5 * fall {
+            fall + bend
+        } else {
+            0.5 * fall
+        };
+        (curvature > 0.0).then(|| (slope / curvature).clamp(-0.7, 0.7))
     }
 }
 

@@ -2,7 +2,7 @@
 //! one is a valid motion.
 
 use super::newton::{Barrier, KEEP, Seen, Step, System};
-use super::problem::{Point, Problem, Room, spreading};
+use super::problem::{Point, Problem, Room, spreading, ways};
 use super::project::project;
 
 /// How far and how long the iteration goes.
@@ -93,7 +93,8 @@ const BETWEEN: usize = 400;
 const BACK: f64 = 0.6;
 
 /// Improves an iterate to the optimum within `effort`; the number of steps, or
-/// `None` when no feasible iterate was found.
+/// `None` when no feasible iterate was found. Where the motion of an iterate sees the poses turned otherwise than its
+/// rotation vectors say, `aims` tells it, and the vertices follow on the way.
 ///
 /// # Source
 /// S. Boyd, L. Vandenberghe, "Convex Optimization", 2004, 11.3 (barrier method); the bounds of an
@@ -102,6 +103,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     problem: &mut Problem<D>,
     point: &mut Point<D>,
     effort: Effort,
+    aims: Option<Aims<'_, D>>,
 ) -> Option<usize> {
     let pace = Pace::new(problem, effort);
     let mut system = System::<D, B>::new(point);
@@ -145,6 +147,10 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             weight = weight.min(parameter / (2.0 * point.z));
         }
         let centred = step.decrement < if done { pace.centre } else { ROUGHLY };
+        let looks = !moved || centred || (count + 1).is_multiple_of(AIMING);
+        let missed = aims
+            .filter(|_| done && looks)
+            .map_or(0.0, |aims| aim(problem, point, (&room, &mut known), aims));
         if moved && !centred {
             continue;
         }
@@ -153,6 +159,9 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             return None;
         }
         if tight && parameter / weight <= effort.gap * point.z {
+            if moved && missed > AIMED {
+                continue;
+            }
             return done.then_some(count);
         }
         if tight {
@@ -164,6 +173,68 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
     }
     (tight && problem.anchor.is_none()).then_some(pace.steps + more)
+}
+
+/// Where the motion of an iterate sees the inner poses.
+pub(crate) type Aims<'a, const D: usize> = &'a dyn Fn(&Problem<D>, &Point<D>) -> Vec<[f64; D]>;
+
+/// Steps from one look at where the poses are seen to the next, and by how much a pose may be seen beside its vertex at
+/// the end, in radii of its ball.
+const AIMING: usize = 4;
+const AIMED: f64 = 1e-4;
+
+/// Share of each slack that moved vertices must leave.
+const LEAVE: f64 = 0.3;
+
+/// Moves the inner vertices to where the motion of the iterate sees them, as far as it stays well inside; by how
+/// much they are still off, in radii of their balls.
+fn aim<const D: usize>(
+    problem: &mut Problem<D>,
+    point: &Point<D>,
+    (room, known): (&Room, &mut Known),
+    aims: Aims<'_, D>,
+) -> f64 {
+    let aims = aims(problem, point);
+    let before = (problem.vertices.clone(), problem.ways.clone());
+    let look = |problem: &Problem<D>, slacks: &[f64]| {
+        let barrier = Barrier {
+            problem,
+            room,
+            weight: 0.0,
+            keep: LEAVE,
+        };
+        barrier.look(point, slacks)
+    };
+    let Some(seen) = look(problem, &[]) else {
+        return 0.0;
+    };
+    let radius = problem.groups[D / 3 - 1].radius;
+    let off = aims.iter().zip(problem.inner()).map(|(aim, vertex)| {
+        let off: f64 = (D - 3..D).map(|d| (aim[d] - vertex[d]).powi(2)).sum();
+        off.sqrt() / radius
+    });
+    let off = off.fold(0.0, f64::max);
+    let mut share = 1.0;
+    for _ in 0..5 {
+        for ((to, from), aim) in problem.vertices[1..]
+            .iter_mut()
+            .zip(&before.0[1..])
+            .zip(&aims)
+        {
+            for d in D - 3..D {
+                to[d] = from[d] + share * (aim[d] - from[d]);
+            }
+        }
+        problem.ways = ways(&problem.vertices);
+        if let Some(seen) = look(problem, &seen.slacks) {
+            known.room = room.clone();
+            known.seen = Some(seen);
+            return off * (1.0 - share);
+        }
+        share *= 0.4;
+    }
+    (problem.vertices, problem.ways) = before;
+    off
 }
 
 /// What is known of the barrier at the iterate, under these bounds.
@@ -277,6 +348,14 @@ fn search<const D: usize>(
         follow(problem, &mut trial, point.z);
         problem.pin(&mut trial);
         trial.crossings.copy_from_slice(&point.crossings);
+        for (time, change) in trial
+            .crossings
+            .iter_mut()
+            .zip(&step.times)
+            .filter(|_| D > 3)
+        {
+            *time += share * change;
+        }
         project(problem, &mut trial, Some(barrier.room), rounds);
         if let Some(there) = barrier.look(&trial, &seen.slacks)
             && barrier.value(&trial, &there) < here - 0.01 * share * step.decrement

@@ -20,6 +20,9 @@ const HELD: f64 = 0.3;
 pub(super) const FEWEST: f64 = 12.0;
 pub(super) const MOST: f64 = 700.0;
 
+/// Spans for each vertex of one that turns, if they are fewer.
+const TURNING: f64 = 58.0;
+
 /// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;
 /// Change of rate (1/s2) on a leg on which nothing moves.
@@ -67,6 +70,16 @@ impl Schedule {
     }
 }
 
+/// Most spans of a spline through so many vertices. One that turns needs twice the work for each span, and its steps are
+/// longer where knots are farther apart.
+fn most<const D: usize>(vertices: usize) -> f64 {
+    if D == 3 {
+        MOST
+    } else {
+        (TURNING * vertices as f64).clamp(0.5 * MOST, MOST)
+    }
+}
+
 /// First iterate of a problem; also sets the `scale` of the problem. For a start in motion,
 /// `spread` is the factor on the time of the look-ahead.
 pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64>) -> Point<D> {
@@ -84,7 +97,8 @@ pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64
     let smoothing = ramp.min(0.5 * schedule.duration / (schedule.dips + 1) as f64);
     let total = schedule.duration + smoothing;
     let finest = total / (8 * (schedule.dips + 1)) as f64;
-    let h = coarse.min(finest).min(total / FEWEST).max(total / MOST);
+    let most = most::<D>(problem.vertices.len());
+    let h = coarse.min(finest).min(total / FEWEST).max(total / most);
     let spans = (total / h).ceil().clamp(FEWEST, MOST) as usize + 3;
     problem.scale = if moving {
         h
