@@ -5,12 +5,18 @@ use super::basis::weights;
 use super::newton::{Iterate, System, outer};
 use super::problem::{Problem, part, square};
 
+/// How much stiffer the time of a pass is tied to the nearest place than both balls hold it.
+const TIE: f64 = 1e3;
+
 /// A ball at one iterate.
 struct Ball<const D: usize> {
     /// First control point, and its weights.
     first: usize,
     weights: [f64; 5],
     gradient: [f64; D],
+    /// The gradient for each unit of the weights' rate: the pass moves with the velocity.
+    turned: [f64; D],
+    rates: [f64; 5],
     /// The Hessian, before the passing time is eliminated; nothing couples two groups.
     blocks: [[[f64; 3]; 3]; 2],
     /// The Hessian times the velocity.
@@ -19,6 +25,8 @@ struct Ball<const D: usize> {
     stiff: f64,
     /// How the place moves with `z`, if the end is in motion.
     slide: Option<[f64; D]>,
+    /// What the slope along `z` gains with the velocity, if the end is in motion.
+    slope: f64,
 }
 
 impl<const D: usize> Ball<D> {
@@ -26,15 +34,18 @@ impl<const D: usize> Ball<D> {
         let (point, room) = (at.point, at.room);
         let (first, share) = point.locate(point.crossings[i]);
         let [p, v, a] = point.at(point.crossings[i]);
-        let weights = weights(share)[0];
+        let [weights, rates, _] = weights(share);
         let mut ball = Self {
             first,
             weights,
             gradient: [0.0; D],
+            turned: [0.0; D],
+            rates,
             blocks: [[[0.0; 3]; 3]; 2],
             bent: [0.0; D],
             stiff: 0.0,
             slide: None,
+            slope: 0.0,
         };
         let mut damping = 0.0;
         for g in 0..Problem::<D>::GROUPS {
@@ -46,18 +57,44 @@ impl<const D: usize> Ball<D> {
                 ball.gradient[3 * g + d] = 2.0 * slack * y[d];
             }
         }
+        if at.problem.is_nearest(&v) {
+            let offset = [0, 1, 2].map(|d| p[d] - goal[d]);
+            ball.hold(&v, &a, &offset);
+        }
         ball.bent = ball.times(&v);
         ball.stiff = (0..D).map(|d| ball.bent[d] * v[d]).sum::<f64>() + damping;
         if !at.slides.is_empty() {
             let mut slide = [0.0; D];
-            for (weight, change) in weights.iter().zip(&at.slides[first..]) {
+            let both = weights.iter().zip(&rates);
+            for ((weight, rate), change) in both.zip(&at.slides[first..]) {
                 for d in 0..D {
                     slide[d] += weight * change[d];
+                    ball.slope += rate * change[d] * ball.turned[d];
                 }
             }
             ball.slide = Some(slide);
         }
         ball
+    }
+
+    /// Ties the pass to where the place is nearest, at `offset` from the ball's centre: its time follows the place,
+    /// and what the other group gains with the time is a slope of the place.
+    fn hold(&mut self, v: &[f64; D], a: &[f64; D], offset: &[f64; 3]) {
+        let speed = square(&part(v, 0));
+        let bend: f64 = (0..3).map(|d| offset[d] * a[d]).sum();
+        let moved = dot(&self.gradient, v) / (speed + bend).max(0.5 * speed);
+        for d in 0..3 {
+            self.gradient[d] -= moved * v[d];
+            self.turned[d] = -moved * offset[d];
+        }
+        let bent = self.times(v);
+        let stiff = (0..D).map(|d| bent[d] * v[d]).sum::<f64>();
+        let tie = TIE * stiff / (speed * speed);
+        for d in 0..3 {
+            for e in 0..3 {
+                self.blocks[0][d][e] += tie * v[d] * v[e];
+            }
+        }
     }
 
     /// The Hessian times a vector.
@@ -110,7 +147,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         if let Some(slide) = &ball.slide {
             border = ball.times(slide);
             drawn = dot(&ball.bent, slide);
-            self.gradient_z += dot(&ball.gradient, slide);
+            self.gradient_z += dot(&ball.gradient, slide) + ball.slope;
             self.hessian_z += dot(&border, slide);
         }
         let free = self.sides.len() / D;
@@ -122,7 +159,8 @@ impl<const D: usize, const B: usize> System<D, B> {
                 };
                 let row = Self::row(free, k, g);
                 for d in 0..3 {
-                    self.sides[row + d][0] += ball.weights[i] * ball.gradient[3 * g + d];
+                    self.sides[row + d][0] += ball.weights[i] * ball.gradient[3 * g + d]
+                        + ball.rates[i] * ball.turned[3 * g + d];
                     self.sides[row + d][1] += ball.weights[i] * border[3 * g + d];
                 }
                 for j in (0..=i).filter(|j| ball.first + j >= 4) {
@@ -168,6 +206,7 @@ impl<const D: usize, const B: usize> System<D, B> {
                 self.gradient_z += ball.gradient[d] * slide[d];
                 self.hessian_z += slide[d] * border[d];
             }
+            self.gradient_z += ball.slope;
         }
         let free = self.sides.len() / D;
         let (first, w) = (ball.first, &ball.weights);
@@ -177,7 +216,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             }
             let row = (first + i - 4) * D;
             for d in 0..D {
-                self.sides[row + d][0] += w[i] * ball.gradient[d];
+                self.sides[row + d][0] += w[i] * ball.gradient[d] + ball.rates[i] * ball.turned[d];
                 self.sides[row + d][1] += w[i] * border[d];
             }
             for j in (0..=i).filter(|j| first + j >= 4) {
@@ -195,7 +234,7 @@ impl<const D: usize, const B: usize> System<D, B> {
 
 #[cfg(test)]
 mod tests {
-    use crate::smooth::spline::newton::System;
+    use crate::smooth::spline::newton::{Barrier, System};
     use crate::smooth::spline::problem::{Group, Problem, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::start;
@@ -223,14 +262,16 @@ mod tests {
             finish: None,
             scale: 1.0,
             anchor: None,
+            nearest: false,
         }
     }
 
     /// With the passing times as unknowns the Newton step is the same.
     #[test]
     fn bands_of_their_own_give_the_same_step() {
-        for speed in [0.0, 0.1] {
+        for (speed, nearest) in [(0.0, false), (0.1, false), (0.0, true), (0.1, true)] {
             let mut problem = problem(speed);
+            problem.nearest = nearest;
             let mut point = start::first(&mut problem, (speed > 0.0).then_some(1.0));
             problem.pin(&mut point);
             project(&problem, &mut point, None, 20);
@@ -249,6 +290,47 @@ mod tests {
             }
             assert!((whole.z - apart.z).abs() < 1e-7 * whole.z.abs());
             assert!((whole.decrement / apart.decrement - 1.0).abs() < 1e-7);
+        }
+    }
+
+    /// The barrier falls along a step as fast as the step says, wherever poses are passed: each trial looks for its
+    /// passes again.
+    #[test]
+    fn the_slope_of_a_step_is_that_of_the_barrier() {
+        for nearest in [false, true] {
+            let mut problem = problem(0.1);
+            problem.nearest = nearest;
+            let mut point = start::first(&mut problem, Some(1.0));
+            problem.pin(&mut point);
+            project(&problem, &mut point, None, 40);
+            let room = Room::new(&problem, &point);
+            project(&problem, &mut point, Some(&room), 40);
+            let weight = problem.parameter(&point) / point.z;
+            let step = System::<6, 36>::new(&point).step(&problem, &point, &room, weight);
+            let step = step.unwrap();
+            let barrier = Barrier {
+                problem: &problem,
+                room: &room,
+                weight,
+                keep: 0.0,
+            };
+            let value = |share: f64| {
+                let mut trial = point.clone();
+                trial.z += share * step.z;
+                let free = trial.control.iter_mut().skip(4);
+                for (to, change) in free.zip(step.control.chunks_exact(6)) {
+                    for d in 0..6 {
+                        to[d] += share * change[d];
+                    }
+                }
+                problem.pin(&mut trial);
+                project(&problem, &mut trial, Some(&room), 40);
+                let seen = barrier.look(&trial, &[]).unwrap();
+                barrier.value(&trial, &seen)
+            };
+            let slope = (value(1e-5) - value(-1e-5)) / 2e-5;
+            let off = (slope + step.decrement).abs() / step.decrement;
+            assert!(off < 0.01, "{nearest}: {slope} {}", step.decrement);
         }
     }
 }

@@ -66,6 +66,9 @@ pub(crate) struct Request<'a> {
     pub(crate) coupled: bool,
     /// A motion from the same start through the same poses that holds, to start the search from.
     pub(crate) known: Option<&'a [Span]>,
+    /// Whether a pose is passed where its place is nearest, whatever the angle is there; otherwise where both balls
+    /// are met best.
+    pub(crate) nearest: bool,
 }
 
 impl Request<'_> {
@@ -259,6 +262,7 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
             anchor: None,
+            nearest: self.request.nearest && D > 3,
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;

@@ -8,6 +8,9 @@
 
 use super::basis::{self, START, weights};
 
+/// Way from knot to knot, in radii of a ball, from which a pose has a nearest place.
+const MOVES: f64 = 0.05;
+
 /// Limits of one group of three coordinates (position, or rotation vector).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group {
@@ -37,6 +40,8 @@ pub(crate) struct Problem<const D: usize> {
     /// While a first iterate from a start in motion breaks limits, its first control points stay
     /// those of this `z`; a greater `z` only widens limits.
     pub(crate) anchor: Option<f64>,
+    /// Whether a pose is passed where the first group is nearest to it, as long as that moves.
+    pub(crate) nearest: bool,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -75,6 +80,12 @@ impl<const D: usize> Problem<D> {
     /// Knot spacing, s.
     pub(crate) fn spacing(&self, z: f64) -> f64 {
         self.scale * z.cbrt()
+    }
+
+    /// Whether the pass is where the first group is nearest, which has this velocity to knots: at a rest that would
+    /// be nowhere.
+    pub(crate) fn is_nearest(&self, velocity: &[f64; D]) -> bool {
+        self.nearest && square(&part(velocity, 0)) > (MOVES * self.groups[0].radius).powi(2)
     }
 
     /// Inner vertices: those with a ball.

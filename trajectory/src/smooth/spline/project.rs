@@ -63,7 +63,9 @@ pub(crate) fn project<const D: usize>(
         for _ in 0..rounds {
             let [p, v, a] = point.at(time);
             let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
-            for g in 0..Problem::<D>::GROUPS {
+            let nearest = problem.is_nearest(&v);
+            let groups = if nearest { 1 } else { Problem::<D>::GROUPS };
+            for g in 0..groups {
                 let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
                 for d in 3 * g..3 * g + 3 {
                     let y = p[d] - goal[d];
@@ -73,7 +75,7 @@ pub(crate) fn project<const D: usize>(
                     speed += v[d] * v[d];
                 }
                 let slack = room.map_or(0.0, |room| room.balls[g][i].powi(2) - away);
-                let inside = D > 3 && slack > 0.0;
+                let inside = D > 3 && !nearest && slack > 0.0;
                 let scale = if inside { 1.0 / slack } else { scales[g] };
                 slope += scale * along;
                 bend += scale * bent;
