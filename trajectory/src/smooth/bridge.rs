@@ -28,11 +28,6 @@ const ROUNDS: usize = 2;
 const KNOTS_PER_CORNER: f64 = 6.0;
 /// Factor on the time of a motion before its rests are bridged: a state at a limit leaves a search no room.
 const ROOM: f64 = 1.0 + 2e-6;
-/// Share of its reach by which an end of a bridge may move, samples to either side, and what the largest move
-/// has to gain of a limit.
-const SHIFT: f64 = 0.3;
-const SHIFTS: i32 = 8;
-const FARTHER: f64 = 0.2;
 /// Share of its time that a bridge has to save at least.
 const GAIN: f64 = 1e-4;
 /// Difference of two states that are the same, in the units of the normal form: rounding of jerks is the largest.
@@ -174,43 +169,10 @@ impl Bridges<'_> {
         let before = k.checked_sub(1).map_or(0.0, |k| self.rests[k].time);
         let end = self.spans.last().map_or(0.0, Span::end);
         let after = self.rests.get(k + 1).map_or(end, |rest| rest.time);
-        let ends = [
+        [
             (time - reach * brake).max(0.5 * (before + time)),
             (time + reach * brake).min(0.5 * (time + after)),
-        ];
-        ends.map(|end| self.calm(end, SHIFT * (end - time).abs()))
-    }
-
-    /// The time, at most `shift` (s) from another one, at which the motion has the most room below its limits,
-    /// less for times farther away: a search that begins or ends at a limit has nowhere to go.
-    fn calm(&self, time: f64, shift: f64) -> f64 {
-        let strain = |step: i32| {
-            let share = f64::from(step) / f64::from(SHIFTS);
-            let at = time + share * shift;
-            let used = self.state(at).map_or(1.0, |state| self.used(&state));
-            (at, used + FARTHER * share.abs())
-        };
-        let steps = (-SHIFTS..=SHIFTS).map(strain);
-        steps
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map_or(time, |best| best.0)
-    }
-
-    /// The largest share of a limit of acceleration or jerk that a state uses. A motion may go on at the limit of
-    /// its speed, so that counts only near the limit.
-    fn used(&self, state: &ToolPoint) -> f64 {
-        let limits = &self.options.limits;
-        let [linear, angular] =
-            [state.linear, state.angular].map(|rates| rates.map(|rate| rate.norm()));
-        let shares = [
-            (linear[0] / limits.speed).powi(8),
-            linear[1] / limits.acceleration,
-            linear[2] / limits.jerk,
-            (angular[0] / limits.angular_speed).powi(8),
-            angular[1] / limits.angular_acceleration,
-            angular[2] / limits.angular_jerk,
-        ];
-        shares.into_iter().fold(0.0, f64::max)
+        ]
     }
 
     /// Knot spacing of a bridge, s: as in other splines, and finer if the tolerance shows corners.
