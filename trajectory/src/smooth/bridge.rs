@@ -7,6 +7,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::certificate::certify;
 use super::choose::{Then, Window, stretch};
 use super::crossing::crossings;
 use super::method::Method;
@@ -135,12 +136,30 @@ impl Bridges<'_> {
         let most = (to - from) * (1.0 - GAIN);
         let bridge = window.spline(Some(&known), most)?;
         joins(&bridge.spans, &ends).then_some(())?;
-        let times = crossings(&bridge.spans, window.poses, self.options);
+        let (certificate, times) = certify(&bridge.spans, window.poses, self.options);
+        // What the bridge exceeds a limit by the whole motion is slowed down by.
+        let slower = if certificate.holds() {
+            1.0
+        } else {
+            certificate.stretch() * ROOM
+        };
+        let total = self.spans.last().map_or(0.0, Span::end);
+        (bridge.duration() + (slower - 1.0) * total <= most).then_some(())?;
         for (time, pass) in self.passes[first..after].iter_mut().zip(times) {
             *time = from + pass.time;
         }
         self.replace(k, [from, to], bridge.spans);
+        self.slow_down(slower);
         Some(())
+    }
+
+    /// Takes so many times the time for all of the motion.
+    fn slow_down(&mut self, factor: f64) {
+        stretch(&mut self.spans, factor);
+        let rests = self.rests.iter_mut().map(|rest| &mut rest.time);
+        for time in rests.chain(&mut self.passes) {
+            *time *= factor;
+        }
     }
 
     /// When the bridge over a rest begins and ends, s.

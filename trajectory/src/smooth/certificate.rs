@@ -96,8 +96,13 @@ impl Certificate {
     /// True when the order, the tolerances, the corridor and all limits hold, and nothing jumps.
     #[must_use]
     pub fn holds(&self) -> bool {
+        self.holds_within(ROUNDING)
+    }
+
+    /// The same, but limits may be exceeded up to a ratio.
+    pub(super) fn holds_within(&self, ratio: f64) -> bool {
         let whole = self.in_order && self.jump.ratio <= 1.0;
-        whole && self.corridor.ratio <= ROUNDING && self.worst_limit() <= ROUNDING
+        whole && self.corridor.ratio <= ROUNDING && self.worst_limit() <= ratio
     }
 
     /// The greatest ratio over the six limits of motion.

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{Certificate, certify};
+use super::certificate::{Certificate, Peak, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
@@ -11,7 +11,7 @@ use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::span::Span;
 use super::spline::{self, Effort, Moving, Request};
-use crate::ToolPoint;
+use crate::{ToolLimits, ToolPoint};
 
 /// Effort of one spline, but for the gap to its optimum.
 const EFFORT: Effort = Effort {
@@ -28,6 +28,12 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
+
+/// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
+const AT_END: f64 = 1.0 + 1e-3;
+
+/// A motion between two ends in motion that exceeds a limit by no more may be slowed down as a whole.
+const NEARLY: f64 = 1.03;
 
 /// Spread of a start in motion that was too fast.
 const SPREAD: f64 = 1.2;
@@ -166,9 +172,17 @@ impl<'a> Window<'a> {
 }
 
 impl Attempts<'_> {
-    /// A certified spline, and whether an attempt before it failed by far; bounds that one attempt breaks are
-    /// narrowed for the next one.
+    /// A certified spline, and whether an attempt before it failed by far; between two ends in motion else the first
+    /// that exceeds its limits by no more than [`NEARLY`].
     fn run(mut self) -> Option<(Vec<Span>, bool)> {
+        let mut nearly = None;
+        let held = self.held(&mut nearly);
+        held.or(nearly)
+    }
+
+    /// The same without the one that is `nearly` within its limits; bounds that one attempt breaks are narrowed for
+    /// the next one.
+    fn held(&mut self, nearly: &mut Option<(Vec<Span>, bool)>) -> Option<(Vec<Span>, bool)> {
         let Window {
             poses,
             options,
@@ -206,6 +220,9 @@ impl Attempts<'_> {
             if certificate.holds() && settled {
                 return Some((spans, retried));
             }
+            if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
+                *nearly = Some((spans.clone(), retried));
+            }
             // Narrower bounds make it slower still.
             let slow = spans.last().map_or(0.0, Span::end) > self.most;
             let last = request.coupled || !turns;
@@ -220,12 +237,31 @@ impl Attempts<'_> {
                 continue;
             }
             retried |= broken(&certificate, &crossings) > FAR;
-            narrow(&mut self.inner, &certificate, &crossings, request.coupled);
-            if certificate.in_order && !settled {
-                self.inner.tolerance *= 0.5;
-            }
+            self.narrow((&certificate, &crossings), request.coupled, settled)?;
         }
         None
+    }
+
+    /// Prepares the attempt after one that broke bounds; `None` if it would be the same.
+    fn narrow(
+        &mut self,
+        (certificate, crossings): (&Certificate, &[Crossing]),
+        coupled: bool,
+        settled: bool,
+    ) -> Option<()> {
+        let Window { moving, finish, .. } = self.window;
+        let before = self.inner.clone();
+        narrow(&mut self.inner, certificate, crossings, coupled);
+        if let Some((moving, finish)) = moving.zip(finish) {
+            self.inner.limits = between(&before.limits, certificate, [&moving.state, finish]);
+            if self.inner == before {
+                return None;
+            }
+        }
+        if certificate.in_order && !settled {
+            self.inner.tolerance *= 0.5;
+        }
+        Some(())
     }
 
     /// Prepares the attempt after one that found no spline; `None` if there is no other way.
@@ -293,6 +329,37 @@ fn narrow(
     if over > 1.0 {
         let share = 0.99 / over.min(4.0);
         options.limits = options.limits.scaled(share, share);
+    }
+}
+
+/// The limits of a motion between two states, without a share of those that it exceeded. None is below what the
+/// states have: no motion would keep it.
+fn between(limits: &ToolLimits, certificate: &Certificate, ends: [&ToolPoint; 2]) -> ToolLimits {
+    let lower = |limit: f64, peak: Peak, rate: fn(&ToolPoint) -> f64| {
+        let least = ends.into_iter().map(rate).fold(0.0, f64::max);
+        if peak.ratio > 1.0 {
+            (limit * 0.99 / peak.ratio.min(4.0)).max(limit.min(AT_END * least))
+        } else {
+            limit
+        }
+    };
+    ToolLimits {
+        speed: lower(limits.speed, certificate.speed, |end| end.linear[0].norm()),
+        acceleration: lower(limits.acceleration, certificate.acceleration, |end| {
+            end.linear[1].norm()
+        }),
+        jerk: lower(limits.jerk, certificate.jerk, |end| end.linear[2].norm()),
+        angular_speed: lower(limits.angular_speed, certificate.angular_speed, |end| {
+            end.angular[0].norm()
+        }),
+        angular_acceleration: lower(
+            limits.angular_acceleration,
+            certificate.angular_acceleration,
+            |end| end.angular[1].norm(),
+        ),
+        angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
+            end.angular[2].norm()
+        }),
     }
 }
 
