@@ -230,6 +230,12 @@ impl<const D: usize, const B: usize> System<D, B> {
             }
             first[g] = Self::row(free, ball.first.saturating_sub(4), g);
         }
+        self.add_time(ball, first, drawn);
+    }
+
+    /// Adds the passing time of a ball as an unknown: the rows where its groups begin, and what couples it with `z`.
+    fn add_time(&mut self, ball: &Ball<D>, first: [usize; 2], drawn: f64) {
+        let free = self.sides.len() / D;
         if ball.stiff <= 0.0 {
             return;
         }

@@ -145,11 +145,11 @@ fn unroll(poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
     result
 }
 
-struct Task<'a> {
+pub(super) struct Task<'a> {
     request: &'a Request<'a>,
-    poses: &'a [Isometry3<f64>],
+    pub(super) poses: &'a [Isometry3<f64>],
     vectors: Vec<Vector3<f64>>,
-    options: &'a SmoothOptions,
+    pub(super) options: &'a SmoothOptions,
     moving: Option<&'a Moving>,
 }
 
@@ -169,18 +169,6 @@ impl Task<'_> {
             }
         }
         result
-    }
-
-    /// Whether the place alone says when each inner pose is passed: the legs beside it are not turns on the spot.
-    fn led(&self) -> Vec<bool> {
-        let far = |pair: &[Isometry3<f64>]| {
-            let way = pair[1].translation.vector - pair[0].translation.vector;
-            way.norm() > self.options.tolerance
-        };
-        let around = self.poses.windows(3);
-        around
-            .map(|three| far(&three[..2]) && far(&three[1..]))
-            .collect()
     }
 
     fn groups(&self, used: [bool; 2]) -> [Group; 2] {
@@ -294,36 +282,6 @@ impl Task<'_> {
         Some(self.spans(&problem, &point, used))
     }
 
-    /// The inner vertices where the motion of an iterate sees the poses: the rotation vector of a pose is that of
-    /// the iterate at the pass, less the turn from the pose to the motion there.
-    fn aims<const D: usize>(&self, problem: &Problem<D>, point: &Point<D>) -> Vec<[f64; D]> {
-        let h = problem.spacing(point.z);
-        let rotations = self.rotations(problem, point, D - 3, h);
-        let passes = point.crossings.iter().zip(problem.inner());
-        let aim = |(i, (time, vertex)): (usize, (&f64, &[f64; D]))| {
-            let (span, share) = point.locate(*time);
-            let control = &rotations[span..span + 5];
-            let span = Span {
-                start: 0.0,
-                duration: h,
-                point: [Vector3::zeros(); 5],
-                base: control[0],
-                turns: turns(control, h),
-            };
-            let off = body_turn(
-                &self.poses[i + 1].rotation,
-                &span.at(share * h).pose.rotation,
-            );
-            let at = point.at(*time)[0];
-            let mut aim = *vertex;
-            for d in 0..3 {
-                aim[D - 3 + d] = at[D - 3 + d] - off[d];
-            }
-            aim
-        };
-        passes.enumerate().map(aim).collect()
-    }
-
     /// First iterate from a known motion.
     fn known<const D: usize>(
         &self,
@@ -404,7 +362,7 @@ impl Task<'_> {
     ///
     /// Rolling a polygon of rotation vectors keeps every angular rate; cutting its corners changes
     /// its end by the square of the tolerance.
-    fn rotations<const D: usize>(
+    pub(super) fn rotations<const D: usize>(
         &self,
         problem: &Problem<D>,
         point: &Point<D>,

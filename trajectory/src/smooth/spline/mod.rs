@@ -6,6 +6,7 @@
 //! uniform splines is convex, and its barrier method are this project's own;
 //! see docs/decisions/0050-smooth-spline.md.
 
+mod aims;
 mod balls;
 mod band;
 mod basis;

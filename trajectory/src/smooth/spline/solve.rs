@@ -86,6 +86,23 @@ impl Pace {
     }
 }
 
+impl Pace {
+    /// The barrier of a problem at this pace.
+    fn barrier<'a, const D: usize>(
+        &self,
+        problem: &'a Problem<D>,
+        room: &'a Room,
+        weight: f64,
+    ) -> Barrier<'a, D> {
+        Barrier {
+            problem,
+            room,
+            weight,
+            keep: self.keep,
+        }
+    }
+}
+
 /// Most Newton steps between two ends in motion.
 const BETWEEN: usize = 400;
 
@@ -135,22 +152,15 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         let Some(step) = system.step(problem, point, &room, weight) else {
             return done.then_some(count);
         };
-        let barrier = Barrier {
-            problem,
-            room: &room,
-            weight,
-            keep: pace.keep,
-        };
-        let share = known.search(&barrier, point, &step, pace.rounds);
+        let barrier = &pace.barrier(problem, &room, weight);
+        let share = known.search(barrier, point, &step, pace.rounds);
         let moved = share > 0.0;
         if slow.is_new(tight && share < SHORT && step.decrement < pace.low) {
             weight = weight.min(parameter / (2.0 * point.z));
         }
         let centred = step.decrement < if done { pace.centre } else { ROUGHLY };
-        let looks = !moved || centred || (count + 1).is_multiple_of(AIMING);
-        let missed = aims
-            .filter(|_| done && looks)
-            .map_or(0.0, |aims| aim(problem, point, (&room, &mut known), aims));
+        let looks = done && (!moved || centred || (count + 1).is_multiple_of(AIMING));
+        let missed = aim(problem, point, (&room, &mut known), aims.filter(|_| looks));
         if moved && !centred {
             continue;
         }
@@ -192,9 +202,11 @@ fn aim<const D: usize>(
     problem: &mut Problem<D>,
     point: &Point<D>,
     (room, known): (&Room, &mut Known),
-    aims: Aims<'_, D>,
+    aims: Option<Aims<'_, D>>,
 ) -> f64 {
-    let aims = aims(problem, point);
+    let Some(aims) = aims.map(|aims| aims(problem, point)) else {
+        return 0.0;
+    };
     let before = (problem.vertices.clone(), problem.ways.clone());
     let look = |problem: &Problem<D>, slacks: &[f64]| {
         let barrier = Barrier {
