@@ -236,6 +236,9 @@ impl<const N: usize> Loop<'_, N> {
         let mut timer = PeriodicTimer::new(period);
         loop {
             let begin = self.origin + self.tick * period;
+            timer.sleep(begin);
+            // While it waits actively for the period: what the driver said is at hand when it begins.
+            let came = self.receive(now_ns(), period);
             let now_ns = timer.wait(begin);
             let late = now_ns.saturating_sub(begin);
             self.shared.latency.count(late);
@@ -247,7 +250,6 @@ impl<const N: usize> Loop<'_, N> {
                 now_ns,
                 skipped,
             };
-            let came = self.receive(now_ns, period);
             self.work(came, tick);
             let work = scheduling::now_ns().saturating_sub(now_ns);
             self.shared.work.count(work);
@@ -363,10 +365,10 @@ impl<const N: usize> Loop<'_, N> {
     }
 }
 
-/// Waits until a time: sleeps until a little earlier, by the usual wake-up delay, and waits
-/// actively for the rest.
+/// Waits until a time: sleeps until a little earlier, by the usual wake-up delay and what is done before the time, and
+/// waits actively for the rest.
 struct PeriodicTimer {
-    /// How much earlier (ns): three of four wake-up delays are shorter.
+    /// How much earlier (ns): three of four delays are shorter.
     early: u64,
     /// The most of it (ns).
     most: u64,
@@ -386,10 +388,14 @@ impl PeriodicTimer {
         }
     }
 
-    /// Waits until `begin` (ns); returns the time then.
+    /// Sleeps until a little before `begin` (ns).
+    fn sleep(&self, begin: u64) {
+        sleep_until_ns(begin.saturating_sub(self.early));
+    }
+
+    /// Waits actively until `begin` (ns), after [`Self::sleep`] and what is done before; returns the time then.
     fn wait(&mut self, begin: u64) -> u64 {
         let bed = begin.saturating_sub(self.early);
-        sleep_until_ns(bed);
         let mut now = now_ns();
         // It stands where three are shorter for each one that is longer.
         self.early = if now.saturating_sub(bed) > self.early {
