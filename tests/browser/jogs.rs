@@ -98,6 +98,9 @@ pub(crate) fn a_jog_ends_with_every_doubt() {
             None => println!("| {} | late answers had ended the jog each time | |", way.0),
         }
     }
+    // Chromium since 156.0.8078.79 closes the socket of a tab that it freezes, and says so.
+    tab.complaints
+        .retain(|text| !text.contains("Page entered Back-Forward Cache"));
     assert!(tab.complaints.is_empty(), "{:#?}", tab.complaints);
     resume(&browser);
 }

@@ -7,11 +7,13 @@
 //! see docs/decisions/0050-smooth-spline.md.
 
 mod aims;
+mod ball;
 mod balls;
 mod band;
 mod basis;
 mod build;
 mod ends;
+mod iterate;
 mod known;
 mod newton;
 mod passes;
