@@ -14,6 +14,7 @@
 )]
 
 use kinematics::{Chain, Solver, urdf};
+use measure::Random;
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
 use rs_opw_kinematics::kinematic_traits::Kinematics as _;
 use std::fmt::Write as _;
@@ -34,21 +35,9 @@ fn chain<const N: usize>(name: &str) -> Chain<N> {
     urdf::read(&text(name), None).unwrap().chain().unwrap()
 }
 
-/// SplitMix64, the same numbers on every machine.
-struct Random(u64);
-
-impl Random {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        low + (high - low) * (((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64)
-    }
-
-    fn joints<const N: usize>(&mut self, chain: &Chain<N>) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| self.between(chain.lower()[i], chain.upper()[i]))
-    }
+/// Random joint positions inside the limits.
+fn joints<const N: usize>(random: &mut Random, chain: &Chain<N>) -> SVector<f64, N> {
+    random.within(chain.lower(), chain.upper())
 }
 
 /// Nanoseconds per input: the inputs are divided into small lots, and the fastest of several passes
@@ -73,8 +62,8 @@ fn nanoseconds<T>(inputs: &[T], mut work: impl FnMut(&T)) -> f64 {
 /// Forward kinematics and Jacobian of ours and of `k`; returns the ratio.
 fn forward<const N: usize>(name: &str) -> f64 {
     let chain = chain::<N>(name);
-    let mut random = Random(1);
-    let inputs: Vec<SVector<f64, N>> = (0..POSES).map(|_| random.joints(&chain)).collect();
+    let mut random = Random::new(1);
+    let inputs: Vec<SVector<f64, N>> = (0..POSES).map(|_| joints(&mut random, &chain)).collect();
     let alone = nanoseconds(&inputs, |q| _ = black_box(chain.forward(q)));
     let ours = nanoseconds(&inputs, |q| _ = black_box(chain.jacobian(q)));
     let plain = chain.plain();
@@ -93,10 +82,10 @@ fn forward<const N: usize>(name: &str) -> f64 {
 /// All branches of one closed form, ns per pose; checks that the original joint position is found.
 fn branches<const N: usize>(name: &str) -> f64 {
     let solver = Solver::new(chain::<N>(name));
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let inputs: Vec<_> = (0..POSES)
         .map(|_| {
-            let q = random.joints(solver.chain());
+            let q = joints(&mut random, solver.chain());
             (solver.chain().forward(&q), solver.parameter(&q), q)
         })
         .collect();
@@ -121,7 +110,7 @@ fn branches<const N: usize>(name: &str) -> f64 {
 /// A UR5e with calibration errors of 0.5 mm and 0.05 degrees in every link: all branches from the
 /// approximate closed form, polished. Prints the time per branch.
 fn calibrated() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let (mut time, mut count, mut found) = (0.0, 0, 0);
     const ARMS: usize = 10;
     for _ in 0..ARMS {
@@ -134,7 +123,7 @@ fn calibrated() {
         let solver = Solver::new(model.chain::<6>().unwrap());
         let inputs: Vec<_> = (0..POSES / ARMS)
             .map(|_| {
-                let q = random.joints(solver.chain());
+                let q = joints(&mut random, solver.chain());
                 (solver.chain().forward(&q), q)
             })
             .collect();
@@ -174,10 +163,10 @@ fn opw() -> f64 {
         ..Parameters::new()
     });
     let arm = chain::<6>("irb120");
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     let inputs: Vec<_> = (0..POSES)
         .map(|_| {
-            let q = random.joints(&arm);
+            let q = joints(&mut random, &arm);
             peer.forward(&[q[0], q[1], q[2], q[3], q[4], q[5]])
         })
         .collect();
@@ -231,10 +220,10 @@ fn cold<const N: usize>(
 
 fn cold_arm<const N: usize>(name: &str, ours: &mut String) -> usize {
     let chain = chain::<N>(name);
-    let mut random = Random(3);
-    let sources: Vec<_> = (0..POSES).map(|_| random.joints(&chain)).collect();
+    let mut random = Random::new(3);
+    let sources: Vec<_> = (0..POSES).map(|_| joints(&mut random, &chain)).collect();
     let poses: Vec<_> = sources.iter().map(|q| chain.forward(q)).collect();
-    let seeds: Vec<_> = (0..POSES).map(|_| random.joints(&chain)).collect();
+    let seeds: Vec<_> = (0..POSES).map(|_| joints(&mut random, &chain)).collect();
     let mut csv = String::from("x,y,z,qw,qx,qy,qz");
     for i in 1..=N {
         let _ = write!(csv, ",seed{i}");
@@ -274,11 +263,11 @@ fn cold_arm<const N: usize>(name: &str, ours: &mut String) -> usize {
 
 /// Median ns of a servo tick: the pose moves on by 0.25 mm and 0.5 mrad.
 fn tick<const N: usize>(name: &str, solver: &Solver<N>) -> f64 {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let axis = Vector3::new(0.36, 0.48, 0.8);
     let mut times = Vec::new();
     for _ in 0..POSES {
-        let q = random.joints(solver.chain());
+        let q = joints(&mut random, solver.chain());
         let pose = solver.chain().forward(&q);
         let turn = UnitQuaternion::from_scaled_axis(axis * 5e-4);
         let next = Isometry3::from_parts(

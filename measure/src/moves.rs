@@ -8,7 +8,7 @@ use planner::robot::{Robot, RobotError};
 use planner::task::{Move, Shape};
 use planner::with_dof;
 
-use crate::{Ends, Problems};
+use crate::Random;
 
 /// One planned move.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,7 @@ impl RandomMoves {
             robot.joint_limits::<N>(),
             robot.joint_names(),
         );
-        let mut random = Problems::new(self.seed, Ends::Resting);
+        let mut random = Random::scattered(self.seed);
         let mut times = Vec::with_capacity(self.count);
         for _ in 0..self.count {
             let start = joints(&planner, &mut random);
@@ -94,7 +94,7 @@ impl RandomMoves {
         &self,
         planner: &Planner<N>,
         start: &SVector<f64, N>,
-        random: &mut Problems,
+        random: &mut Random,
     ) -> Vec<Isometry3<f64>> {
         let mut pose = planner.chain().forward(start);
         let count = match self.shape {
@@ -112,7 +112,7 @@ impl RandomMoves {
 }
 
 /// Random joint positions within the limits.
-fn joints<const N: usize>(planner: &Planner<N>, random: &mut Problems) -> SVector<f64, N> {
+fn joints<const N: usize>(planner: &Planner<N>, random: &mut Random) -> SVector<f64, N> {
     let (lower, upper) = (planner.chain().lower(), planner.chain().upper());
     SVector::from_fn(|i, _| {
         let (low, high) = (lower[i].max(-HALF_TURN), upper[i].min(HALF_TURN));
@@ -120,6 +120,6 @@ fn joints<const N: usize>(planner: &Planner<N>, random: &mut Problems) -> SVecto
     })
 }
 
-fn vector(random: &mut Problems, size: f64) -> Vector3<f64> {
+fn vector(random: &mut Random, size: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| random.between(-size, size))
 }

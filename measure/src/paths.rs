@@ -3,6 +3,8 @@
 use nalgebra::SVector;
 use trajectory::{JointLimits, SplinePath};
 
+use crate::Random;
+
 /// Random spline paths of `N` joints through waypoints within a radian of zero, with the limits
 /// that the published comparisons use: 2 rad/s, 10 rad/s², 100 rad/s³.
 ///
@@ -16,7 +18,7 @@ use trajectory::{JointLimits, SplinePath};
 /// ```
 #[derive(Clone, Debug)]
 pub struct RandomPaths<const N: usize> {
-    state: u64,
+    random: Random,
     waypoints: usize,
 }
 
@@ -24,7 +26,7 @@ impl<const N: usize> RandomPaths<N> {
     /// Paths of this many waypoints (two at least), from this seed.
     pub fn new(seed: u64, waypoints: usize) -> Self {
         Self {
-            state: seed,
+            random: Random::new(seed),
             waypoints: waypoints.max(2),
         }
     }
@@ -33,20 +35,6 @@ impl<const N: usize> RandomPaths<N> {
     pub fn limits() -> JointLimits<N> {
         JointLimits::uniform(2.0, 10.0, 100.0)
     }
-
-    /// The next number, even in -1 to 1.
-    ///
-    /// # Source
-    /// SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators",
-    /// OOPSLA 2014.
-    fn number(&mut self) -> f64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
 }
 
 impl<const N: usize> Iterator for RandomPaths<N> {
@@ -54,7 +42,7 @@ impl<const N: usize> Iterator for RandomPaths<N> {
 
     fn next(&mut self) -> Option<SplinePath<N>> {
         let points: Vec<SVector<f64, N>> = (0..self.waypoints)
-            .map(|_| SVector::from_fn(|_, _| self.number()))
+            .map(|_| SVector::from_fn(|_, _| self.random.between(-1.0, 1.0)))
             .collect();
         SplinePath::new(&points)
     }

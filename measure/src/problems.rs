@@ -1,5 +1,6 @@
 //! Random problems from a seed, for benchmarks and tests.
 
+use crate::Random;
 use nalgebra::SVector;
 use trajectory::otg::{Limits, Options, Problem, State};
 
@@ -35,7 +36,7 @@ pub enum Ends {
 /// States", RSS 2021, and the benchmark published with it.
 #[derive(Clone, Debug)]
 pub struct Problems {
-    state: u64,
+    random: Random,
     ends: Ends,
 }
 
@@ -43,7 +44,7 @@ impl Problems {
     /// The sequence of `seed`.
     pub fn new(seed: u64, ends: Ends) -> Self {
         Self {
-            state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d,
+            random: Random::scattered(seed),
             ends,
         }
     }
@@ -100,22 +101,11 @@ impl Problems {
 
     /// An even number from `low` to `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        let bits = self.bits() >> 11;
-        low + (high - low) * (bits as f64 / (1u64 << 53) as f64)
+        self.random.between(low, high)
     }
 
-    /// A normal number of deviation 1 (Box and Muller, 1958).
+    /// A normal number of deviation 1.
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.between(0.0, 1.0)).cos()
-    }
-
-    /// 64 random bits (splitmix64; Steele, Lea and Flood, 2014).
-    fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.random.normal()
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use kinematics::{IkFailure, IkReport, Solution, Solver};
+use measure::Random;
 use nalgebra::{Isometry3, Quaternion, SVector, Translation3, UnitQuaternion};
 use planner::robot::Robot;
 
@@ -78,10 +79,10 @@ fn solve<const N: usize>(
         .chain::<N>()
         .map_err(|error| Failure::new(Exit::Unreadable, error))?;
     let solver = Solver::new(chain);
-    let mut random = Random(options.seed.unwrap_or(0));
+    let mut random = Random::new(options.seed.unwrap_or(0));
     let mut sheet = Sheet::new(N)?;
     for (row, pose) in poses.iter().enumerate() {
-        let start = options.seed.map(|_| random.joints(solver.chain()));
+        let start = options.seed.map(|_| joints(&mut random, solver.chain()));
         let begin = Instant::now();
         if options.all {
             let found = solver.solve_all(pose);
@@ -217,29 +218,10 @@ impl Sheet {
     }
 }
 
-/// A fixed sequence of joint positions inside the limits.
-///
-/// # Source
-/// G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014
-/// (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        bits ^= bits >> 31;
-        (bits >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn joints<const N: usize>(&mut self, chain: &kinematics::Chain<N>) -> SVector<f64, N> {
-        let (lower, upper) = (chain.lower(), chain.upper());
-        SVector::from_fn(|joint, _| {
-            let pi = std::f64::consts::PI;
-            let (low, high) = (lower[joint].max(-pi), upper[joint].min(pi));
-            low + self.next() * (high - low)
-        })
-    }
+/// Random joint positions inside the limits, within half a turn of zero.
+fn joints<const N: usize>(random: &mut Random, chain: &kinematics::Chain<N>) -> SVector<f64, N> {
+    let pi = std::f64::consts::PI;
+    let lower = chain.lower().map(|low| low.max(-pi));
+    let upper = chain.upper().map(|high| high.min(pi));
+    random.within(&lower, &upper)
 }
