@@ -1,5 +1,7 @@
 //! Opens or refuses a session.
 
+use std::path::Path;
+
 use ipc::{
     Clock, DriverFeatures, DriverState, FaultCode, Hello, HelloAck, MAX_TOOLS, Setpoint, Verdict,
     bytes_of, text_of,
@@ -136,14 +138,27 @@ impl<R: Robot> Driver<R> {
                 if session.process != hello.process =>
             {
                 let (owner, process) = (&session.owner, session.process);
-                Some((
-                    Verdict::Busy,
-                    format!("driven by {owner} (process {process})"),
-                ))
+                Some(if is_seen(process) {
+                    (
+                        Verdict::Busy,
+                        format!("driven by {owner} (process {process})"),
+                    )
+                } else {
+                    (
+                        Verdict::Wait,
+                        format!("{owner} (process {process}) is gone: the arm comes to rest"),
+                    )
+                })
             }
             _ if self.leaving => Some((Verdict::NotReady, "the driver ends".to_owned())),
             _ if !self.is_resting() => Some((Verdict::Wait, "the arm comes to rest".to_owned())),
             _ => None,
         }
     }
+}
+
+/// Whether a process runs, as far as the kernel tells this one. One that was killed is gone before the
+/// watchdog ends its session.
+fn is_seen(process: u32) -> bool {
+    Path::new("/proc").join(process.to_string()).exists()
 }

@@ -289,6 +289,27 @@ fn what_cannot_be_served_is_refused() {
     assert!(reason.contains("protocol 1, expected 2"), "{reason}");
 }
 
+/// Another engine is refused while the one that drives runs; when that was killed, it waits until the arm rests.
+#[test]
+fn an_engine_after_one_that_was_killed_waits() {
+    let mut ended = std::process::Command::new("true").spawn().unwrap();
+    let gone = ended.id();
+    assert!(ended.wait().unwrap().success());
+    for (owner, expected) in [(1, Verdict::Busy), (gone, Verdict::Wait)] {
+        let mut pair = Pair::new(Arm::default());
+        let mut hello = Hello::new(1, PERIOD, WATCHDOG, Clock::Wall);
+        hello.process = owner;
+        pair.ack = pair.driver.greet(&hello, pair.now);
+        assert_eq!(pair.ack.verdict, Verdict::Welcome as u32);
+        pair.sequence = 0;
+        let state = pair.hold(20);
+        assert_eq!(state.driver_state, DriverState::Active as u32);
+        assert_eq!(pair.greet(), expected);
+        let reason = text_of(&pair.ack.reason);
+        assert!(reason.contains(&format!("process {owner}")), "{reason}");
+    }
+}
+
 #[test]
 fn a_fault_of_the_hardware_is_told_in_its_words() {
     let mut pair = Pair::new(Arm {

@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import os
 import time
 
 from . import messages as m
@@ -110,7 +111,11 @@ class Driver:
             period = f"a period of {hello.period_ns * 1e-6:g} ms"
             return m.WRONG_PERIOD, f"{period}; this arm needs {least * 1e3:g} to {most * 1e3:g} ms"
         if self.following and self.hello.process != hello.process:
-            return m.BUSY, f"driven by process {self.hello.process}"
+            process = self.hello.process
+            if os.path.exists(f"/proc/{process}"):
+                return m.BUSY, f"driven by process {process}"
+            # It was killed; the watchdog ends its session.
+            return m.WAIT, f"process {process} is gone: the arm comes to rest"
         if self.leaving:
             return m.NOT_READY, "the driver ends"
         if not self.resting:

@@ -6,7 +6,9 @@ Needs nothing but Python. Whatever comes and whoever stalls, no joint leaves its
 its acceleration or its jerk, in any period.
 """
 
+import os
 import random
+import subprocess
 import sys
 import unittest
 from pathlib import Path
@@ -242,6 +244,19 @@ class Laws(unittest.TestCase):
         self.assertEqual(pair.driver.greet(pair.hello).verdict, m.WAIT)
         pair.engine_stands(1000, False)
         self.assertEqual(pair.driver.greet(pair.hello).verdict, m.WELCOME)
+
+    def test_an_engine_after_one_that_was_killed_waits(self):
+        ended = subprocess.Popen(["true"])
+        ended.wait()
+        for owner, verdict in (1, m.BUSY), (ended.pid, m.WAIT):
+            pair = Pair([1.0, -1.0])
+            pair.driver.hello.process = owner
+            pair.both(20)
+            another = m.Hello.from_buffer_copy(pair.hello)
+            another.process = os.getpid()
+            ack = pair.driver.greet(another)
+            self.assertEqual(ack.verdict, verdict)
+            self.assertIn(f"process {owner}".encode(), bytes(ack.reason))
 
     def test_a_driver_that_leaves_brakes_first(self):
         pair = Pair([1.0, -1.0])
