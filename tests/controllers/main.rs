@@ -3,9 +3,9 @@
 //! Where a controller or a client is not installed, its tests are reported as ignored:
 //! `pip install franka-sim==1.1.7` brings the one of Franka arms, `pip install ur_rtde==1.6.5` a
 //! client for the arms of Universal Robots, `pip install RSIPI==0.3.0` the echo server of KUKA arms;
-//! `CANTER_FRANKA_PYTHON`, `CANTER_UR_PYTHON` and `CANTER_RSI_PYTHON` name the Python that has them. The tests of Franka need a machine that is nearly idle: the controller stops
-//! the arm at the first step that is beyond its maker's limits, and a machine that stalls brings such
-//! steps.
+//! `CANTER_FRANKA_PYTHON`, `CANTER_UR_PYTHON` and `CANTER_RSI_PYTHON` name the Python that has them
+//! (franka-sim needs older packages than the others). On a machine that stalls, the controller of Franka arms sees steps
+//! beyond its maker's limits and stops the arm: these tests have further tries.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![allow(clippy::print_stdout, reason = "figures of a test")]
 #![allow(dead_code, reason = "helpers that the other tests use")]
