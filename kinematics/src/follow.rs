@@ -38,9 +38,6 @@ pub struct FollowPoint<const N: usize> {
     pub u: f64,
     /// Joint positions (rad, m) and their first three derivatives to `u`.
     pub q: [SVector<f64, N>; 4],
-    /// Smallest singular value of the Jacobian (lengths in units of 0.3 m): zero
-    /// where the arm is singular.
-    pub smallest: f64,
 }
 
 /// How closely to follow.
@@ -216,23 +213,33 @@ pub fn follow_with<const N: usize>(
     task.trace(start, &motion.0)
 }
 
+/// A joint path with further points: `grid` has the parameters of all `points`, which were followed with the same
+/// null-space motion, and more between them. What is known is not computed again.
+///
+/// # Errors
+/// As [`follow`].
+pub fn refine<const N: usize>(
+    solver: &Solver<N>,
+    tool: &dyn Fn(f64) -> TwistPoint,
+    (grid, points): (&[f64], &[FollowPoint<N>]),
+    options: &FollowOptions,
+    motion: &NullMotion<N>,
+) -> Result<Vec<FollowPoint<N>>, FollowError> {
+    let task = trace::Task {
+        solver,
+        tool,
+        grid,
+        options,
+    };
+    task.check_grid()?;
+    task.refine(points, &motion.0)
+}
+
 /// Checks the grid, and that the arm is at the start of the path.
 fn check<const N: usize>(
     task: &trace::Task<'_, N>,
     start: &SVector<f64, N>,
 ) -> Result<(), FollowError> {
-    let grid = task.grid;
-    let ascends = grid.len() >= 2
-        && grid.iter().all(|u| u.is_finite())
-        && grid.windows(2).all(|pair| pair[0] < pair[1]);
-    if !ascends {
-        let u = grid.first().copied().unwrap_or(0.0);
-        return Err(FollowError {
-            u,
-            joint: None,
-            cause: FollowCause::BadGrid,
-            amount: grid.len() as f64,
-        });
-    }
+    task.check_grid()?;
     task.check_start(start)
 }

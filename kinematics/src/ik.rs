@@ -19,7 +19,7 @@ mod turns;
 
 pub use goal::Goal;
 pub(crate) use goal::PoseError;
-pub(crate) use numeric::restart;
+pub(crate) use numeric::Restarts;
 pub use report::{Branches, IkFailure, IkReport, MOST_BRANCHES, Solution};
 use simd::Frame;
 
@@ -131,7 +131,7 @@ impl<const N: usize> Solver<N> {
     /// # Errors
     /// [`IkReport`]: what is in the way, and the nearest pose that was found.
     pub fn solve(&self, pose: &Isometry3<f64>) -> Result<Solution<N>, IkReport<N>> {
-        self.nearest(pose, &numeric::restart(&self.chain, 0))
+        self.nearest(pose, &Restarts::new(&self.chain).at(0))
     }
 
     /// The solution nearest to `seed` (rad, m); whole turns of its joints are also chosen nearest
@@ -179,7 +179,7 @@ impl<const N: usize> Solver<N> {
     /// Arms without a closed form are searched from a fixed sequence of seeds.
     #[must_use]
     pub fn solve_all(&self, pose: &Isometry3<f64>) -> Branches<N> {
-        let middle = numeric::restart(&self.chain, 0);
+        let middle = Restarts::new(&self.chain).at(0);
         match &self.closed {
             Some(closed) => self.branches_at(closed, pose, &middle, closed.parameter(&middle)),
             None => self.search_all(pose),
@@ -245,13 +245,13 @@ impl<const N: usize> Solver<N> {
         seed: &SVector<f64, N>,
         restarts: u32,
     ) -> Result<Solution<N>, IkReport<N>> {
-        let target = goal.target();
+        let (target, seeds) = (goal.target(), Restarts::new(&self.chain));
         let mut best = self.descend(&target, seed, self.stop);
         for index in 0..restarts {
             if best.reached {
                 return Ok(self.solution(&best, seed));
             }
-            let next = self.restarted(&target, index);
+            let next = self.restarted(&target, &seeds, index);
             if next.reached || score(&next) < score(&best) {
                 best = next;
             }
@@ -284,9 +284,9 @@ impl<const N: usize> Solver<N> {
     /// Solutions found from the whole sequence of restarts, each once.
     fn search_all(&self, pose: &Isometry3<f64>) -> Branches<N> {
         let target = Goal::Pose(*pose).target();
-        let mut found = Branches::new();
+        let (mut found, seeds) = (Branches::new(), Restarts::new(&self.chain));
         for index in 0..SEARCH {
-            let result = self.restarted(&target, index);
+            let result = self.restarted(&target, &seeds, index);
             let known =
                 |other: &Solution<N>| turns::distance(&self.chain, &other.q, &result.q) < 1e-5;
             if result.reached && !found.iter().any(known) {
@@ -318,8 +318,8 @@ impl<const N: usize> Solver<N> {
 
     /// One restart. Every second one may leave the limits during the search, which avoids local
     /// minima at corners of the limits; if it ends outside, it continues from the nearest corner.
-    fn restarted(&self, target: &Target, index: u32) -> SolverResult<N> {
-        let seed = numeric::restart(&self.chain, index);
+    fn restarted(&self, target: &Target, seeds: &Restarts<'_, N>, index: u32) -> SolverResult<N> {
+        let seed = seeds.at(index);
         let limits = index % 2 == 1;
         let mut result = self.descend(
             target,

@@ -43,6 +43,28 @@ pub fn dexterity<const N: usize>(chain: &Chain<N>, q: &SVector<f64, N>) -> Dexte
     }
 }
 
+/// Whether the smallest singular value at `q` is at least `least` for sure; false where that takes a closer look. For
+/// six joints or more.
+pub(crate) fn surely_nimble<const N: usize>(
+    chain: &Chain<N>,
+    q: &SVector<f64, N>,
+    least: f64,
+) -> bool {
+    let (_, mut jacobian) = chain.jacobian(q);
+    jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
+    let Some(factor) = (jacobian * jacobian.transpose()).cholesky() else {
+        return false;
+    };
+    // The sum of the inverse squares of the singular values; rounding changes it by less where they are larger
+    // than CERTAIN.
+    let smallest = (1.0 / factor.inverse().trace()).sqrt() * (1.0 - ROUNDING);
+    smallest > CERTAIN.max(least)
+}
+
+/// Smallest singular value from which on the sum of inverse squares is exact within [`ROUNDING`].
+const CERTAIN: f64 = 1e-3;
+const ROUNDING: f64 = 1e-6;
+
 /// The six singular values of a Jacobian in rising order.
 ///
 /// Computed by one-sided Jacobi rotations of the rows, which keeps even the small ones exact.
@@ -79,4 +101,35 @@ pub fn singular_values<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [f64; 6
     let mut values = rows.map(|row| row.norm());
     values.sort_unstable_by(f64::total_cmp);
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ik::Restarts;
+    use crate::urdf;
+
+    /// What counts as surely nimble is so, and hardly anything nimble is missed by more than the root of six.
+    #[test]
+    fn surely_nimble_is_nimble() {
+        let text = include_str!("../../robots/panda/robot.urdf");
+        let chain = urdf::read(text, None).unwrap().chain::<7>().unwrap();
+        let places = Restarts::new(&chain);
+        let mut sure = 0;
+        for index in 0..500 {
+            let q = places.at(index);
+            let smallest = dexterity(&chain, &q).smallest;
+            for share in [0.3, 0.9, 0.999, 1.001, 1.2] {
+                let found = surely_nimble(&chain, &q, share * smallest);
+                assert!(!found || share < 1.0, "{smallest} {share}");
+                sure += usize::from(found);
+            }
+            let least = smallest > 0.01;
+            assert!(
+                !least || surely_nimble(&chain, &q, 0.4 * smallest),
+                "{smallest}"
+            );
+        }
+        assert!(sure > 400, "{sure}");
+    }
 }

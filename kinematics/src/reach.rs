@@ -1,9 +1,9 @@
 //! How far an arm reaches, for display and messages.
 
 use crate::chain::Chain;
-use crate::ik::restart;
+use crate::ik::Restarts;
 use crate::measure;
-use nalgebra::{Point3, SVector, Vector3};
+use nalgebra::{Point3, Vector3};
 
 /// Reach of an arm, sampled evenly over its joint ranges.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +40,9 @@ pub fn map<const N: usize>(chain: &Chain<N>, origin: &Point3<f64>, samples: u32)
         Vector3::repeat(f64::NEG_INFINITY),
     );
     let (mut distances, mut smallest) = (Vec::new(), Vec::new());
+    let places = Restarts::new(chain);
     for index in 0..samples.max(1) {
-        let q: SVector<f64, N> = restart(chain, index);
+        let q = places.at(index);
         let point = chain.forward(&q).translation.vector;
         (low, high) = (low.inf(&point), high.sup(&point));
         distances.push((point - origin.coords).norm());

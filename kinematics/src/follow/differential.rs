@@ -1,7 +1,7 @@
 //! Derivatives of the joints along a tool path, up to the third.
 
 use super::TwistPoint;
-use super::linear::{self, Rows};
+use super::linear::{Rows, System};
 use super::null_space::NullSpace;
 use crate::measure::LENGTH;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -70,7 +70,7 @@ pub(super) fn derivatives<const N: usize>(
     null_space: &NullSpace<N>,
     prior: &[SVector<f64, N>; 3],
 ) -> [SVector<f64, N>; 3] {
-    let rows = task_rows(jacobian, null_space);
+    let system = System::<N>::new(&task_rows(jacobian, null_space));
     let u_rows = null_space.rates();
     let solve = |goal: &Screw, order: usize| -> SVector<f64, N> {
         let mut b = [0.0; 8];
@@ -83,7 +83,7 @@ pub(super) fn derivatives<const N: usize>(
         }
         let mut expected = [0.0; 8];
         expected[..N].copy_from_slice(prior[order].as_slice());
-        let x = linear::solve::<N>(&rows, &b, &expected);
+        let x = system.solve(&b, &expected);
         SVector::from_fn(|i, _| x[i])
     };
     let screw = |i: usize| Screw {

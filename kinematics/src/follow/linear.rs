@@ -8,61 +8,99 @@ const SMALLEST_PIVOT: f64 = 1e-7;
 /// Weight of the prior against the rows where elimination is not trusted.
 const PRIOR: f64 = 1e-12;
 
-/// Solves `rows * x = b` for `N` unknowns.
-///
-/// Where the rows do not settle `x` (singular, or fewer joints than six), the
-/// least-squares solution nearest to `prior`.
-pub(super) fn solve<const N: usize>(rows: &Rows, b: &[f64; 8], prior: &[f64; 8]) -> [f64; 8] {
-    if N >= 6
-        && let Some(x) = eliminate::<N>(rows, b)
-    {
-        return x;
-    }
-    let count = N.max(6);
-    let mut x = *prior;
-    // The second pass takes out what the first left by rounding.
-    for _ in 0..2 {
-        let mut rest = *b;
-        for (r, row) in rows.iter().enumerate().take(count) {
-            for j in 0..N {
-                rest[r] -= row[j] * x[j];
-            }
-        }
-        let y = normal::<N>(rows, &rest, count);
-        for j in 0..N {
-            x[j] += y[j];
-        }
-    }
-    x
+/// Task rows, ready to be solved for several task motions.
+pub(super) struct System<const N: usize> {
+    rows: Rows,
+    /// Factors of the rows, unless elimination is not trusted.
+    factors: Option<Factors<N>>,
 }
 
-/// Gaussian elimination with row exchange; `None` where a pivot is too small.
-fn eliminate<const N: usize>(rows: &Rows, b: &[f64; 8]) -> Option<[f64; 8]> {
-    let (mut m, mut b) = (*rows, *b);
-    let mut largest = 0.0_f64;
-    for k in 0..N {
-        let pivot = (k..N).max_by(|i, j| m[*i][k].abs().total_cmp(&m[*j][k].abs()))?;
-        m.swap(k, pivot);
-        b.swap(k, pivot);
-        let size = m[k][k].abs();
-        largest = largest.max(size);
-        if size.is_nan() || size <= SMALLEST_PIVOT * largest {
-            return None;
+impl<const N: usize> System<N> {
+    /// Factors the rows.
+    pub(super) fn new(rows: &Rows) -> Self {
+        let factors = if N >= 6 { Factors::new(rows) } else { None };
+        Self {
+            rows: *rows,
+            factors,
         }
-        for i in k + 1..N {
-            let factor = m[i][k] / m[k][k];
-            for j in k..N {
-                m[i][j] -= factor * m[k][j];
+    }
+
+    /// Solves `rows * x = b` for `N` unknowns.
+    ///
+    /// Where the rows do not settle `x` (singular, or fewer joints than six), the
+    /// least-squares solution nearest to `prior`.
+    pub(super) fn solve(&self, b: &[f64; 8], prior: &[f64; 8]) -> [f64; 8] {
+        if let Some(factors) = &self.factors {
+            return factors.solve(b);
+        }
+        let count = N.max(6);
+        let mut x = *prior;
+        // The second pass takes out what the first left by rounding.
+        for _ in 0..2 {
+            let mut rest = *b;
+            for (r, row) in self.rows.iter().enumerate().take(count) {
+                for j in 0..N {
+                    rest[r] -= row[j] * x[j];
+                }
             }
-            b[i] -= factor * b[k];
+            let y = normal::<N>(&self.rows, &rest, count);
+            for j in 0..N {
+                x[j] += y[j];
+            }
         }
+        x
     }
-    let mut x = [0.0; 8];
-    for k in (0..N).rev() {
-        let sum = (k + 1..N).fold(b[k], |sum, j| sum - m[k][j] * x[j]);
-        x[k] = sum / m[k][k];
+}
+
+/// Factors of rows by Gaussian elimination with row exchange: the upper one, the multipliers below it, and the
+/// row that was taken at each step.
+struct Factors<const N: usize> {
+    rows: Rows,
+    taken: [usize; 8],
+}
+
+impl<const N: usize> Factors<N> {
+    /// `None` where a pivot is too small.
+    fn new(rows: &Rows) -> Option<Self> {
+        let (mut m, mut taken) = (*rows, [0; 8]);
+        let mut largest = 0.0_f64;
+        for k in 0..N {
+            let pivot = (k..N).max_by(|i, j| m[*i][k].abs().total_cmp(&m[*j][k].abs()))?;
+            m.swap(k, pivot);
+            taken[k] = pivot;
+            let size = m[k][k].abs();
+            largest = largest.max(size);
+            if size.is_nan() || size <= SMALLEST_PIVOT * largest {
+                return None;
+            }
+            for i in k + 1..N {
+                let factor = m[i][k] / m[k][k];
+                m[i][k] = factor;
+                for j in k + 1..N {
+                    m[i][j] -= factor * m[k][j];
+                }
+            }
+        }
+        Some(Self { rows: m, taken })
     }
-    Some(x)
+
+    fn solve(&self, b: &[f64; 8]) -> [f64; 8] {
+        let (m, mut b) = (&self.rows, *b);
+        for k in 0..N {
+            b.swap(k, self.taken[k]);
+        }
+        for k in 0..N {
+            for i in k + 1..N {
+                b[i] -= m[i][k] * b[k];
+            }
+        }
+        let mut x = [0.0; 8];
+        for k in (0..N).rev() {
+            let sum = (k + 1..N).fold(b[k], |sum, j| sum - m[k][j] * x[j]);
+            x[k] = sum / m[k][k];
+        }
+        x
+    }
 }
 
 /// `(A^T A + PRIOR) y = A^T b`.
@@ -109,7 +147,8 @@ mod tests {
             rows[i][i] = 2.0;
         }
         rows[0][5] = 1.0;
-        let x = solve::<6>(&rows, &[3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0], &[0.0; 8]);
+        let b = [3.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0];
+        let x = System::<6>::new(&rows).solve(&b, &[0.0; 8]);
         assert!(x[..6].iter().all(|value| (value - 1.0).abs() < 1e-15));
         // Columns 4 and 5 alike: only their sum is settled.
         let mut rows: Rows = [[0.0; 8]; 8];
@@ -117,7 +156,8 @@ mod tests {
             rows[i][i] = 1.0;
         }
         rows[4][5] = 1.0;
-        let x = solve::<6>(&rows, &[1.0; 8], &[0.0, 0.0, 0.0, 0.0, 3.0, -1.0, 0.0, 0.0]);
+        let prior = [0.0, 0.0, 0.0, 0.0, 3.0, -1.0, 0.0, 0.0];
+        let x = System::<6>::new(&rows).solve(&[1.0; 8], &prior);
         assert!(
             (x[4] - 2.5).abs() < 1e-9 && (x[5] + 1.5).abs() < 1e-9,
             "{x:?}"

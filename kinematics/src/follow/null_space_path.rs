@@ -7,7 +7,7 @@
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::trace::{Guess, Task};
 use crate::measure::LENGTH;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// Steps along the path.
 const LAYERS: usize = 32;
@@ -40,8 +40,7 @@ pub(super) fn search<const N: usize>(
     start: &SVector<f64, N>,
     still: &NullSpace<N>,
 ) -> Vec<NullSpacePolynomial> {
-    let layers = fill(task, start, still);
-    let Some(way) = shortest(&layers) else {
+    let Some(way) = Grid { task, still }.cheapest(start) else {
         return Vec::new();
     };
     let points: Vec<(f64, f64)> = way
@@ -60,59 +59,116 @@ pub(super) fn search<const N: usize>(
         .collect()
 }
 
-/// Fills the grid by continuation from the start.
-fn fill<const N: usize>(
-    task: &Task<'_, N>,
-    start: &SVector<f64, N>,
-    still: &NullSpace<N>,
-) -> Vec<Layer<N>> {
-    let value = |column: usize| {
-        let mut at = still.at(still.from);
+/// The grid over path parameter and null-space motion, measured as `still` says.
+struct Grid<'a, const N: usize> {
+    task: &'a Task<'a, N>,
+    still: &'a NullSpace<N>,
+}
+
+impl<const N: usize> Grid<'_, N> {
+    /// Columns of the cheapest path through the grid, which is filled by continuation from the start; no farther
+    /// than a path leads.
+    fn cheapest(&self, start: &SVector<f64, N>) -> Option<Vec<usize>> {
+        let mut layer = self.first(start);
+        // A path can only begin at the start itself.
+        let mut total = vec![f64::INFINITY; WIDTH];
+        total[SIDE] = 0.0;
+        let mut back: Vec<Vec<usize>> = Vec::with_capacity(LAYERS);
+        for i in 1..=LAYERS {
+            let next = self.next(&layer, i);
+            let (sums, from) = reached(&layer, &total, &next);
+            if sums.iter().all(|sum| sum.is_infinite()) {
+                return None;
+            }
+            back.push(from);
+            (layer, total) = (next, sums);
+        }
+        let last = (0..WIDTH).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
+        let mut way = vec![last];
+        for from in back.iter().rev() {
+            way.push(from[*way.last()?]);
+        }
+        way.reverse();
+        Some(way)
+    }
+
+    /// The cells at the start.
+    fn first(&self, start: &SVector<f64, N>) -> Layer<N> {
+        let pose = (self.task.tool)(self.still.from).pose;
+        let mut layer: Layer<N> = vec![None; WIDTH];
+        layer[SIDE] = Some(Cell {
+            q: *start,
+            cost: 0.0,
+        });
+        for step in 1..=SIDE {
+            for (near, column) in [
+                (SIDE + step - 1, SIDE + step),
+                (SIDE + 1 - step, SIDE - step),
+            ] {
+                layer[column] = layer[near].and_then(|near| self.cell(&near.q, &pose, column));
+            }
+        }
+        layer
+    }
+
+    /// The cells of layer `i`, from those of the one before it.
+    fn next(&self, before: &Layer<N>, i: usize) -> Layer<N> {
+        let u = self.still.from + self.still.span * i as f64 / LAYERS as f64;
+        let pose = (self.task.tool)(u).pose;
+        let cell = |column: usize| {
+            let near = [Some(column), column.checked_sub(1), Some(column + 1)];
+            let mut seeds = near.into_iter().flatten().filter_map(|c| *before.get(c)?);
+            seeds.find_map(|seed| self.cell(&seed.q, &pose, column))
+        };
+        (0..WIDTH).map(cell).collect()
+    }
+
+    /// The cell of a column at a pose, near joints.
+    fn cell(
+        &self,
+        near: &SVector<f64, N>,
+        pose: &Isometry3<f64>,
+        column: usize,
+    ) -> Option<Cell<N>> {
+        let mut at = self.still.at(self.still.from);
         at[0] += (column as f64 - SIDE as f64) * STEP;
-        at
-    };
-    let cell = |q0: &SVector<f64, N>, u: f64, column: usize| {
         let guess = Guess {
-            q: q0,
+            q: near,
             within: CELL_CHANGE,
             exact: CLOSE,
         };
-        let q = task.newton(&guess, u, still, &value(column))?;
-        Some(Cell {
-            q,
-            cost: cost(task, &q),
-        })
-    };
-    let mut first: Layer<N> = vec![None; WIDTH];
-    first[SIDE] = Some(Cell {
-        q: *start,
-        cost: 0.0,
-    });
-    for step in 1..=SIDE {
-        let right = first[SIDE + step - 1].and_then(|c| cell(&c.q, still.from, SIDE + step));
-        let left = first[SIDE + 1 - step].and_then(|c| cell(&c.q, still.from, SIDE - step));
-        (first[SIDE + step], first[SIDE - step]) = (right, left);
+        let q = self.task.newton(&guess, pose, self.still, &at)?;
+        let cost = cost(self.task, &q);
+        Some(Cell { q, cost })
     }
-    let mut layers = vec![first];
-    for i in 1..=LAYERS {
-        let u = still.from + still.span * i as f64 / LAYERS as f64;
-        let before = &layers[i - 1];
-        let next = (0..WIDTH)
-            .map(|column| {
-                let near = [Some(column), column.checked_sub(1), Some(column + 1)];
-                let mut seeds = near.into_iter().flatten().filter_map(|c| *before.get(c)?);
-                seeds.find_map(|seed| cell(&seed.q, u, column))
-            })
-            .collect();
-        layers.push(next);
-    }
-    // A path can only begin at the start itself.
-    for (column, cell) in layers[0].iter_mut().enumerate() {
-        if column != SIDE {
-            *cell = None;
+}
+
+/// The least cost to each cell of a layer from the one before it, whose costs are `total`, and the column from which
+/// it is reached; infinite where it is not.
+fn reached<const N: usize>(
+    before: &Layer<N>,
+    total: &[f64],
+    layer: &Layer<N>,
+) -> (Vec<f64>, Vec<usize>) {
+    let (mut next, mut from) = (vec![f64::INFINITY; WIDTH], vec![0; WIDTH]);
+    for (column, cell) in layer.iter().enumerate() {
+        let Some(cell) = cell else { continue };
+        for source in column.saturating_sub(SWING)..(column + SWING + 1).min(WIDTH) {
+            let Some(before) = before[source] else {
+                continue;
+            };
+            // The same null-space value can belong to another branch; the joints show it.
+            if (before.q - cell.q).amax() > 2.0 * CELL_CHANGE {
+                continue;
+            }
+            let swing = column.abs_diff(source) as f64;
+            let sum = total[source] + cell.cost + 0.3 * swing * swing;
+            if sum < next[column] {
+                (next[column], from[column]) = (sum, source);
+            }
         }
     }
-    layers
+    (next, from)
 }
 
 /// The cost of `q`: grows towards limits and singular poses, infinite beyond them.
@@ -147,48 +203,6 @@ fn about_smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
         along /= most;
     }
     1.0 / most.sqrt()
-}
-
-/// Columns of the cheapest path through the grid.
-fn shortest<const N: usize>(layers: &[Layer<N>]) -> Option<Vec<usize>> {
-    let mut total: Vec<f64> = layers
-        .first()?
-        .iter()
-        .map(|cell| if cell.is_some() { 0.0 } else { f64::INFINITY })
-        .collect();
-    let mut back: Vec<Vec<usize>> = Vec::new();
-    for (i, layer) in layers.iter().enumerate().skip(1) {
-        let (mut next, mut from) = (vec![f64::INFINITY; WIDTH], vec![0; WIDTH]);
-        for (column, cell) in layer.iter().enumerate() {
-            let Some(cell) = cell else { continue };
-            for source in column.saturating_sub(SWING)..(column + SWING + 1).min(WIDTH) {
-                let Some(before) = layers[i - 1][source] else {
-                    continue;
-                };
-                // The same null-space value can belong to another branch; the joints show it.
-                if (before.q - cell.q).amax() > 2.0 * CELL_CHANGE {
-                    continue;
-                }
-                let swing = column.abs_diff(source) as f64;
-                let sum = total[source] + cell.cost + 0.3 * swing * swing;
-                if sum < next[column] {
-                    (next[column], from[column]) = (sum, source);
-                }
-            }
-        }
-        total = next;
-        back.push(from);
-    }
-    let last = (0..WIDTH).min_by(|a, b| total[*a].total_cmp(&total[*b]))?;
-    if !total[last].is_finite() {
-        return None;
-    }
-    let mut way = vec![last];
-    for from in back.iter().rev() {
-        way.push(from[*way.last()?]);
-    }
-    way.reverse();
-    Some(way)
 }
 
 /// Least-squares polynomial of a degree up to 5 through points `(progress, offset)`, with

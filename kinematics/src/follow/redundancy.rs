@@ -5,6 +5,7 @@ use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
+use crate::measure;
 use nalgebra::{SMatrix, SVector};
 
 /// Distance from a limit, rad or m, from which a joint counts as well inside.
@@ -252,15 +253,23 @@ fn resting<const N: usize>(
 /// its start.
 fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
     let chain = task.solver.chain();
-    let one = |point: &FollowPoint<N>| {
+    // The smaller of the quality at a point and `least`, which is known.
+    let one = |least: f64, point: &FollowPoint<N>| {
+        let q = &point.q[0];
         let room = (0..N).fold(f64::INFINITY, |room, i| {
-            let q = point.q[0][i];
-            room.min(chain.upper()[i] - q).min(q - chain.lower()[i])
+            room.min(chain.upper()[i] - q[i])
+                .min(q[i] - chain.lower()[i])
         });
-        (room / ROOM).min(point.smallest / NIMBLE)
+        let least = least.min(room / ROOM);
+        if measure::surely_nimble(chain, q, least * NIMBLE) {
+            return least;
+        }
+        least.min(measure::dexterity(chain, q).smallest / NIMBLE)
     };
-    let start = points.first().map_or(1.0, one).clamp(1e-6, 1.0);
-    points.iter().map(one).fold(f64::INFINITY, f64::min) / start
+    let start = points
+        .first()
+        .map_or(1.0, |point| one(f64::INFINITY, point));
+    points.iter().fold(f64::INFINITY, one) / start.clamp(1e-6, 1.0)
 }
 
 /// Directions in which the joints can move without moving the tool: `N - 6` of them,

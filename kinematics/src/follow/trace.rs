@@ -2,12 +2,13 @@
 
 use super::differential::{derivatives, task_rows};
 use super::error::{FollowCause, FollowError};
+use super::linear::System;
 use super::null_space::NullSpace;
-use super::{FollowOptions, FollowPoint, TwistPoint, linear};
+use super::{FollowOptions, FollowPoint, TwistPoint};
 use crate::ik::{Goal, Solver};
 use crate::measure;
 use crate::measure::LENGTH;
-use nalgebra::{Isometry3, SMatrix, SVector};
+use nalgebra::{Isometry3, SVector};
 
 /// A path to follow.
 pub(super) struct Task<'a, const N: usize> {
@@ -51,6 +52,23 @@ pub(super) struct Guess<'a, const N: usize> {
 }
 
 impl<const N: usize> Task<'_, N> {
+    /// Checks that the grid rises.
+    pub(super) fn check_grid(&self) -> Result<(), FollowError> {
+        let grid = self.grid;
+        let ascends = grid.len() >= 2
+            && grid.iter().all(|u| u.is_finite())
+            && grid.windows(2).all(|pair| pair[0] < pair[1]);
+        if ascends {
+            return Ok(());
+        }
+        Err(FollowError {
+            u: grid.first().copied().unwrap_or(0.0),
+            joint: None,
+            cause: FollowCause::BadGrid,
+            amount: grid.len() as f64,
+        })
+    }
+
     /// Checks that the arm is at the start of the path.
     pub(super) fn check_start(&self, start: &SVector<f64, N>) -> Result<(), FollowError> {
         let u = self.grid[0];
@@ -73,22 +91,40 @@ impl<const N: usize> Task<'_, N> {
         null_space: &NullSpace<N>,
     ) -> Result<Vec<FollowPoint<N>>, FollowError> {
         let first = self.first(start, null_space);
-        let mut points = vec![first];
-        let mut overrun = self.overrun(first.u, start);
-        let mut last = first;
+        self.refine(&[first], null_space)
+    }
+
+    /// The joint path through the points that are known of it, the first of which is its start: those of the
+    /// grid and others between them.
+    pub(super) fn refine(
+        &self,
+        known: &[FollowPoint<N>],
+        null_space: &NullSpace<N>,
+    ) -> Result<Vec<FollowPoint<N>>, FollowError> {
+        let Some((first, ahead)) = known.split_first() else {
+            return Err(self.error(self.grid[0], FollowCause::BadGrid, 0.0));
+        };
+        let (mut last, mut ahead) = (*first, ahead.iter().peekable());
+        // Whether nothing has come between the last point and the next one that is known.
+        let mut joined = true;
+        let mut points = Vec::with_capacity(self.grid.len().max(known.len()));
+        points.push(last);
+        let mut overrun = self.overrun(last.u, &last.q[0]);
         for &goal in &self.grid[1..] {
             while last.u < goal {
                 if points.len() >= self.options.most_points {
                     let amount = points.len() as f64;
-                    let cause = FollowCause::TooManyPoints;
-                    return Err(FollowError {
-                        u: last.u,
-                        joint: None,
-                        cause,
-                        amount,
-                    });
+                    return Err(self.error(last.u, FollowCause::TooManyPoints, amount));
                 }
-                last = self.advance(&last, goal, null_space)?;
+                // What is known of a place that was reached otherwise is of no use.
+                while ahead.next_if(|point| point.u <= last.u).is_some() {}
+                let next = ahead
+                    .next_if(|point| point.u <= goal && (joined || self.is_close(&last, point)));
+                joined = next.is_some();
+                last = match next {
+                    Some(next) => *next,
+                    None => self.advance(&last, goal, null_space)?,
+                };
                 points.push(last);
                 let next = self.overrun(last.u, &last.q[0]);
                 if next.amount > overrun.amount {
@@ -98,14 +134,22 @@ impl<const N: usize> Task<'_, N> {
         }
         if overrun.amount > SLACK {
             let Overrun { u, joint, amount } = overrun;
+            let joint = Some(joint);
             return Err(FollowError {
-                u,
-                joint: Some(joint),
-                cause: FollowCause::Limit,
-                amount,
+                joint,
+                ..self.error(u, FollowCause::Limit, amount)
             });
         }
         Ok(points)
+    }
+
+    fn error(&self, u: f64, cause: FollowCause, amount: f64) -> FollowError {
+        FollowError {
+            u,
+            joint: None,
+            cause,
+            amount,
+        }
     }
 
     fn first(&self, start: &SVector<f64, N>, null_space: &NullSpace<N>) -> FollowPoint<N> {
@@ -113,11 +157,11 @@ impl<const N: usize> Task<'_, N> {
         let still = FollowPoint {
             u,
             q: [*start, SVector::zeros(), SVector::zeros(), SVector::zeros()],
-            smallest: 0.0,
         };
+        let seen = (self.tool)(u);
         // The start may be off by rounding; the path continues from the exact point.
-        let exact = self.settle(&still, u, null_space).unwrap_or(*start);
-        self.finish(u, &exact, &still, null_space)
+        let exact = self.settle(&still, (u, &seen), null_space);
+        self.finish((u, &seen), &exact.unwrap_or(*start), &still, null_space)
     }
 
     /// The farthest point that one step reaches towards `goal`.
@@ -148,19 +192,24 @@ impl<const N: usize> Task<'_, N> {
         u: f64,
         null_space: &NullSpace<N>,
     ) -> Option<FollowPoint<N>> {
-        let q = self.settle(last, u, null_space)?;
-        let point = self.finish(u, &q, last, null_space);
-        let middle = midpoint(last, &point);
-        let pose = (self.tool)(0.5 * (last.u + u)).pose;
-        let error = distance(&self.solver.chain().forward(&middle), &pose);
-        (error <= self.options.accuracy).then_some(point)
+        let seen = (self.tool)(u);
+        let q = self.settle(last, (u, &seen), null_space)?;
+        let point = self.finish((u, &seen), &q, last, null_space);
+        self.is_close(last, &point).then_some(point)
+    }
+
+    /// Whether the polynomial between two points is near enough to the path in the middle.
+    fn is_close(&self, last: &FollowPoint<N>, point: &FollowPoint<N>) -> bool {
+        let middle = midpoint(last, point);
+        let pose = (self.tool)(0.5 * (last.u + point.u)).pose;
+        distance(&self.solver.chain().forward(&middle), &pose) <= self.options.accuracy
     }
 
     /// Joint positions at `u`, near those predicted from the last point.
     fn settle(
         &self,
         last: &FollowPoint<N>,
-        u: f64,
+        (u, seen): (f64, &TwistPoint),
         null_space: &NullSpace<N>,
     ) -> Option<SVector<f64, N>> {
         let guess = Guess {
@@ -168,18 +217,18 @@ impl<const N: usize> Task<'_, N> {
             within: OTHER_BRANCH,
             exact: EXACT,
         };
-        self.newton(&guess, u, null_space, &null_space.at(u))
+        self.newton(&guess, &seen.pose, null_space, &null_space.at(u))
     }
 
-    /// Joint positions at `u` near a guess, with given values of the spare functions.
+    /// Joint positions at a pose of the tool near a guess, with given values of the spare functions.
     pub(super) fn newton(
         &self,
         guess: &Guess<'_, N>,
-        u: f64,
+        pose: &Isometry3<f64>,
         null_space: &NullSpace<N>,
         at: &[f64; 2],
     ) -> Option<SVector<f64, N>> {
-        let target = Goal::Pose((self.tool)(u).pose);
+        let target = Goal::Pose(*pose);
         let mut q = *guess.q;
         let mut reached = f64::INFINITY;
         for _ in 0..12 {
@@ -198,7 +247,7 @@ impl<const N: usize> Task<'_, N> {
                 return None;
             }
             reached = error;
-            let x = linear::solve::<N>(&rows, &b, &[0.0; 8]);
+            let x = System::<N>::new(&rows).solve(&b, &[0.0; 8]);
             let step = SVector::from_fn(|i, _| x[i]);
             q += step;
             if (q - *guess.q).amax() > guess.within {
@@ -215,7 +264,7 @@ impl<const N: usize> Task<'_, N> {
     /// A point with its derivatives.
     fn finish(
         &self,
-        u: f64,
+        (u, seen): (f64, &TwistPoint),
         q: &SVector<f64, N>,
         last: &FollowPoint<N>,
         null_space: &NullSpace<N>,
@@ -227,11 +276,10 @@ impl<const N: usize> Task<'_, N> {
             last.q[3],
         ];
         let (_, jacobian) = self.solver.chain().jacobian(q);
-        let [q1, q2, q3] = derivatives(&jacobian, &(self.tool)(u), &null_space.moved_to(u), &prior);
+        let [q1, q2, q3] = derivatives(&jacobian, seen, &null_space.moved_to(u), &prior);
         FollowPoint {
             u,
             q: [*q, q1, q2, q3],
-            smallest: smallest(jacobian),
         }
     }
 
@@ -269,15 +317,9 @@ impl<const N: usize> Task<'_, N> {
             u,
             joint: Some(fastest),
             cause: FollowCause::Singular,
-            amount: last.smallest,
+            amount: measure::dexterity(self.solver.chain(), &last.q[0]).smallest,
         }
     }
-}
-
-/// Smallest singular value of a Jacobian, lengths in units of [`LENGTH`].
-pub(super) fn smallest<const N: usize>(mut jacobian: SMatrix<f64, 6, N>) -> f64 {
-    jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / LENGTH);
-    measure::singular_values(&jacobian)[6 - N.min(6)]
 }
 
 /// Distance of two poses, m, angles times [`LENGTH`].

@@ -113,9 +113,10 @@ impl<const N: usize> Solver<N> {
         let Some(closed) = &self.closed else {
             return false;
         };
+        let seeds = numeric::Restarts::new(&self.chain);
         let (mut lost, mut wrong) = (0, 0);
         for index in 0..1000 {
-            let q = numeric::restart(&self.chain, index);
+            let q = seeds.at(index);
             let pose = self.chain.forward(&q);
             let branches = self.branches_at(closed, &pose, &q, closed.parameter(&q));
             lost += u32::from(

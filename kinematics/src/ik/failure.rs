@@ -3,7 +3,7 @@
 use nalgebra::{Point3, SVector};
 
 use super::goal::Goal;
-use super::numeric::{self, SolverResult, Stop};
+use super::numeric::{Restarts, SolverResult, Stop};
 use super::{IkFailure, IkReport, Solver, score, turns};
 use crate::measure;
 
@@ -73,12 +73,13 @@ impl<const N: usize> Solver<N> {
     /// The nearest that the tool comes to a position, with any orientation.
     fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
         let target = Goal::Position(point).target();
+        let seeds = Restarts::new(&self.chain);
         let mut best = self.descend(&target, seed, self.stop);
         for index in 0..PLACES {
             if best.reached {
                 break;
             }
-            let next = self.restarted(&target, index);
+            let next = self.restarted(&target, &seeds, index);
             if next.reached || score(&next) < score(&best) {
                 best = next;
             }
@@ -93,13 +94,13 @@ impl<const N: usize> Solver<N> {
         stop: Stop,
         seed: &SVector<f64, N>,
     ) -> SolverResult<N> {
-        let target = goal.target();
+        let (target, seeds) = (goal.target(), Restarts::new(&self.chain));
         let mut best = self.descend(&target, seed, stop);
         for index in 0..tries {
             if best.reached {
                 break;
             }
-            let next = self.descend(&target, &numeric::restart(&self.chain, index), stop);
+            let next = self.descend(&target, &seeds.at(index), stop);
             if next.reached || score(&next) < score(&best) {
                 best = next;
             }

@@ -294,21 +294,34 @@ fn advance<const N: usize>(
 }
 
 /// The fixed sequence of seeds for restarts: evenly spread, at most one turn wide.
-///
-/// # Source
-/// M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018:
-/// multiples of powers of the root of `x^(N+1) = x + 1`.
-pub(crate) fn restart<const N: usize>(chain: &Chain<N>, index: u32) -> SVector<f64, N> {
-    let mut root = 1.5_f64;
-    for _ in 0..32 {
-        root = (1.0 + root).powf(1.0 / (N as f64 + 1.0));
+pub(crate) struct Restarts<'a, const N: usize> {
+    chain: &'a Chain<N>,
+    /// From one seed to the next, as a share of each joint's part.
+    steps: [f64; N],
+}
+
+impl<'a, const N: usize> Restarts<'a, N> {
+    /// The sequence for a chain; its steps are powers of the root of `x^(N+1) = x + 1`.
+    ///
+    /// # Source
+    /// M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+    pub(crate) fn new(chain: &'a Chain<N>) -> Self {
+        let mut root = 1.5_f64;
+        for _ in 0..32 {
+            root = (1.0 + root).powf(1.0 / (N as f64 + 1.0));
+        }
+        let steps = std::array::from_fn(|i| root.powi(-(i as i32 + 1)));
+        Self { chain, steps }
     }
-    SVector::from_fn(|i, _| {
-        let step = root.powi(-(i as i32 + 1));
-        let unit = (0.5 + step * f64::from(index)).fract();
-        let (low, high) = window(chain, i);
-        low + (high - low) * unit
-    })
+
+    /// The seed with this number.
+    pub(crate) fn at(&self, index: u32) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| {
+            let unit = (0.5 + self.steps[i] * f64::from(index)).fract();
+            let (low, high) = window(self.chain, i);
+            low + (high - low) * unit
+        })
+    }
 }
 
 /// The part of a joint's range that restarts draw from.

@@ -2,7 +2,7 @@
 
 use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;
-use kinematics::follow::{cheaper, follow_with};
+use kinematics::follow::{cheaper, follow_choosing, follow_with, refine};
 use kinematics::{FollowCause, FollowOptions, FollowPoint, Solver, TwistPoint, follow};
 use nalgebra::{Isometry3, SVector, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -129,6 +129,49 @@ fn the_spare_joint_takes_what_costs_less() {
         }
     }
     assert!(found >= 3, "{found}");
+}
+
+/// On a finer grid, the joints that are known stay as they are, and those between them are those that are found when all
+/// are computed anew.
+fn refines<const N: usize>(name: &str) {
+    let solver = Solver::new(arms::chain::<N>(name));
+    let start = ready::<N>(name);
+    let tool = curve(&solver.chain().forward(&start), 1.0);
+    let coarse: Vec<f64> = (0..=100).map(|i| f64::from(i) / 100.0).collect();
+    let options = FollowOptions::default();
+    let at = (&coarse[..], &start);
+    let (points, motion) = follow_choosing(&solver, &tool, at, &options).unwrap();
+    let mut grid = Vec::new();
+    for (i, pair) in points.windows(2).enumerate() {
+        grid.push(pair[0].u);
+        if i % 3 != 1 {
+            grid.push(0.5 * (pair[0].u + pair[1].u));
+        }
+    }
+    grid.push(1.0);
+    let finer = refine(&solver, &tool, (&grid, &points), &options, &motion).unwrap();
+    let anew = follow_with(&solver, &tool, (&grid, &start), &options, &motion).unwrap();
+    assert!(points.iter().all(|point| finer.contains(point)), "{name}");
+    assert!(finer.windows(2).all(|pair| pair[0].u < pair[1].u), "{name}");
+    for u in grid {
+        let at = |points: &[FollowPoint<N>]| *points.iter().find(|point| point.u == u).unwrap();
+        let (a, b) = (at(&finer), at(&anew));
+        for k in 0..4 {
+            let off = (a.q[k] - b.q[k]).amax();
+            assert!(off < 1e-8 * (1.0 + b.q[k].amax()), "{name} {u}: {off}");
+        }
+    }
+    // Of nothing nothing is made, and a grid has to rise.
+    let none = refine(&solver, &tool, (&coarse, &[]), &options, &motion);
+    assert_eq!(none.unwrap_err().cause, FollowCause::BadGrid);
+    let falling = refine(&solver, &tool, (&[1.0, 0.0], &points), &options, &motion);
+    assert_eq!(falling.unwrap_err().cause, FollowCause::BadGrid);
+}
+
+#[test]
+fn finer_grids_keep_what_is_known() {
+    SIX.iter().for_each(|name| refines::<6>(name));
+    SEVEN.iter().for_each(|name| refines::<7>(name));
 }
 
 /// Six joints have no null-space motion to choose.

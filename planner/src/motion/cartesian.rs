@@ -1,16 +1,17 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
-use kinematics::follow::{self, FollowCause, FollowError, FollowPoint, NullMotion, TwistPoint};
+use kinematics::follow::{
+    self, FollowCause, FollowError, FollowOptions, FollowPoint, NullMotion, TwistPoint,
+};
 use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
 use trajectory::{
     Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
-    smooth, time_path,
+    time_path,
 };
 
-use super::draft::{Crossing, Draft};
-use super::{Blend, BlockedCause, MotionError, Planner};
+use super::{BlockedCause, Draft, MotionError, Planner};
 use crate::task::Move;
 
 /// Longest distance of the tool between two solved points, m.
@@ -19,11 +20,6 @@ const STEP_M: f64 = 4e-3;
 const STEP_RAD: f64 = 0.02;
 /// Largest deviation of the fitted joint path between solved points, m and rad.
 const FIT: f64 = 5e-7;
-/// Fraction of the time by which a motion may be slowed down uniformly before another time law is
-/// computed.
-const ENOUGH: f64 = 1e-3;
-/// Time of the joints over that of the tool from which on the spare joint of an arm is asked to help.
-const HELPED: f64 = 1.01;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -73,148 +69,6 @@ impl<const N: usize> Planner<N> {
         Ok(self.slowed(draft, motion))
     }
 
-    /// The joints follow a smooth path from `start`, slowed down where a joint needs it: motions to be
-    /// certified, the fastest first.
-    pub(super) fn follow_smooth(
-        &self,
-        path: &SmoothPath,
-        motion: &Move,
-        start: &SVector<f64, N>,
-    ) -> Result<Vec<Draft<N>>, MotionError> {
-        let plan = &path.plan;
-        let crossings = Crossing::of(plan);
-        if path.still || plan.duration() <= 0.0 {
-            let at_once = Crossing::at(&crossings, |_| 0.0);
-            return Ok(vec![passing(Trajectory::new(Vec::new()), at_once)]);
-        }
-        let towards = |u: f64| {
-            1 + plan
-                .crossings()
-                .iter()
-                .take_while(|pass| pass.time <= u)
-                .count()
-        };
-        let mut way = Way {
-            still_ends: true,
-            towards: &towards,
-            ..Way::along(plan)
-        };
-        let points = self
-            .followed(&way, start)
-            .map_err(|blocked| self.blamed(blocked, motion, start))?;
-        let first = self.fastest_along(plan, &points, (&crossings, motion))?;
-        if first.trajectory.duration() <= plan.duration() * HELPED {
-            return Ok(vec![first]);
-        }
-        // The joints rule: the spare one may help them.
-        let spare = self.helping(&way, &points, start);
-        way.spare = spare.as_ref();
-        let other = way.spare.and_then(|_| {
-            let points = self.followed(&way, start).ok()?;
-            let draft = self
-                .fastest_along(plan, &points, (&crossings, motion))
-                .ok()?;
-            (draft.trajectory.duration() < first.trajectory.duration()).then_some(draft)
-        });
-        Ok(other.into_iter().chain([first]).collect())
-    }
-
-    /// The fastest motion of the joints along a smooth motion of the tool, that is never faster.
-    fn fastest_along(
-        &self,
-        plan: &smooth::SmoothPlan,
-        points: &[FollowPoint<N>],
-        (crossings, motion): (&[Crossing], &Move),
-    ) -> Result<Draft<N>, MotionError> {
-        let direct = Trajectory::new(pieces(points));
-        let free = direct.duration();
-        let direct = self.slowed(passing(direct, crossings.to_vec()), motion);
-        if direct.trajectory.duration() <= free * (1.0 + ENOUGH) {
-            return Ok(direct);
-        }
-        let path = joint_path(plan, points)?;
-        match self.retimed(&path, crossings, motion) {
-            Ok(timed) if timed.trajectory.duration() < direct.trajectory.duration() => Ok(timed),
-            _ => Ok(direct),
-        }
-    }
-
-    /// A null-space motion with which the joints need about less time for a curve whose parameter is time.
-    fn helping(
-        &self,
-        way: &Way<'_, N>,
-        points: &[FollowPoint<N>],
-        start: &SVector<f64, N>,
-    ) -> Option<NullMotion<N>> {
-        if N <= 6 {
-            return None;
-        }
-        let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
-        let options = follow::FollowOptions {
-            still_ends: way.still_ends,
-            ..Default::default()
-        };
-        let cost = |points: &[FollowPoint<N>]| self.about_time(points);
-        follow::cheaper(&self.solver, &way.tool(), (&grid, start), &options, &cost)
-    }
-
-    /// About the time that the joints need along points whose parameter is the time of the tool: at each point
-    /// the factor by which it must be stretched.
-    fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
-        let limits = &self.limits;
-        let factor = |point: &FollowPoint<N>| {
-            let [_, velocity, acceleration, jerk] = &point.q;
-            (0..N).fold(1.0_f64, |most, j| {
-                most.max(velocity[j].abs() / limits.velocity[j])
-                    .max((acceleration[j].abs() / limits.acceleration[j]).sqrt())
-                    .max((jerk[j].abs() / limits.jerk[j]).cbrt())
-            })
-        };
-        let parts = points.windows(2).map(|pair| {
-            let mean = 0.5 * (factor(&pair[0]) + factor(&pair[1]));
-            mean * (pair[1].u - pair[0].u)
-        });
-        parts.sum()
-    }
-
-    /// The smooth motion of the tool through the poses of a move that starts at `start`; `fit` says
-    /// whether a curve may be fitted through a dense list, `gap` how near to the optimum it ends.
-    pub(super) fn smooth_path(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (fit, gap): (bool, Option<f64>),
-    ) -> Result<SmoothPath, MotionError> {
-        let mut poses = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
-        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
-        options.fit = fit;
-        options.gap = gap.unwrap_or(options.gap);
-        Ok(SmoothPath {
-            plan: smooth::plan(&poses, &options)?,
-            still: is_still(&poses),
-        })
-    }
-
-    /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
-    /// `crossings` are those of the smooth motion.
-    fn retimed(
-        &self,
-        path: &HermitePath<N, &dyn ToolCurve>,
-        crossings: &[Crossing],
-        motion: &Move,
-    ) -> Result<Draft<N>, MotionError> {
-        let options = TimingOptions {
-            start: Boundary::Free,
-            end: Boundary::Free,
-            rate_cap: Some(1.0),
-            ..Default::default()
-        };
-        let timed = time_path(path, &self.limits, &motion.limits, &options)?;
-        let times = Crossing::at(crossings, |u| moment(&timed.law, u));
-        Ok(self.slowed(passing(timed.trajectory, times), motion))
-    }
-
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine
     /// enough that a quintic between its points stays on the curve.
     pub(super) fn followed(
@@ -222,22 +76,33 @@ impl<const N: usize> Planner<N> {
         way: &Way<'_, N>,
         start: &SVector<f64, N>,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
-        let (mut points, chosen) = self.solved(way, &first_grid(way.curve), start)?;
+        let (mut points, mut chosen) = self.solved(way, &first_grid(way.curve), start)?;
         for _ in 0..REFINEMENTS {
             let finer = refined(self.chain(), &points, way.curve);
             if finer.len() == points.len() || finer.len() > MOST_POINTS {
                 break;
             }
-            let spare = Some(&chosen);
-            let found = self.solved(&Way { spare, ..*way }, &finer, start);
+            let found = self.with_more(way, (&finer, &points), &chosen);
             // Another null-space motion can be searched only where there is one and it was not given.
             let searched = N > 6 && way.spare.is_none();
-            (points, _) = match found {
-                Err(_) if searched => self.solved(way, &finer, start)?,
-                found => found?,
-            };
+            match found {
+                Err(_) if searched => (points, chosen) = self.solved(way, &finer, start)?,
+                found => points = found?,
+            }
         }
         Ok(points)
+    }
+
+    /// The joints at the points of a finer grid, with the null-space motion of those that are known.
+    fn with_more(
+        &self,
+        way: &Way<'_, N>,
+        (grid, points): (&[f64], &[FollowPoint<N>]),
+        spare: &NullMotion<N>,
+    ) -> Result<Vec<FollowPoint<N>>, MotionError> {
+        let (tool, options) = (way.tool(), way.options());
+        follow::refine(&self.solver, &tool, (grid, points), &options, spare)
+            .map_err(|error| self.blocked(&error, way.curve.end(), way.towards))
     }
 
     /// The joints at the points of a grid and between them, and the null-space motion that was followed.
@@ -247,11 +112,7 @@ impl<const N: usize> Planner<N> {
         grid: &[f64],
         start: &SVector<f64, N>,
     ) -> Result<(Vec<FollowPoint<N>>, NullMotion<N>), MotionError> {
-        let (tool, at) = (way.tool(), (grid, start));
-        let options = follow::FollowOptions {
-            still_ends: way.still_ends,
-            ..Default::default()
-        };
+        let (tool, at, options) = (way.tool(), (grid, start), way.options());
         let found = match way.spare {
             Some(spare) => follow::follow_with(&self.solver, &tool, at, &options, spare)
                 .map(|points| (points, *spare)),
@@ -320,65 +181,12 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// The smooth motion of the tool that the joints are to follow.
-pub(super) struct SmoothPath {
-    pub(super) plan: smooth::SmoothPlan,
-    /// Whether all poses are where the arm is.
-    still: bool,
-}
-
-impl SmoothPath {
-    /// Whether it is along a curve fitted through a dense list.
-    pub(super) fn is_fitted(&self) -> bool {
-        self.plan.method() == smooth::Method::Fit
-    }
-
-    /// What it promises, planned with this tolerance (m).
-    pub(super) fn blend(&self, tolerance: f64) -> Blend {
-        let certificate = self.plan.certificate();
-        Blend {
-            tolerance,
-            exact_stop: self.plan.exact_stop(),
-            corridor_ratio: certificate.corridor.ratio,
-            jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
-            fallbacks: self.plan.fallbacks(),
-        }
-    }
-}
-
-/// A draft that passes its poses so.
-fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<Crossing>) -> Draft<N> {
-    Draft {
-        crossings,
-        ..Draft::of(trajectory)
-    }
-}
-
 /// Whether all poses are where the first is, within 1e-9 m and rad.
 pub(super) fn is_still(poses: &[Isometry3<f64>]) -> bool {
     poses.iter().all(|pose| {
         let gap = poses[0].inv_mul(pose);
         gap.translation.vector.norm() < 1e-9 && gap.rotation.angle() < 1e-9
     })
-}
-
-/// The time at which a monotonic time law reaches `u`, s.
-pub(super) fn moment(law: &Trajectory<1>, u: f64) -> f64 {
-    let pieces = law.pieces();
-    let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
-    let Some(piece) = pieces.get(next.saturating_sub(1)) else {
-        return 0.0;
-    };
-    let (mut low, mut high) = (0.0, piece.duration);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if piece.sample(middle).position[0] < u {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    law.times()[next.saturating_sub(1)] + high
 }
 
 /// A curve of the tool, whether it is at rest at both ends in its own parameter, the next pose of the
@@ -401,8 +209,16 @@ impl<'a, const N: usize> Way<'a, N> {
         }
     }
 
+    /// How closely the joints follow it.
+    pub(super) fn options(&self) -> FollowOptions {
+        FollowOptions {
+            still_ends: self.still_ends,
+            ..FollowOptions::default()
+        }
+    }
+
     /// The motion of the tool.
-    fn tool(&self) -> impl Fn(f64) -> TwistPoint {
+    pub(super) fn tool(&self) -> impl Fn(f64) -> TwistPoint {
         |u| {
             let ToolPoint {
                 pose,

@@ -4,9 +4,10 @@ use nalgebra::SVector;
 use trajectory::bounds::Held;
 use trajectory::{Boundary, MotionBounds, PacedPath, TimingOptions, Trajectory, smooth, time_path};
 
-use super::cartesian::{Way, is_still, joint_path, moment};
+use super::cartesian::{Way, is_still, joint_path};
 use super::certificate::Arm;
 use super::draft::{Crossing, Draft};
+use super::smooth_joints::moment;
 use super::{Blend, MotionError, PlannedMove, Planner};
 use crate::task::LegsMove;
 

@@ -25,6 +25,7 @@ mod reach;
 mod screw;
 mod singular;
 mod smooth;
+mod smooth_joints;
 mod soonest;
 mod timed;
 mod timed_refusal;

@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, SVector};
 use trajectory::smooth::{RestCause, SmoothOptions, least_time};
 use trajectory::{Line, Trajectory};
 
-use super::cartesian::{SmoothPath, Way, is_still};
+use super::cartesian::{Way, is_still};
 use super::draft::{Crossing, Draft};
+use super::smooth_joints::Followed;
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
 use crate::task::{Move, Shape};
 
@@ -13,25 +14,17 @@ use crate::task::{Move, Shape};
 const QUARTER: f64 = 0.25;
 /// Time of the motion over that of the tool alone from which on the joints rule.
 const RULED: f64 = 1.3;
-/// Other curves tried then: shares of the linear and of the angular limits under which each is planned, and the gap to
-/// the optimum at which its search ends. Far from its optimum a curve is rounder, which the joints follow faster.
-const OTHERS: [([f64; 2], f64); 4] = [
-    ([0.7, 1.0], 1.0),
-    ([0.6, 0.6], 1.0),
-    ([1.0, 0.4], 1.0),
-    ([1.0, 1.0], 0.3),
-];
+/// Other curves tried then: shares of the linear and of the angular limits under which each is planned.
+const OTHERS: [[f64; 2]; 4] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6]];
+/// The same where the joints cannot follow the first curve: also one that differs only in that it is rounder.
+const INSTEAD: [[f64; 2]; 5] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]];
+/// Gap to the optimum at which their searches end: far from its optimum a curve is rounder, which the joints follow
+/// faster.
+const GAP: f64 = 1.0;
+/// Share by which the joints may be faster along another curve than their bound along it foretells.
+const SPREAD: f64 = 4e-3;
 /// Most spans of a curve that is cheap enough for that.
 const CHEAP: usize = 400;
-
-/// What is wanted of a curve that is tried besides another.
-#[derive(Clone, Copy)]
-struct Rough {
-    /// Gap to the optimum at which its search ends.
-    gap: f64,
-    /// Time of the motion that it has to be faster than, s.
-    most: f64,
-}
 
 /// Whether a curve may be possible for the tool, and only the joints fail on it.
 fn is_of_the_joints(error: &MotionError) -> bool {
@@ -39,6 +32,28 @@ fn is_of_the_joints(error: &MotionError) -> bool {
         error,
         MotionError::Uncertified(_) | MotionError::Blocked { .. }
     )
+}
+
+/// Why there is no motion along a smooth curve of the tool.
+struct Failure {
+    error: MotionError,
+    /// Spans of the curve; none if there is no curve.
+    spans: usize,
+}
+
+impl From<MotionError> for Failure {
+    fn from(error: MotionError) -> Self {
+        Self { error, spans: 0 }
+    }
+}
+
+/// What is known before other curves are tried.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Time of the fastest motion, s.
+    time: f64,
+    /// That time over the bound of the time along its curve.
+    over: f64,
 }
 
 /// A motion along a smooth curve of the tool.
@@ -63,15 +78,24 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(motion, start) {
             return self.all_windows(windowed);
         }
-        let planned = match self.blended(motion, start, (motion, None)) {
-            Ok(first) => self.for_the_joints(motion, start, first),
-            Err(first) if motion.tolerance > 0.0 && is_of_the_joints(&first) => {
-                match self.otherwise(motion, start, f64::INFINITY) {
+        let planned = match self.blended(motion, start, motion) {
+            Ok((first, curve)) => self.for_the_joints(motion, start, (first, &curve)),
+            Err(Failure { error, spans }) => {
+                let error = self.blamed(error, motion, start);
+                if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
+                    return Err(error);
+                }
+                let cheap = spans <= CHEAP;
+                let none = Known {
+                    time: f64::INFINITY,
+                    over: 1.0,
+                };
+                let other = cheap.then(|| self.otherwise(motion, start, (none, &INSTEAD)));
+                match other.flatten() {
                     Some(other) => other,
-                    None => self.nearer(motion, start, first)?,
+                    None => self.nearer(motion, start, error)?,
                 }
             }
-            Err(first) => return Err(first),
         };
         self.or_straight(motion, start, planned)
     }
@@ -91,9 +115,9 @@ impl<const N: usize> Planner<N> {
             tolerance: share * motion.tolerance,
             ..motion.clone()
         };
-        self.blended(motion, start, (&within(QUARTER), None))
-            .or_else(|_| self.blended(motion, start, (&within(0.0), None)))
-            .map(|along| along.planned)
+        self.blended(motion, start, &within(QUARTER))
+            .or_else(|_| self.blended(motion, start, &within(0.0)))
+            .map(|(along, _)| along.planned)
             .map_err(|_| error)
     }
 
@@ -120,36 +144,63 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        first: Along<N>,
+        (first, curve): (Along<N>, &Followed<N>),
     ) -> PlannedMove<N> {
-        let ruled = first.planned.trajectory.duration() > RULED * first.tool;
+        let time = first.planned.trajectory.duration();
+        let ruled = time > RULED * first.tool;
         if !ruled || motion.tolerance <= 0.0 || first.spans > CHEAP {
             return first.planned;
         }
-        let most = first.planned.trajectory.duration();
-        self.otherwise(motion, start, most).unwrap_or(first.planned)
+        let least = self.least_along(curve, motion).unwrap_or(time);
+        let known = Known {
+            time,
+            over: time / least,
+        };
+        let other = self.otherwise(motion, start, (known, &OTHERS));
+        other.unwrap_or(first.planned)
     }
 
-    /// The fastest motion along another curve that takes less than `most` seconds.
+    /// The fastest motion along another curve that is faster than the one that is known. The joints follow all of
+    /// them; the curves whose bounds of the time are least are timed, as long as one may be faster.
     fn otherwise(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        mut most: f64,
+        (mut known, others): (Known, &[[f64; 2]]),
     ) -> Option<PlannedMove<N>> {
-        let mut best = None;
-        for ([along, about], gap) in OTHERS {
+        let mut tried = Vec::with_capacity(others.len());
+        for &[along, about] in others {
             let slower = Move {
                 limits: motion.limits.scaled(along, about),
                 ..motion.clone()
             };
-            let rough = Some(Rough { gap, most });
-            let Ok(other) = self.blended(motion, start, (&slower, rough)) else {
+            let followed = self.curve(start, (&slower, Some(known.time)), true);
+            let Ok(followed) = followed else {
                 continue;
             };
-            let duration = other.planned.trajectory.duration();
-            if duration < most {
-                (most, best) = (duration, Some(other.planned));
+            if let Ok(least) = self.least_along(&followed, motion) {
+                tried.push((least, followed));
+            }
+        }
+        tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mut best = None;
+        for (least, followed) in tried {
+            if least * known.over * (1.0 - SPREAD) >= known.time {
+                break;
+            }
+            let Ok(other) = self.on(&followed, motion, (start, known.time)) else {
+                continue;
+            };
+            let time = other.planned.trajectory.duration();
+            if time < known.time {
+                // No more is foretold than what was seen.
+                let over = time / least;
+                known.over = if best.is_some() || known.time.is_finite() {
+                    known.over.min(over)
+                } else {
+                    over
+                };
+                (known.time, best) = (time, Some(other.planned));
             }
         }
         best
@@ -214,40 +265,69 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The motion along the curve of another move through the same poses, of at most the tolerance and the
-    /// limits of this one; a rough one only if the tool alone is fast enough on it. An arm that cannot follow the curve fitted through a dense list may follow the
+    /// limits of this one, and the curve. An arm that cannot follow the curve fitted through a dense list may follow the
     /// spline.
     fn blended(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        (curve, rough): (&Move, Option<Rough>),
-    ) -> Result<Along<N>, MotionError> {
-        let along = |path: &SmoothPath| -> Result<_, MotionError> {
-            let mut planned = Err(MotionError::NoWay);
-            for draft in self.follow_smooth(path, motion, start)? {
-                planned = self.certify(motion, start, draft);
-                if planned.is_ok() {
-                    break;
-                }
+        curve: &Move,
+    ) -> Result<(Along<N>, Followed<N>), Failure> {
+        let first = self.curve(start, (curve, None), true)?;
+        match self.on(&first, motion, (start, f64::INFINITY)) {
+            Err(_) if first.path.is_fitted() => {
+                let spline = self.curve(start, (curve, None), false)?;
+                let along = self.on(&spline, motion, (start, f64::INFINITY))?;
+                Ok((along, spline))
             }
-            Ok(Along {
-                planned: PlannedMove {
-                    blend: Some(path.blend(curve.tolerance)),
-                    ..planned?
-                },
-                tool: path.plan.duration(),
-                spans: path.plan.spans(),
-            })
-        };
-        let gap = rough.map(|rough| rough.gap);
-        let path = self.smooth_path(curve, start, (true, gap))?;
-        if rough.is_some_and(|rough| path.plan.duration() >= rough.most) {
-            return Err(MotionError::NoWay);
+            along => Ok((along?, first)),
         }
-        match along(&path) {
-            Err(_) if path.is_fitted() => along(&self.smooth_path(curve, start, (false, gap))?),
-            other => other,
+    }
+
+    /// The joints along that curve; along a rough one only if the tool alone takes less than `most` (s) on it.
+    fn curve(
+        &self,
+        start: &SVector<f64, N>,
+        (curve, most): (&Move, Option<f64>),
+        fit: bool,
+    ) -> Result<Followed<N>, Failure> {
+        let path = self.smooth_path(curve, start, (fit, most.map(|_| GAP)))?;
+        if most.is_some_and(|most| path.plan.duration() >= most) {
+            return Err(MotionError::NoWay.into());
         }
+        let (spans, fitted) = (path.plan.spans(), path.is_fitted());
+        match self.joints_on(path, start) {
+            Err(_) if fitted => self.curve(start, (curve, most), false),
+            followed => followed.map_err(|error| Failure { error, spans }),
+        }
+    }
+
+    /// The motion along a curve that the joints follow, if it is shorter than `most` (s).
+    fn on(
+        &self,
+        followed: &Followed<N>,
+        motion: &Move,
+        (start, most): (&SVector<f64, N>, f64),
+    ) -> Result<Along<N>, Failure> {
+        let path = &followed.path;
+        let spans = path.plan.spans();
+        let failure = |error| Failure { error, spans };
+        let mut planned = Err(MotionError::NoWay);
+        let drafts = self.along_smooth(followed, motion, (start, most));
+        for draft in drafts.map_err(failure)? {
+            planned = self.certify(motion, start, draft);
+            if planned.is_ok() {
+                break;
+            }
+        }
+        Ok(Along {
+            planned: PlannedMove {
+                blend: Some(path.blend()),
+                ..planned.map_err(failure)?
+            },
+            tool: path.plan.duration(),
+            spans,
+        })
     }
 
     /// A straight move to each pose in turn, with a stop at each.

@@ -202,7 +202,11 @@ impl<'a> List<'a> {
         // A motion within half of the tolerance is within all of it. A second motion is cheap if
         // poses are close to each other and fit in one window.
         let costly = self.is_costly(&plan) || plan.parts.len() > 1;
-        if costly || self.poses.len() <= SHORT || plan.method() != Method::Spline {
+        if costly
+            || self.options.is_rough()
+            || self.poses.len() <= SHORT
+            || plan.method() != Method::Spline
+        {
             return Some(plan);
         }
         let mut half = form.options.clone();

@@ -3,8 +3,8 @@
 use trajectory::timing::Timed;
 use trajectory::{Boundary, MotionBounds, TimingOptions, Trajectory, time_path};
 
-use super::super::cartesian::moment;
 use super::super::draft::Crossing;
+use super::super::smooth_joints::moment;
 use super::super::{
     Draft, Fault, MotionError, MoveCertificate, Planner, ROUNDING, certificate, check,
 };

@@ -12,7 +12,7 @@ mod way;
 
 use nalgebra::{Isometry3, SVector};
 use realtime::Piece;
-use trajectory::smooth::{FittedCurve, SmoothOptions, least_time};
+use trajectory::smooth::{FittedCurve, RestCause, SmoothOptions, least_time};
 use trajectory::{Boundary, HermitePath, Path, Trajectory};
 
 use super::{Blend, MotionError, MoveCertificate, PlannedMove, Planner};
@@ -132,6 +132,18 @@ impl<const N: usize> WindowedMove<N> {
         });
         part.trajectory.pieces().to_vec()
     }
+
+    /// Counts a rest on the way, and names it at the pose that was passed last.
+    fn rest(&mut self) {
+        self.rests += 1;
+        let passes = self
+            .certificate
+            .as_mut()
+            .map(|certificate| &mut certificate.poses);
+        if let Some(pass) = passes.and_then(|passes| passes.last_mut()) {
+            pass.rests = Some(RestCause::Division);
+        }
+    }
 }
 
 impl<const N: usize> Planner<N> {
@@ -148,15 +160,9 @@ impl<const N: usize> Planner<N> {
         let pieces = match (planned, windowed.stop.take()) {
             (Ok((head, boundary, stop)), _) => {
                 windowed.stop = stop;
-                if windowed.stop.is_none() && head.to < windowed.path.last() {
-                    windowed.rests += 1;
-                }
                 windowed.take(head, boundary)
             }
-            (Err(_), Some(stop)) => {
-                windowed.rests += 1;
-                windowed.take(stop, Boundary::Rest)
-            }
+            (Err(_), Some(stop)) => windowed.take(stop, Boundary::Rest),
             (Err(error), None) => {
                 return Err(MotionError::OnTheWay {
                     pose: windowed.passed + 1,
@@ -167,6 +173,8 @@ impl<const N: usize> Planner<N> {
         let last = windowed.is_done();
         if last {
             self.conclude(windowed);
+        } else if windowed.boundary == Boundary::Rest {
+            windowed.rest();
         }
         Ok(MoveWindow { pieces, last })
     }
@@ -269,6 +277,7 @@ mod tests {
         let end = end.sample(end.duration);
         assert!(end.velocity.amax() < 1e-6 && (end.position - windowed.here()).amax() < 1e-9);
         assert_eq!(windowed.rests(), 1);
+        let last = windowed.passed;
         loop {
             let window = planner.window_of(&mut windowed).unwrap();
             pieces.extend(window.pieces);
@@ -281,6 +290,9 @@ mod tests {
         let certificate = windowed.certificate.as_ref().unwrap();
         assert!((certificate.duration_s - trajectory.duration()).abs() < 1e-9);
         assert_eq!(certificate.poses.len(), 4998);
+        let named = certificate.poses.iter().filter(|pass| pass.rests.is_some());
+        let named: Vec<_> = named.map(|pass| (pass.index, pass.rests)).collect();
+        assert_eq!(named, [(last, Some(RestCause::Division))]);
         assert!(
             certificate.in_order && certificate.peaks.largest() <= 1.0 + crate::motion::ROUNDING
         );

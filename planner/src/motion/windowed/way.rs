@@ -1,6 +1,7 @@
 //! The check of the whole way of a long smooth move.
 
 use kinematics::follow::{FollowOptions, FollowPoint, TwistPoint, follow};
+use kinematics::measure::dexterity;
 use nalgebra::SVector;
 use trajectory::smooth::{FittedCurve, SmoothOptions};
 use trajectory::{Boundary, HermitePath, JointPoint, ToolCurve};
@@ -97,7 +98,8 @@ impl<const N: usize> Planner<N> {
             ..Default::default()
         };
         let points = follow(&self.solver, &tool, &curve.knots(), start, &options).ok()?;
-        let regular = |point: &FollowPoint<N>| point.smallest >= SINGULAR;
+        let regular =
+            |point: &FollowPoint<N>| dexterity(self.chain(), &point.q[0]).smallest >= SINGULAR;
         points.iter().all(regular).then_some(points)
     }
 

@@ -151,7 +151,8 @@ impl<const D: usize, const B: usize> System<D, B> {
 
 #[cfg(test)]
 mod tests {
-    use crate::smooth::spline::newton::{Barrier, System};
+    use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::newton::System;
     use crate::smooth::spline::problem::{Group, Problem, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::start;
@@ -188,7 +189,11 @@ mod tests {
     fn bands_of_their_own_give_the_same_step() {
         for speed in [0.0, 0.1] {
             let mut problem = problem(speed);
-            let mut point = start::first(&mut problem, (speed > 0.0).then_some(1.0));
+            let mut point = start::first(
+                &mut problem,
+                (speed > 0.0).then_some(1.0),
+                start::KNOTS_PER_RAMP,
+            );
             problem.pin(&mut point);
             project(&problem, &mut point, None, 20);
             let room = Room::new(&problem, &point);
@@ -216,7 +221,7 @@ mod tests {
         for led in [false, true] {
             let mut problem = problem(0.0);
             problem.led = vec![led; 3];
-            let mut point = start::first(&mut problem, None);
+            let mut point = start::first(&mut problem, None, start::KNOTS_PER_RAMP);
             problem.pin(&mut point);
             project(&problem, &mut point, None, 20);
             let room = Room::new(&problem, &point);

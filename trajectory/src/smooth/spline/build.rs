@@ -39,6 +39,9 @@ const CORRECTED: f64 = 0.015;
 const BEND: f64 = 5.8;
 const STEEPEST: f64 = 60.0;
 
+/// Knot intervals in one time `A / J` of a curve that stays far from its bounds.
+const ROUGH_KNOTS: f64 = 2.0;
+
 /// Control points over which the difference of an orientation in motion fades out.
 const FADE: f64 = 12.0;
 
@@ -198,6 +201,15 @@ impl Task<'_> {
         }
     }
 
+    /// Knot intervals in one time `A / J`: fewer where the curve need not come near its bounds.
+    fn knots_per_ramp(&self) -> f64 {
+        if self.options.is_rough() {
+            ROUGH_KNOTS
+        } else {
+            KNOTS_PER_RAMP
+        }
+    }
+
     /// Fractions of angular speed, acceleration and jerk in use: not less than both ends in motion have.
     fn angular_shares(&self) -> [f64; 3] {
         let (limits, mut shares) = (&self.options.limits, [ANGULAR; 3]);
@@ -273,7 +285,7 @@ impl Task<'_> {
             }
             None => {
                 let spread = self.moving.map(|_| effort.spread.unwrap_or(1.0));
-                start::first(&mut problem, spread)
+                start::first(&mut problem, spread, self.knots_per_ramp())
             }
         };
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);

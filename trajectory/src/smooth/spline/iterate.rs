@@ -1,4 +1,4 @@
-//! An iterate, and how sums of its control points move.
+//! An iterate, and how its control points move.
 
 use super::problem::{Point, Problem, Room};
 
@@ -14,43 +14,17 @@ pub(super) struct Iterate<'a, const D: usize> {
 }
 
 impl<const D: usize> Iterate<'_, D> {
-    /// How a sum of control points moves with `z`, if some of them are pinned.
-    #[inline(always)]
-    pub(super) fn slide<const M: usize>(&self, sum: &Sum<'_, M>) -> Option<[f64; 3]> {
-        let Sum { first, w, g } = *sum;
-        let mut slide = [0.0; 3];
-        let mut add = |weight: f64, change: &[f64; D]| {
-            for d in 0..3 {
-                slide[d] += weight * change[3 * g + d];
-            }
-        };
-        if !self.slides.is_empty() {
-            for (weight, change) in w.iter().zip(&self.slides[first..]) {
-                add(*weight, change);
-            }
-        } else if first < 4 {
-            for (weight, pin) in w.iter().zip(&self.pinned[first..]) {
-                add(*weight, &pin[1]);
-            }
-        } else {
-            return None;
+    /// How each control point moves with `z`; empty if none does.
+    pub(super) fn moves(&self) -> Vec<[f64; D]> {
+        let still = |pin: &[[f64; D]; 2]| pin[1].iter().all(|x| *x == 0.0);
+        if !self.slides.is_empty() || self.pinned.iter().all(still) {
+            return self.slides.clone();
         }
-        Some(slide)
-    }
-}
-
-/// A weighted sum of consecutive control points, of the coordinates of one group.
-#[derive(Clone, Copy)]
-pub(super) struct Sum<'a, const M: usize> {
-    pub(super) first: usize,
-    pub(super) w: &'a [f64; M],
-    pub(super) g: usize,
-}
-
-impl<'a, const M: usize> Sum<'a, M> {
-    #[inline(always)]
-    pub(super) fn new(first: usize, w: &'a [f64; M], g: usize) -> Self {
-        Self { first, w, g }
+        let mut moves = vec![[0.0; D]; self.point.control.len()];
+        for (to, pin) in moves.iter_mut().zip(&self.pinned) {
+            *to = pin[1];
+        }
+        moves
     }
 }
 

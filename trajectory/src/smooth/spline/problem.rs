@@ -6,6 +6,8 @@
 //! ball around a pose at the closest approach; the corridor is a distance from the leg at each knot
 //! and between knots.
 
+use simd::{F4, Four};
+
 use super::basis::{self, START, weights};
 
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
@@ -198,6 +200,12 @@ impl<const D: usize> Problem<D> {
         best
     }
 
+    /// A leg (index of its far vertex) in group `g`.
+    #[inline(always)]
+    pub(crate) fn way(&self, leg: usize, g: usize) -> &Way {
+        &self.ways[g][leg - 1]
+    }
+
     /// Direction along which the nearest point of the path moves; zero at a corner.
     pub(crate) fn slide(&self, foot: &Foot, g: usize) -> [f64; 3] {
         let way = &self.ways[g][foot.leg - 1];
@@ -369,5 +377,35 @@ impl Way {
             off[2] - share * way[2],
         ];
         Foot { offset, leg, share }
+    }
+
+    /// Offsets of four points from this leg, by coordinate, if the nearest point of each lies between its ends.
+    #[inline(always)]
+    pub(crate) fn beside<S: Four>(&self, points: [F4<S>; 3]) -> Option<[F4<S>; 3]> {
+        let simd = points[0].build();
+        let [from, way] = [&self.from, &self.way];
+        let x = points[0] - F4::splat(simd, from[0]);
+        let y = points[1] - F4::splat(simd, from[1]);
+        let z = points[2] - F4::splat(simd, from[2]);
+        let share = (x * way[0] + y * way[1] + z * way[2]) * self.inverse;
+        let inside = F4::splat(simd, f64::MIN_POSITIVE).le(share)
+            & share.le(F4::splat(simd, 1.0 - f64::EPSILON));
+        let offset = [x - share * way[0], y - share * way[1], z - share * way[2]];
+        if inside.bits() == 0b1111 {
+            Some(offset)
+        } else {
+            None
+        }
+    }
+
+    /// Direction of the leg; zero for a leg of no length.
+    #[inline(always)]
+    pub(crate) fn direction(&self) -> [f64; 3] {
+        let factor = self.inverse.sqrt();
+        [
+            self.way[0] * factor,
+            self.way[1] * factor,
+            self.way[2] * factor,
+        ]
     }
 }

@@ -1,7 +1,8 @@
 //! The interior point iteration. It may stop at any time: every iterate after the first feasible
 //! one is a valid motion.
 
-use super::newton::{Barrier, KEEP, Seen, Step, System};
+use super::barrier::{Barrier, KEEP, Seen};
+use super::newton::{Step, System};
 use super::problem::{Point, Problem, Room, spreading, ways};
 use super::project::project;
 
@@ -44,6 +45,9 @@ const ANCHORED: usize = 40;
 /// Square of the Newton decrement that is near enough to a centre on the way to a first valid motion.
 const ROUGHLY: f64 = 30.0;
 
+/// A gap from which on no more than a motion is wanted that is far inside of its bounds.
+const ROUGH: f64 = 0.1;
+
 /// How the iteration is led.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
@@ -58,6 +62,8 @@ struct Pace {
     keep: f64,
     /// Rounds in which a trial looks for the passes.
     rounds: usize,
+    /// Square of the decrement from which widened bounds are narrowed at once.
+    near: f64,
 }
 
 impl Pace {
@@ -70,6 +76,7 @@ impl Pace {
                 low: LOW,
                 keep: KEEP,
                 rounds: 3,
+                near: if effort.gap > ROUGH { 3.0 } else { 0.1 },
             };
         }
         // Between two ends in motion the passes of a sharp corner wander, and an iterate that comes close
@@ -82,6 +89,7 @@ impl Pace {
             low: 0.0,
             keep: 0.5,
             rounds: 12,
+            near: 0.1,
         }
     }
 }
@@ -178,7 +186,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             weight = (weight * pace.growth).min(1.01 * parameter / (effort.gap * point.z));
         } else if since == 0 && !moved {
             return None; // Stuck.
-        } else if step.decrement < 0.1 || !moved {
+        } else if step.decrement < pace.near || !moved {
             since = PATIENCE;
         }
     }

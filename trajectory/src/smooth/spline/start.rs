@@ -80,15 +80,19 @@ fn most<const D: usize>(vertices: usize) -> f64 {
     }
 }
 
-/// First iterate of a problem; also sets the `scale` of the problem. For a start in motion,
-/// `spread` is the factor on the time of the look-ahead.
-pub(crate) fn first<const D: usize>(problem: &mut Problem<D>, spread: Option<f64>) -> Point<D> {
+/// First iterate of a problem, with at least so many `knots` in one time `A / J`; also sets the `scale` of the
+/// problem. For a start in motion, `spread` is the factor on the time of the look-ahead.
+pub(crate) fn first<const D: usize>(
+    problem: &mut Problem<D>,
+    spread: Option<f64>,
+    knots: f64,
+) -> Point<D> {
     let moving = spread.is_some();
     let legs = legs(problem);
     let ramp = (0..Problem::<D>::GROUPS)
         .map(|g| problem.groups[g].caps[1] / problem.groups[g].caps[2])
         .fold(0.0, f64::max);
-    let coarse = ramp / KNOTS_PER_RAMP;
+    let coarse = ramp / knots;
     let start = begin(problem, &legs);
     let mut rates = junctions(problem, &legs, coarse);
     rates[0] = start[1];

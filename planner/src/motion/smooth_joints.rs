@@ -1,0 +1,301 @@
+//! MoveSmoothlyTo: the joints along a smooth motion of the tool.
+
+use kinematics::follow::{self, FollowPoint, NullMotion};
+use nalgebra::SVector;
+use trajectory::timing::PathTiming;
+use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, smooth};
+
+use super::cartesian::{Way, is_still, joint_path, pieces};
+use super::draft::{Crossing, Draft};
+use super::{Blend, MotionError, Planner, ROUNDING};
+use crate::task::Move;
+
+/// Fraction of the time by which a motion may be slowed down uniformly before another time law is
+/// computed.
+const ENOUGH: f64 = 1e-3;
+/// Time of the joints over that of the tool from which on the spare joint of an arm is asked to help.
+const HELPED: f64 = 1.01;
+/// A time law along a motion of the tool, whose ends rest; it is never faster.
+const ALONG: TimingOptions = TimingOptions {
+    start: Boundary::Free,
+    end: Boundary::Free,
+    rate_cap: Some(1.0),
+    cells: None,
+    fit: 1e-8,
+    gap: 1e-3,
+    reserve: 0.0,
+};
+
+impl<const N: usize> Planner<N> {
+    /// The joints along a smooth path, without a null-space motion that helps them.
+    pub(super) fn joints_on(
+        &self,
+        path: SmoothPath,
+        start: &SVector<f64, N>,
+    ) -> Result<Followed<N>, MotionError> {
+        let points = if path.is_still() {
+            Vec::new()
+        } else {
+            let towards = |u: f64| path.towards(u);
+            self.followed(&path.way(&towards), start)?
+        };
+        Ok(Followed { path, points })
+    }
+
+    /// The motions of the joints along a smooth path, slowed down where a joint needs it, to be certified: the fastest
+    /// first. [`MotionError::NoWay`] if none is shorter than `most` (s).
+    pub(super) fn along_smooth(
+        &self,
+        Followed { path, points }: &Followed<N>,
+        motion: &Move,
+        (start, most): (&SVector<f64, N>, f64),
+    ) -> Result<Vec<Draft<N>>, MotionError> {
+        let plan = &path.plan;
+        let crossings = Crossing::of(plan);
+        if path.is_still() {
+            let at_once = Crossing::at(&crossings, |_| 0.0);
+            return Ok(vec![passing(Trajectory::new(Vec::new()), at_once)]);
+        }
+        let first = match self.fastest_along(plan, (points, most), (&crossings, motion)) {
+            // The spare joint may help.
+            Err(MotionError::NoWay) if N > 6 => None,
+            first => Some(first?),
+        };
+        let time = |draft: &Draft<N>| draft.trajectory.duration();
+        let most = first.as_ref().map_or(most, time);
+        if most <= plan.duration() * HELPED {
+            return Ok(first.into_iter().collect());
+        }
+        let towards = |u: f64| path.towards(u);
+        let mut way = path.way(&towards);
+        let spare = self.helping(&way, points, start);
+        way.spare = spare.as_ref();
+        let other = way.spare.and_then(|_| {
+            let points = self.followed(&way, start).ok()?;
+            let draft = self.fastest_along(plan, (&points, most), (&crossings, motion));
+            draft.ok().filter(|draft| time(draft) < most)
+        });
+        let drafts: Vec<_> = other.into_iter().chain(first).collect();
+        if drafts.is_empty() {
+            return Err(MotionError::NoWay);
+        }
+        Ok(drafts)
+    }
+
+    /// A lower bound of the time of the joints along a smooth path, s: of the fastest law without limits of jerk.
+    pub(super) fn least_along(
+        &self,
+        Followed { path, points }: &Followed<N>,
+        motion: &Move,
+    ) -> Result<f64, MotionError> {
+        let plan = &path.plan;
+        let joints = joint_path(plan, points)?;
+        let timing = PathTiming::new(&joints, &self.limits, &motion.limits, &ALONG)?;
+        Ok(timing.lower_bound().max(plan.duration()))
+    }
+
+    /// The fastest motion of the joints along a smooth motion of the tool, that is never faster;
+    /// [`MotionError::NoWay`], for less work, where none is shorter than `most` (s).
+    fn fastest_along(
+        &self,
+        plan: &smooth::SmoothPlan,
+        (points, most): (&[FollowPoint<N>], f64),
+        (crossings, motion): (&[Crossing], &Move),
+    ) -> Result<Draft<N>, MotionError> {
+        let free = plan.duration();
+        let enough = free * (1.0 + ENOUGH);
+        let slowed = || {
+            let direct = Trajectory::new(pieces(points));
+            self.slowed(passing(direct, crossings.to_vec()), motion)
+        };
+        // Slowed down as a whole it takes at least so long: where that is more than enough, the whole need
+        // not be bounded before another time law is known to be slower.
+        let sure = free * self.least_slowdown(points) * (1.0 - ROUNDING);
+        let mut direct = (sure <= enough).then(slowed);
+        if let Some(direct) = direct.take_if(|direct| direct.trajectory.duration() <= enough) {
+            return Ok(direct);
+        }
+        let path = joint_path(plan, points)?;
+        let timed = self.retimed(&path, (crossings, most), motion);
+        let time = |draft: &Draft<N>| draft.trajectory.duration();
+        let least = direct.as_ref().map_or(sure, time);
+        match timed {
+            Ok(timed) if time(&timed) < least => Ok(timed),
+            // No motion along this path is short enough.
+            Err(error @ MotionError::NoWay) => Err(error),
+            timed => {
+                let direct = direct.unwrap_or_else(slowed);
+                Ok(match timed {
+                    Ok(timed) if time(&timed) < time(&direct) => timed,
+                    _ => direct,
+                })
+            }
+        }
+    }
+
+    /// The least factor by which time has to be stretched so that the joints keep their limits at all points,
+    /// whose parameter is time; at least 1.
+    fn least_slowdown(&self, points: &[FollowPoint<N>]) -> f64 {
+        let factors = points.iter().map(|point| self.slowdown(point));
+        factors.fold(1.0, f64::max)
+    }
+
+    /// The factor by which time has to be stretched so that the joints keep their limits at a point.
+    fn slowdown(&self, point: &FollowPoint<N>) -> f64 {
+        let limits = &self.limits;
+        let [_, velocity, acceleration, jerk] = &point.q;
+        (0..N).fold(1.0_f64, |most, j| {
+            most.max(velocity[j].abs() / limits.velocity[j])
+                .max((acceleration[j].abs() / limits.acceleration[j]).sqrt())
+                .max((jerk[j].abs() / limits.jerk[j]).cbrt())
+        })
+    }
+
+    /// A null-space motion with which the joints need about less time for a curve whose parameter is time.
+    fn helping(
+        &self,
+        way: &Way<'_, N>,
+        points: &[FollowPoint<N>],
+        start: &SVector<f64, N>,
+    ) -> Option<NullMotion<N>> {
+        if N <= 6 {
+            return None;
+        }
+        let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
+        let cost = |points: &[FollowPoint<N>]| self.about_time(points);
+        let (tool, options) = (way.tool(), way.options());
+        follow::cheaper(&self.solver, &tool, (&grid, start), &options, &cost)
+    }
+
+    /// About the time that the joints need along points whose parameter is the time of the tool: at each point
+    /// the factor by which it must be stretched.
+    fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
+        let parts = points.windows(2).map(|pair| {
+            let mean = 0.5 * (self.slowdown(&pair[0]) + self.slowdown(&pair[1]));
+            mean * (pair[1].u - pair[0].u)
+        });
+        parts.sum()
+    }
+
+    /// The smooth motion of the tool through the poses of a move that starts at `start`; `fit` says
+    /// whether a curve may be fitted through a dense list, `gap` how near to the optimum it ends.
+    pub(super) fn smooth_path(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (fit, gap): (bool, Option<f64>),
+    ) -> Result<SmoothPath, MotionError> {
+        let mut poses = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        options.fit = fit;
+        options.gap = gap.unwrap_or(options.gap);
+        Ok(SmoothPath {
+            plan: smooth::plan(&poses, &options)?,
+            tolerance: motion.tolerance,
+            still: is_still(&poses),
+        })
+    }
+
+    /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
+    /// `crossings` are those of the smooth motion. [`MotionError::NoWay`] if none is shorter than `most` (s).
+    fn retimed(
+        &self,
+        path: &HermitePath<N, &dyn ToolCurve>,
+        (crossings, most): (&[Crossing], f64),
+        motion: &Move,
+    ) -> Result<Draft<N>, MotionError> {
+        let timing = PathTiming::new(path, &self.limits, &motion.limits, &ALONG)?;
+        if timing.lower_bound() >= most {
+            return Err(MotionError::NoWay);
+        }
+        let timed = if most < f64::INFINITY {
+            timing.solve_below(most)?.ok_or(MotionError::NoWay)?
+        } else {
+            timing.solve()?
+        };
+        let times = Crossing::at(crossings, |u| moment(&timed.law, u));
+        Ok(self.slowed(passing(timed.trajectory, times), motion))
+    }
+}
+
+/// A smooth motion of the tool, and joints along it whose parameter is its time.
+pub(super) struct Followed<const N: usize> {
+    pub(super) path: SmoothPath,
+    points: Vec<FollowPoint<N>>,
+}
+
+/// The smooth motion of the tool that the joints are to follow.
+pub(super) struct SmoothPath {
+    pub(super) plan: smooth::SmoothPlan,
+    /// Tolerance with which it was planned, m.
+    tolerance: f64,
+    /// Whether all poses are where the arm is.
+    still: bool,
+}
+
+impl SmoothPath {
+    /// Whether it is along a curve fitted through a dense list.
+    pub(super) fn is_fitted(&self) -> bool {
+        self.plan.method() == smooth::Method::Fit
+    }
+
+    /// Whether nothing moves.
+    fn is_still(&self) -> bool {
+        self.still || self.plan.duration() <= 0.0
+    }
+
+    /// The pose of the command that is next at a time.
+    fn towards(&self, time: f64) -> usize {
+        let passes = self.plan.crossings().iter();
+        1 + passes.take_while(|pass| pass.time <= time).count()
+    }
+
+    /// The way of the tool, with the next pose after a parameter.
+    fn way<'a, const N: usize>(&'a self, towards: &'a dyn Fn(f64) -> usize) -> Way<'a, N> {
+        Way {
+            still_ends: true,
+            towards,
+            ..Way::along(&self.plan)
+        }
+    }
+
+    /// What it promises.
+    pub(super) fn blend(&self) -> Blend {
+        let certificate = self.plan.certificate();
+        Blend {
+            tolerance: self.tolerance,
+            exact_stop: self.plan.exact_stop(),
+            corridor_ratio: certificate.corridor.ratio,
+            jerk_ratio: certificate.jerk.ratio.max(certificate.angular_jerk.ratio),
+            fallbacks: self.plan.fallbacks(),
+        }
+    }
+}
+
+/// A draft that passes its poses so.
+fn passing<const N: usize>(trajectory: Trajectory<N>, crossings: Vec<Crossing>) -> Draft<N> {
+    Draft {
+        crossings,
+        ..Draft::of(trajectory)
+    }
+}
+
+/// The time at which a monotonic time law reaches `u`, s.
+pub(super) fn moment(law: &Trajectory<1>, u: f64) -> f64 {
+    let pieces = law.pieces();
+    let next = pieces.partition_point(|piece| piece.coefficients[0][0] <= u);
+    let Some(piece) = pieces.get(next.saturating_sub(1)) else {
+        return 0.0;
+    };
+    let (mut low, mut high) = (0.0, piece.duration);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if piece.sample(middle).position[0] < u {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    law.times()[next.saturating_sub(1)] + high
+}
