@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::options::SmoothOptions;
-use super::poly::{bernstein, hull, quartic};
+use super::poly::{hull, quartic};
 use super::span::Span;
 
 /// Upper bounds of angular speed, acceleration and jerk over their limits.
@@ -11,7 +11,10 @@ use super::span::Span;
 /// On each of a few intervals the world axes of the rotations, and what their moving adds, are fixed at the
 /// middle, which leaves a polynomial, bounded by its hull. How both change is bounded by norms and added: less
 /// on shorter intervals, into which an interval is divided where the bound is little above the limit.
-pub(super) fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
+///
+/// A bound that is not above the greatest `known` of the motion does not change that, and is not made closer; of a motion
+/// that exceeds a limit, nor are those within the others.
+pub(super) fn angular_bounds(span: &Span, options: &SmoothOptions, known: [f64; 3]) -> [f64; 3] {
     let limits = &options.limits;
     let caps = [
         limits.angular_speed,
@@ -19,13 +22,32 @@ pub(super) fn angular_bounds(span: &Span, options: &SmoothOptions) -> [f64; 3] {
         limits.angular_jerk,
     ];
     let whole = [0.0, span.duration];
-    if span.turns.len() == 1 {
-        bounds_within(span, whole, &caps, 0)
+    let (bounds, _) = ratios(span, whole, &caps);
+    if span.turns.len() == 1 || is_known(bounds, known) {
+        bounds
     } else {
-        divided(span, whole, &caps, DIVISIONS)
+        divided(span, whole, (&caps, known), DIVISIONS)
     }
 }
 
+/// Whether bounds say nothing of a motion that is not known. One that keeps its limits: none is above the greatest, and
+/// none is nearly at its limit. One that does not: none is above its limit and the greatest.
+fn is_known(bounds: [f64; 3], known: [f64; 3]) -> bool {
+    let broken = known.iter().any(|known| *known > BROKEN);
+    let most = known.map(|known| {
+        if broken {
+            known.max(1.0)
+        } else {
+            known.min(ACTIVE)
+        }
+    });
+    (0..3).all(|k| bounds[k] <= most[k])
+}
+
+/// A limit used to this share is active.
+pub(super) const ACTIVE: f64 = 0.98;
+/// A ratio from which on a motion does not keep its limits.
+const BROKEN: f64 = 1.0 + 1e-6;
 /// Parts into which an interval is divided, and how often.
 const PARTS: u32 = 4;
 const DIVISIONS: u32 = 3;
@@ -33,34 +55,49 @@ const DIVISIONS: u32 = 3;
 const HOPELESS: f64 = 3.0;
 
 /// The bounds on an interval from the bounds on its parts.
-fn divided(span: &Span, [from, to]: [f64; 2], caps: &[f64; 3], left: u32) -> [f64; 3] {
+fn divided(
+    span: &Span,
+    [from, to]: [f64; 2],
+    (caps, mut known): (&[f64; 3], [f64; 3]),
+    left: u32,
+) -> [f64; 3] {
     let width = (to - from) / f64::from(PARTS);
-    let parts = (0..PARTS).map(|part| {
+    let mut worst = [0.0; 3];
+    for part in 0..PARTS {
         let from = from + width * f64::from(part);
-        bounds_within(span, [from, from + width], caps, left)
-    });
-    parts.fold([0.0; 3], |worst, bounds| {
-        [0, 1, 2].map(|k| {
-            if bounds[k] <= worst[k] {
-                worst[k]
-            } else {
-                bounds[k]
+        let bounds = bounds_within(span, [from, from + width], (caps, known), left);
+        for k in 0..3 {
+            if bounds[k] > worst[k] || bounds[k].is_nan() {
+                worst[k] = bounds[k];
             }
-        })
-    })
+            known[k] = known[k].max(bounds[k]);
+        }
+    }
+    worst
 }
 
 /// The bounds on an interval, which may be divided as often as is `left`.
-fn bounds_within(span: &Span, [from, to]: [f64; 2], caps: &[f64; 3], left: u32) -> [f64; 3] {
-    let (bounds, middle) = angular_stretch(span, from, to);
-    let bounds = [0, 1, 2].map(|k| bounds[k] / caps[k]);
+fn bounds_within(
+    span: &Span,
+    interval: [f64; 2],
+    (caps, known): (&[f64; 3], [f64; 3]),
+    left: u32,
+) -> [f64; 3] {
+    let (bounds, exceeded) = ratios(span, interval, caps);
     let most = bounds.iter().fold(0.0_f64, |most, bound| most.max(*bound));
-    let exceeded = (0..3).any(|k| middle[k] > caps[k]);
-    if left == 0 || most <= 1.0 || (exceeded && most > HOPELESS) {
+    let hopeless = exceeded && most > HOPELESS;
+    if left == 0 || most <= 1.0 || hopeless || is_known(bounds, known) {
         bounds
     } else {
-        divided(span, [from, to], caps, left - 1)
+        divided(span, interval, (caps, known), left - 1)
     }
+}
+
+/// The bounds over the limits on an interval as a whole, and whether its middle exceeds one.
+fn ratios(span: &Span, [from, to]: [f64; 2], caps: &[f64; 3]) -> ([f64; 3], bool) {
+    let (bounds, middle) = angular_stretch(span, from, to);
+    let exceeded = (0..3).any(|k| middle[k] > caps[k]);
+    ([0, 1, 2].map(|k| bounds[k] / caps[k]), exceeded)
 }
 
 /// Bounds of the norms of angular velocity and its two derivatives on the
@@ -76,12 +113,9 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> ([f64; 3], [f64; 3]) {
     let mut moving = Moving::default();
     let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(span.turns.len());
     for turn in &span.turns {
-        let [_, c1, c2, c3, c4] = turn.angle;
-        let [middle, now1, now2, _] = quartic(&turn.angle, from + half);
+        let [middle, now1, now2, now3] = quartic(&turn.angle, from + half);
         let axis = rotation * turn.axis;
-        let first = bernstein(&[c1, 2.0 * c2, 3.0 * c3, 4.0 * c4], from, to);
-        let second = bernstein(&[2.0 * c2, 6.0 * c3, 12.0 * c4], from, to);
-        let third = bernstein(&[6.0 * c3, 24.0 * c4], from, to);
+        let (first, second, third) = rates([now1, now2, now3, 24.0 * turn.angle[4]], half);
         let most = [largest(&first), largest(&second), largest(&third)];
         // The axis turns with the factors before it; if they have the same direction, it does not
         // turn.
@@ -117,6 +151,28 @@ fn angular_stretch(span: &Span, from: f64, to: f64) -> ([f64; 3], [f64; 3]) {
     let [w, a] = moving.now;
     let middle = [w.norm(), a.norm(), ((rate3[0] + rate3[1]) * 0.5).norm()];
     (bounds, middle)
+}
+
+/// Bernstein forms of the first three derivatives of an angle on an interval, from its derivatives at the middle and
+/// half of its width.
+fn rates([d1, d2, d3, d4]: [f64; 4], half: f64) -> ([f64; 4], [f64; 3], [f64; 2]) {
+    let square = half * half;
+    let even = [d1 + 0.5 * d3 * square, d1 - d3 * square / 6.0];
+    let odd = [
+        (d2 + d4 * square / 6.0) * half,
+        (d2 / 3.0 - d4 * square / 6.0) * half,
+    ];
+    let (bend, slope) = (0.5 * d4 * square, d3 * half);
+    (
+        [
+            even[0] - odd[0],
+            even[1] - odd[1],
+            even[1] + odd[1],
+            even[0] + odd[0],
+        ],
+        [d2 - slope + bend, d2 - bend, d2 + slope + bend],
+        [d3 - d4 * half, d3 + d4 * half],
+    )
 }
 
 /// What comes of axes that move with the factors before them.
@@ -231,7 +287,7 @@ mod tests {
                 angular_jerk: 1.15 * most[2],
                 ..ToolLimits::UNLIMITED
             };
-            let bounds = angular_bounds(&span, &SmoothOptions::new(0.01, limits));
+            let bounds = angular_bounds(&span, &SmoothOptions::new(0.01, limits), [0.0; 3]);
             for bound in bounds {
                 assert!((1.0 / 1.151..=1.0).contains(&bound), "{seed}: {bounds:?}");
             }
@@ -273,10 +329,56 @@ mod tests {
             [0, 1, 2].map(|k| most[k].max(rates[k].norm()))
         });
         let whole = angular_stretch(&span, 0.0, 0.25 * h).0;
-        let bounds = angular_bounds(&span, &SmoothOptions::new(0.01, limits));
+        let bounds = angular_bounds(&span, &SmoothOptions::new(0.01, limits), [0.0; 3]);
         assert!(most[2] < limits.angular_jerk, "{most:?}");
         assert!(whole[2] > HOPELESS * limits.angular_jerk, "{whole:?}");
         assert!(bounds.iter().all(|bound| *bound <= 1.02), "{bounds:?}");
         assert!(bounds[2] >= most[2] / limits.angular_jerk, "{bounds:?}");
+    }
+
+    /// Bounds that are not made closer where they are below what is known of a motion do not change its greatest, whether
+    /// it keeps its limits or not.
+    #[test]
+    fn what_is_known_does_not_change_the_greatest() {
+        for most in [0.5, 0.9, 1.5, 4.0] {
+            let limits = ToolLimits {
+                angular_speed: 3.0 / most,
+                angular_acceleration: 15.0 / most,
+                angular_jerk: 300.0 / most,
+                ..ToolLimits::UNLIMITED
+            };
+            let options = SmoothOptions::new(0.01, limits);
+            let (mut plain, mut known, mut coarse) = ([0.0_f64; 3], [0.0_f64; 3], 0);
+            for seed in 0..60_u32 {
+                let angle = |k: u32| 0.9 * f64::from(seed * 7 + k * 13).sin();
+                let mut control = vec![UnitQuaternion::identity()];
+                for k in 0..4 {
+                    let step = Vector3::new(0.024, 0.004 * angle(k), 0.002 * angle(k + 1));
+                    let step = UnitQuaternion::from_scaled_axis(step * angle(5));
+                    control.push(control[control.len() - 1] * step);
+                }
+                let span = Span {
+                    start: 0.0,
+                    duration: 0.008,
+                    point: [Vector3::zeros(); 5],
+                    base: control[0],
+                    turns: turns(&control, 0.008),
+                };
+                let close = angular_bounds(&span, &options, [0.0; 3]);
+                let bounds = angular_bounds(&span, &options, known);
+                coarse += usize::from(bounds != close);
+                for k in 0..3 {
+                    plain[k] = plain[k].max(close[k]);
+                    known[k] = known[k].max(bounds[k]);
+                }
+            }
+            let exceeded = |greatest: [f64; 3]| greatest.map(|ratio| ratio.max(1.0));
+            let keeps = plain.iter().all(|ratio| *ratio <= 1.0);
+            if keeps {
+                assert_eq!(plain, known);
+            }
+            assert_eq!(exceeded(plain), exceeded(known));
+            assert!(coarse > 20, "{coarse}");
+        }
     }
 }

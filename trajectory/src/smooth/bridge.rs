@@ -4,19 +4,22 @@
 //! A list is divided where no motion was found through a pose, and at the division the motion rests. What
 //! is left of the list does not matter there: a spline over twice the way of braking, with knots as
 //! close together as the corner asks for, is found where one through the whole list is not.
+//!
+//! Where none is found, what comes after the rest begins before what comes before it has ended ([`overlapped`]).
 
 use nalgebra::{Isometry3, Vector3};
 
 use super::certificate::certify;
 use super::choose::{Then, Window, stretch};
-use super::crossing::crossings;
+use super::crossing::{Crossing, crossings};
 use super::method::Method;
 use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::overlap::overlapped;
 use super::rest::Rest;
 use super::span::Span;
 use super::spline::{KNOTS_PER_RAMP, Moving};
-use crate::ToolPoint;
+use crate::{ToolLimits, ToolPoint};
 
 /// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
 const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
@@ -26,11 +29,21 @@ const MOST: usize = 48;
 const ROUNDS: usize = 2;
 /// Knots in the time of the corner that the tolerance allows.
 const KNOTS_PER_CORNER: f64 = 6.0;
+/// Most knots of a bridge: where jerks are large beside accelerations, knots as close as a ramp asks for were thousands.
+const MOST_KNOTS: f64 = 600.0;
 /// Factor on the time of a motion before its rests are bridged: a state at a limit leaves a search no room.
 const ROOM: f64 = 1.0 + 2e-6;
+/// Most that bridges save, in braking times: once, and for each. A rest costs one, the way from full speed and back to it
+/// at half of the speed in the mean; a bridge may gain some by its shape beside.
+const SAVED: [f64; 2] = [0.5, 1.1];
 /// Share of its time that a bridge has to save at least.
 const GAIN: f64 = 1e-4;
-/// Difference of two states that are the same, in the units of the normal form: rounding of jerks is the largest.
+/// Factor from one time in which both sides of a rest move to the next that is tried, the least of them in ramps of the
+/// acceleration, and how many whole motions are certified.
+const SHORTER: f64 = 0.8;
+const LEAST_OVERLAP: f64 = 0.03;
+const MOST_WHOLE: usize = 5;
+/// Difference of two states that are the same, in the units of the normal form.
 const SAME: f64 = 1e-7;
 
 /// A motion with its rests, and when it passes each pose between the ends.
@@ -48,12 +61,12 @@ struct Bridges<'a> {
     retried: bool,
 }
 
-/// The motion through `poses` without those of its rests for which a faster way past is found, with which
-/// the whole `holds`; `None` if there is none.
+/// The motion through poses without those of its rests for which a faster way past is found, with which
+/// the whole `holds`; `None` if there is none, or if it would not be faster than `best` (s).
 pub(super) fn bridged(
     motion: &Motion,
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
+    (poses, options): (&[Isometry3<f64>], &SmoothOptions),
+    best: f64,
     holds: &dyn Fn(&Motion) -> bool,
 ) -> Option<Motion> {
     let mut spans = motion.spans.clone();
@@ -84,9 +97,15 @@ pub(super) fn bridged(
     for _ in 0..ROUNDS {
         let (before, mut k) = (bridges.rests.len(), 0);
         while k < bridges.rests.len() && left > 0 {
+            if bridges.least(left) > best {
+                return None;
+            }
+            // A spline has to be faster than both sides of the rest at the same time.
+            let other = bridges.overlapped(k, holds);
+            let saved = other.map_or(0.0, |other| bridges.duration() - other.duration());
             let passed = REACHES.iter().find_map(|reach| {
                 left = left.checked_sub(1)?;
-                bridges.passed(k, *reach, holds)
+                bridges.passed(k, (*reach, saved), holds)
             });
             match passed {
                 Some(passed) => bridges = passed,
@@ -97,16 +116,33 @@ pub(super) fn bridged(
             break;
         }
     }
+    bridges.overlap_all(holds);
     (bridges.rests.len() < motion.rests.len()).then(|| bridges.motion())
 }
 
 impl Bridges<'_> {
     /// The motion past the rest with the number `k`, if the whole of it holds then: a pass beside the bridge
     /// may be another one now, so the bridge by itself does not tell.
-    fn passed(&self, k: usize, reach: f64, holds: &dyn Fn(&Motion) -> bool) -> Option<Self> {
+    fn passed(
+        &self,
+        k: usize,
+        (reach, saved): (f64, f64),
+        holds: &dyn Fn(&Motion) -> bool,
+    ) -> Option<Self> {
         let mut next = self.clone();
-        next.pass(k, reach)?;
+        next.pass(k, reach, saved)?;
         holds(&next.clone().motion()).then_some(next)
+    }
+
+    /// Time (s) below which the motion does not come with so many more bridges.
+    fn least(&self, bridges: usize) -> f64 {
+        let saved = (SAVED[0] + SAVED[1] * self.rests.len().min(bridges) as f64) * self.brake();
+        self.duration() - saved
+    }
+
+    /// Time of the motion, s.
+    fn duration(&self) -> f64 {
+        self.spans.last().map_or(0.0, Span::end)
     }
 
     /// Braking time from full speed, s.
@@ -115,13 +151,13 @@ impl Bridges<'_> {
         limits.speed / limits.acceleration + limits.acceleration / limits.jerk
     }
 
-    /// Puts a spline in the place of the rest with the number `k`, if that is faster.
-    fn pass(&mut self, k: usize, reach: f64) -> Option<()> {
+    /// Puts a spline in the place of the rest with the number `k`, if that saves more than so much time (s).
+    fn pass(&mut self, k: usize, reach: f64, saved: f64) -> Option<()> {
         let [from, to] = self.reach(k, reach);
         let ends = [self.state(from)?, self.state(to)?];
         let moving = Moving {
             state: ends[0],
-            spacing: self.spacing(),
+            spacing: self.spacing().max((to - from) / MOST_KNOTS),
         };
         let first = self.passes.partition_point(|time| *time <= from);
         let after = self.passes.partition_point(|time| *time < to);
@@ -133,9 +169,9 @@ impl Bridges<'_> {
             finish: Some(&ends[1]),
             then: Then::Stop,
         };
-        let most = (to - from) * (1.0 - GAIN);
+        let most = ((to - from) * (1.0 - GAIN)).min(to - from - saved);
         let bridge = window.spline(Some(&known), most)?;
-        joins(&bridge.spans, &ends).then_some(())?;
+        joins(&bridge.spans, &ends, &self.options.limits).then_some(())?;
         let (certificate, times) = certify(&bridge.spans, window.poses, self.options);
         // What the bridge exceeds a limit by the whole motion is slowed down by.
         let slower = if certificate.holds() {
@@ -143,14 +179,59 @@ impl Bridges<'_> {
         } else {
             certificate.stretch() * ROOM
         };
-        let total = self.spans.last().map_or(0.0, Span::end);
-        (bridge.duration() + (slower - 1.0) * total <= most).then_some(())?;
+        (bridge.duration() + (slower - 1.0) * self.duration() <= most).then_some(())?;
         for (time, pass) in self.passes[first..after].iter_mut().zip(times) {
             *time = from + pass.time;
         }
-        self.replace(k, [from, to], bridge.spans);
+        self.replace(k, [from, to], (Method::Spline, bridge.spans));
         self.slow_down(slower);
         Some(())
+    }
+
+    /// Lets both sides of each rest that is left overlap where the whole of it holds then.
+    fn overlap_all(&mut self, holds: &dyn Fn(&Motion) -> bool) {
+        let (mut k, mut left) = (0, MOST);
+        while k < self.rests.len() && left > 0 {
+            left -= 1;
+            match self.overlapped(k, holds) {
+                Some(passed) => *self = passed,
+                None => k += 1,
+            }
+        }
+    }
+
+    /// The motion in which what comes after the rest with the number `k` begins before what comes before it ends, as
+    /// early as the whole of it holds.
+    fn overlapped(&self, k: usize, holds: &dyn Fn(&Motion) -> bool) -> Option<Self> {
+        let rest = self.rests[k].time;
+        let [from, to] = self.reach(k, 1.0);
+        let ramp = self.options.limits.acceleration / self.options.limits.jerk;
+        let corner = self.state(rest)?.pose;
+        let (mut time, mut left) = (ramp.min(rest - from).min(to - rest), MOST_WHOLE);
+        while time > LEAST_OVERLAP * ramp && left > 0 {
+            let sides = [self.part(rest - time, rest), self.part(rest, rest + time)];
+            let spans = overlapped(&sides[0], &sides[1], &corner);
+            if self.is_near(&spans, &corner) {
+                left -= 1;
+                let mut next = self.clone();
+                let method = self.methods[self.at(rest - time)];
+                next.replace(k, [rest - time, rest + time], (method, spans));
+                let passes = crossings(&next.spans, self.poses, self.options);
+                next.passes = passes.iter().map(|pass| pass.time).collect();
+                if holds(&next.clone().motion()) {
+                    return Some(next);
+                }
+            }
+            time *= SHORTER;
+        }
+        None
+    }
+
+    /// Whether spans keep all limits and pass a pose within the tolerances.
+    fn is_near(&self, spans: &[Span], corner: &Isometry3<f64>) -> bool {
+        let (certificate, passes) = certify(spans, &[*corner; 3], self.options);
+        let near = passes.first().is_some_and(Crossing::holds);
+        near && certificate.worst_limit() <= 1.0
     }
 
     /// Takes so many times the time for all of the motion.
@@ -167,7 +248,7 @@ impl Bridges<'_> {
         let brake = self.brake();
         let time = self.rests[k].time;
         let before = k.checked_sub(1).map_or(0.0, |k| self.rests[k].time);
-        let end = self.spans.last().map_or(0.0, Span::end);
+        let end = self.duration();
         let after = self.rests.get(k + 1).map_or(end, |rest| rest.time);
         [
             (time - reach * brake).max(0.5 * (before + time)),
@@ -212,8 +293,8 @@ impl Bridges<'_> {
     }
 
     /// Puts spans in the place of those between two times, and of the rest with the number `k`.
-    fn replace(&mut self, k: usize, [from, to]: [f64; 2], bridge: Vec<Span>) {
-        let end = self.spans.last().map_or(0.0, Span::end);
+    fn replace(&mut self, k: usize, [from, to]: [f64; 2], (method, bridge): (Method, Vec<Span>)) {
+        let end = self.duration();
         let (first, last) = (self.at(from), self.at(to));
         let change = bridge.last().map_or(0.0, Span::end) - (to - from);
         let mut spans = self.spans[..first].to_vec();
@@ -234,7 +315,7 @@ impl Bridges<'_> {
             before.part(before.start, from),
         );
         for span in bridge {
-            add(from, Method::Spline, span);
+            add(from, method, span);
         }
         add(
             to + change,
@@ -273,8 +354,8 @@ impl Bridges<'_> {
     }
 }
 
-/// Whether spans begin and end in two states, up to rounding.
-fn joins(spans: &[Span], ends: &[ToolPoint; 2]) -> bool {
+/// Whether spans begin and end in two states, up to rounding: that of a jerk is as large as the jerks beside it.
+fn joins(spans: &[Span], ends: &[ToolPoint; 2], limits: &ToolLimits) -> bool {
     let (Some(first), Some(last)) = (spans.first(), spans.last()) else {
         return false;
     };
@@ -282,9 +363,12 @@ fn joins(spans: &[Span], ends: &[ToolPoint; 2]) -> bool {
     got.iter().zip(ends).all(|(got, end)| {
         let off = got.pose.translation.vector - end.pose.translation.vector;
         let turned = got.pose.rotation.angle_to(&end.pose.rotation);
-        let rates = got.linear.iter().zip(&end.linear);
-        let mut rates = rates.chain(got.angular.iter().zip(&end.angular));
-        let near = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm() <= SAME * (1.0 + b.norm());
-        off.norm() + turned <= SAME && rates.all(|(a, b)| near(a, b))
+        let near = |got: &[Vector3<f64>; 3], end: &[Vector3<f64>; 3], jerk: f64| {
+            let sizes = [end[0].norm(), end[1].norm(), jerk];
+            (0..3).all(|k| (got[k] - end[k]).norm() <= SAME * (1.0 + sizes[k]))
+        };
+        off.norm() + turned <= SAME
+            && near(&got.linear, &end.linear, limits.jerk)
+            && near(&got.angular, &end.angular, limits.angular_jerk)
     })
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::angular_bounds::angular_bounds;
+use super::angular_bounds::{ACTIVE, angular_bounds};
 use super::crossing::{self, Crossing, RESOLUTION};
 use super::options::SmoothOptions;
 use super::poly::{halve, hull};
@@ -68,9 +68,6 @@ pub struct Certificate {
     /// shorter, s.
     pub lower_bound: f64,
 }
-
-/// A limit used to this share is active.
-const ACTIVE: f64 = 0.98;
 
 /// Limits in the order of the ratios.
 const LIMITS: [Limit; 6] = [
@@ -240,7 +237,12 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
     certificate.jerk.raise(bounds[2], time);
     let mut angular = [0.0; 3];
     if !span.turns.is_empty() {
-        angular = angular_bounds(span, options);
+        let known = [
+            certificate.angular_speed.ratio,
+            certificate.angular_acceleration.ratio,
+            certificate.angular_jerk.ratio,
+        ];
+        angular = angular_bounds(span, options, known);
         certificate.angular_speed.raise(angular[0], time);
         certificate.angular_acceleration.raise(angular[1], time);
         certificate.angular_jerk.raise(angular[2], time);

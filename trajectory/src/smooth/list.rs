@@ -1,5 +1,7 @@
 //! A list of poses, and the choice among the ways of planning it.
 
+use std::cell::Cell;
+
 use nalgebra::Isometry3;
 
 use super::certificate::certify_whole;
@@ -62,6 +64,8 @@ struct List<'a> {
     exact_stop: f64,
     /// Lower bound of the time of all motions, s.
     least: f64,
+    /// Time of the fastest motion that is certified so far, s.
+    best: Cell<f64>,
 }
 
 impl<'a> List<'a> {
@@ -72,6 +76,7 @@ impl<'a> List<'a> {
             options,
             exact_stop: exact_stop::duration(poses, &options.limits),
             least: lower_bound(poses, options),
+            best: Cell::new(f64::INFINITY),
         }
     }
 
@@ -240,12 +245,14 @@ impl<'a> List<'a> {
         let bridged = if motion.rests.is_empty() || self.options.is_rough() {
             None
         } else {
-            bridge::bridged(&motion, &form.poses, &form.options, &holds)
+            let best = self.best.get();
+            bridge::bridged(&motion, (&form.poses, &form.options), best, &holds)
         };
         let mut plan = bridged
             .and_then(|motion| self.placed(form, motion))
             .or_else(|| self.placed(form, motion))?;
         plan.before = before;
+        self.best.set(self.best.get().min(plan.duration()));
         Some(plan)
     }
 

@@ -27,6 +27,7 @@ mod motion;
 mod narrower;
 mod normal_form;
 mod options;
+mod overlap;
 mod plan;
 mod ramp;
 mod rest;

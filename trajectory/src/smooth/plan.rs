@@ -43,11 +43,12 @@ impl SmoothPlan {
     ) -> Self {
         let (certificate, crossings) = whole;
         let (start, goal) = (poses[0], poses[poses.len() - 1]);
+        let rests = named(motion.rests, &motion.spans, poses, &crossings);
         Self {
             start,
             goal,
             spans: motion.spans,
-            rests: named(motion.rests, poses, &crossings),
+            rests,
             crossings,
             certificate,
             parts: motion.parts,
@@ -145,8 +146,13 @@ pub(super) fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> O
     })
 }
 
-/// The rests with the poses at which they are, and those where the way turns back said to be there.
-fn named(mut rests: Vec<Rest>, poses: &[Isometry3<f64>], crossings: &[Crossing]) -> Vec<Rest> {
+/// The rests with the poses at which they are, and those where the way turns back, and no others, said to be there.
+fn named(
+    mut rests: Vec<Rest>,
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    crossings: &[Crossing],
+) -> Vec<Rest> {
     for rest in &mut rests {
         let after = crossings.partition_point(|pass| pass.time < rest.time);
         let off = |pass: &&Crossing| (pass.time - rest.time).abs();
@@ -156,9 +162,20 @@ fn named(mut rests: Vec<Rest>, poses: &[Isometry3<f64>], crossings: &[Crossing])
         };
         rest.pose = pass.index;
         let tolerances = [pass.tolerance, pass.angular_tolerance];
-        if rest.cause != RestCause::TurnsBack && turns_back(poses, pass.index, tolerances) {
-            rest.cause = RestCause::TurnsBack;
-        }
+        let passed = 1 + crossings.partition_point(|pass| pass.time <= rest.time);
+        let next = spans.partition_point(|span| span.start < rest.time);
+        let Some(span) = spans.get(next.saturating_sub(1)) else {
+            continue;
+        };
+        let place = span
+            .at((rest.time - span.start).clamp(0.0, span.duration))
+            .pose;
+        let back = turns_back(&place, poses, passed, tolerances);
+        rest.cause = match rest.cause {
+            _ if back => RestCause::TurnsBack,
+            RestCause::TurnsBack => RestCause::Division,
+            other => other,
+        };
     }
     rests
 }

@@ -26,10 +26,14 @@ impl Rest {
 }
 
 /// Why a smooth motion rests on its way.
+///
+/// With a tolerance the way itself never asks for a rest: where it turns by 120 degrees or more, what goes on may begin
+/// before what goes before has ended, and where it turns by less, an arc passes. So each of these says what kind of place
+/// it is at which no faster motion was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RestCause {
-    /// The way turns back on itself, by more than 135 degrees as seen at a few tolerances from the pose.
+    /// The way turns back on itself, by more than 135 degrees as seen at a few tolerances from the rest.
     TurnsBack,
     /// A straight leg ends there: the tolerance is zero, or no faster motion past the pose was
     /// certified.

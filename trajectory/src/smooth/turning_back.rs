@@ -4,41 +4,31 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::line::body_turn;
 
-/// Distance from a pose at which the way to it and from it are compared, in tolerances: what is nearer a
-/// motion may cut off.
+/// Distance from a place at which the way to it and from it are compared, in tolerances: what is nearer a motion may
+/// cut off.
 const AWAY: f64 = 4.0;
 /// Cosine of the turn from one to the other from which on the way turns back. At 120 degrees the widest arc
 /// that passes the pose within the tolerance has the tolerance as its radius; at this angle 0.6 of it.
 const BACK: f64 = -0.7;
 
-/// Whether the way turns back at pose `at` or beside it, seen at a few tolerances (m, rad): the place does,
-/// or, where the place stays within them, the orientation.
-pub(super) fn turns_back(poses: &[Isometry3<f64>], at: usize, tolerances: [f64; 2]) -> bool {
-    let near = |k: &usize| distance(&poses[*k], &poses[at], tolerances) < AWAY;
-    let first = (0..at).rev().take_while(near).last().unwrap_or(at);
-    let last = (at + 1..poses.len()).take_while(near).last().unwrap_or(at);
-    (first.saturating_sub(1)..=(last + 1).min(poses.len() - 1))
-        .any(|k| cosine(poses, k, tolerances).is_some_and(|cosine| cosine < BACK))
-}
-
-/// Distance of two poses in tolerances, the larger of place and orientation.
-fn distance(one: &Isometry3<f64>, other: &Isometry3<f64>, tolerances: [f64; 2]) -> f64 {
-    let way = (one.translation.vector - other.translation.vector).norm();
-    let turn = body_turn(&one.rotation, &other.rotation).norm();
-    (way / tolerances[0]).max(turn / tolerances[1])
-}
-
-/// Cosine of the turn from the way to a pose to that from it; `None` near an end of the list.
-fn cosine(poses: &[Isometry3<f64>], at: usize, [place, turn]: [f64; 2]) -> Option<f64> {
-    let pose = &poses[at];
-    let way = |other: &Isometry3<f64>| other.translation.vector - pose.translation.vector;
-    let turned = |other: &Isometry3<f64>| body_turn(&pose.rotation, &other.rotation);
-    let both = |offset: &dyn Fn(&Isometry3<f64>) -> Vector3<f64>, radius: f64| {
-        let before = leaves(poses[..at].iter().rev().map(offset), radius)?;
-        let after = leaves(poses[at + 1..].iter().map(offset), radius)?;
+/// Whether the way turns back at a place on it, which lies before the pose with the number `after`, seen at a few
+/// tolerances (m, rad) from the place: the controlled point does, or, where it stays within them to one side, the
+/// orientation.
+pub(super) fn turns_back(
+    place: &Isometry3<f64>,
+    poses: &[Isometry3<f64>],
+    after: usize,
+    [near, askew]: [f64; 2],
+) -> bool {
+    let way = |other: &Isometry3<f64>| other.translation.vector - place.translation.vector;
+    let turned = |other: &Isometry3<f64>| body_turn(&place.rotation, &other.rotation);
+    let cosine = |offset: &dyn Fn(&Isometry3<f64>) -> Vector3<f64>, radius: f64| {
+        let before = leaves(poses[..after].iter().rev().map(offset), radius)?;
+        let after = leaves(poses[after..].iter().map(offset), radius)?;
         Some(-before.dot(&after) / (before.norm() * after.norm()))
     };
-    both(&way, AWAY * place).or_else(|| both(&turned, AWAY * turn))
+    let cosine = cosine(&way, AWAY * near).or_else(|| cosine(&turned, AWAY * askew));
+    cosine.is_some_and(|cosine| cosine < BACK)
 }
 
 /// Where a polyline that begins in a place leaves the ball of a radius around it; offsets from the place.
@@ -73,19 +63,20 @@ mod tests {
         let tolerances = [1e-3, 0.02];
         let spike = list(&[[0.0, 0.0], [0.1, 0.0], [0.0, 0.01]]);
         let corner = list(&[[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]]);
-        assert!(turns_back(&spike, 1, tolerances));
-        assert!(!turns_back(&corner, 1, tolerances));
+        let at = |list: &[Isometry3<f64>], k: usize| turns_back(&list[k], list, k + 1, tolerances);
+        assert!(at(&spike, 1));
+        assert!(!at(&corner, 1));
         let noisy: Vec<_> = (0..100)
             .map(|i| [1e-4 * f64::from(i), 2e-4 * f64::from(i % 2)])
             .collect();
-        assert!(!(1..99).any(|at| turns_back(&list(&noisy), at, tolerances)));
-        // Dense, and found from a pose beside the tip.
+        assert!(!(1..99).any(|k| at(&list(&noisy), k)));
+        // Dense, at the tip and not farther from it than is seen.
         let dense: Vec<_> = (0..=400)
             .map(|i| 0.2 - (0.2 - 1e-3 * f64::from(i)).abs())
             .map(|x| [x, 0.0])
             .collect();
-        assert!(turns_back(&list(&dense), 202, tolerances));
-        assert!(!turns_back(&list(&dense), 150, tolerances));
+        assert!(at(&list(&dense), 200) && at(&list(&dense), 202));
+        assert!(!at(&list(&dense), 150));
     }
 
     /// Where the place rests the orientation counts.
@@ -94,7 +85,7 @@ mod tests {
         let turned = |angle: f64| Isometry3::new(Vector3::zeros(), Vector3::z() * angle);
         let there = [turned(0.0), turned(0.5), turned(1.0)];
         let back = [turned(0.0), turned(0.5), turned(0.1)];
-        assert!(!turns_back(&there, 1, [1e-3, 0.02]));
-        assert!(turns_back(&back, 1, [1e-3, 0.02]));
+        assert!(!turns_back(&there[1], &there, 2, [1e-3, 0.02]));
+        assert!(turns_back(&back[1], &back, 2, [1e-3, 0.02]));
     }
 }

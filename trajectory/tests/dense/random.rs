@@ -3,17 +3,16 @@
 
 use nalgebra::{Isometry3, Vector3};
 use trajectory::ToolCurve;
-use trajectory::smooth::{Rest, SmoothOptions, SmoothPlan, plan};
+use trajectory::smooth::{Rest, RestCause, SmoothOptions, SmoothPlan, plan};
 
 use crate::lists;
 
 /// Distance from a rest at which the way to it and from it are compared, in tolerances.
 const AWAY: f64 = 4.0;
 
-/// Whether a rest is needed: the way of the list turns back there, by more than 135 degrees as seen at a few
-/// tolerances from the rest. No arc inside ball and corridor that is wider than 0.6 of the tolerance passes there.
-/// The cause that the plan names is not asked.
-fn needed(plan: &SmoothPlan, poses: &[Isometry3<f64>], rest: &Rest, tolerance: f64) -> bool {
+/// Whether the way of the list turns back at a rest, by more than 135 degrees as seen at a few tolerances from it. The
+/// cause that the plan names is not asked.
+fn turns_back(plan: &SmoothPlan, poses: &[Isometry3<f64>], rest: &Rest, tolerance: f64) -> bool {
     let place = plan.at(rest.time).pose.translation.vector;
     let passes = plan.crossings();
     let after = 1 + passes.partition_point(|pass| pass.time <= rest.time);
@@ -46,20 +45,24 @@ fn leaves(places: impl Iterator<Item = Vector3<f64>>, radius: f64) -> Vector3<f6
     from
 }
 
-/// Whether a rest is where it is said to be: nothing moves, and its pose is passed there.
-fn is_named(plan: &SmoothPlan, rest: &Rest) -> bool {
+/// Whether a rest is where it is said to be: nothing moves, its pose is passed there, and the way turns back there if
+/// that is its cause, and else not.
+fn is_named(plan: &SmoothPlan, poses: &[Isometry3<f64>], rest: &Rest, tolerance: f64) -> bool {
+    let back = rest.cause == RestCause::TurnsBack;
     let still = plan.at(rest.time).linear[0].norm() < 1e-6;
     let off = |time: f64| (time - rest.time).abs();
     let pass = plan.crossings().get(rest.pose.wrapping_sub(1));
     let least = plan.crossings().iter().map(|pass| off(pass.time));
     let least = least.fold(f64::INFINITY, f64::min);
-    still && pass.is_some_and(|pass| pass.index == rest.pose && off(pass.time) <= least)
+    let place = still && back == turns_back(plan, poses, rest, tolerance);
+    place && pass.is_some_and(|pass| pass.index == rest.pose && off(pass.time) <= least)
 }
 
 /// Plans so many lists: each is certified and never slower than exact stops, and each rest is named; the
-/// seeds of those that rest without need.
-fn judged(seeds: std::ops::Range<u64>, most: f64) -> Vec<u64> {
-    let mut needless = Vec::new();
+/// seeds of those that rest. Every rest is a fall back: where the way turns back, what comes after it may begin before
+/// what comes before it has ended, and elsewhere an arc passes within the tolerance.
+fn judged(seeds: impl Iterator<Item = u64>, most: f64) -> Vec<u64> {
+    let mut resting = Vec::new();
     for seed in seeds {
         let (poses, tolerance) = lists::random(seed, most);
         let options = SmoothOptions::new(tolerance, lists::turning_limits());
@@ -68,24 +71,23 @@ fn judged(seeds: std::ops::Range<u64>, most: f64) -> Vec<u64> {
         let stops = plan.exact_stop() * (1.0 + 1e-12);
         assert!(plan.duration() <= stops, "{seed}");
         for rest in plan.rests() {
-            assert!(is_named(&plan, rest), "{seed} {rest:?}");
-            if !needed(&plan, &poses, rest, tolerance) {
-                println!(
-                    "list {seed}: pose {} at {:.3} s, {}",
-                    rest.pose, rest.time, rest.cause
-                );
-                needless.push(seed);
-            }
+            assert!(is_named(&plan, &poses, rest, tolerance), "{seed} {rest:?}");
+            println!(
+                "list {seed}: pose {} at {:.3} s, {}",
+                rest.pose, rest.time, rest.cause
+            );
+            resting.push(seed);
         }
     }
-    needless.dedup();
-    needless
+    resting.dedup();
+    resting
 }
 
 #[test]
 fn random_lists_are_certified() {
-    // List 7 rested at three poses, with a tolerance of 15 micrometres.
-    assert_eq!(judged(0..24, 400.0), [0_u64; 0]);
+    // List 7 rested at three poses, with a tolerance of 15 micrometres. Lists 196 and 232 rested where their way turns
+    // back, as no spline past it was found.
+    assert_eq!(judged((0..24).chain([196, 232]), 400.0), [0_u64; 0]);
 }
 
 /// Lists that were slow or rested on their way, with the time that they may take (s): a list that is
@@ -130,9 +132,9 @@ fn ten_thousand_random_lists_are_certified() {
     let text = std::env::var("CANTER_RANDOM_LISTS").unwrap_or("0..10000".to_owned());
     let (from, to) = text.split_once("..").unwrap();
     let seeds = from.parse().unwrap()..to.parse().unwrap();
-    // The goal is one in a thousand; of the first 200 lists 4 rest without need.
-    let most = 1 + 20 * (seeds.end - seeds.start) / 1000;
-    let needless = judged(seeds, 400.0);
-    println!("{} lists rest without need: {needless:?}", needless.len());
-    assert!(needless.len() as u64 <= most, "{needless:?}");
+    // The goal is one in a thousand; of the lists 100 to 383 one rests (112).
+    let most = 1 + 5 * (seeds.end - seeds.start) / 1000;
+    let resting = judged(seeds, 400.0);
+    println!("{} lists rest: {resting:?}", resting.len());
+    assert!(resting.len() as u64 <= most, "{resting:?}");
 }
