@@ -436,6 +436,7 @@ impl Task<'_> {
             result.push(self.poses[foot.leg - 1].rotation * UnitQuaternion::from_scaled_axis(turn));
         }
         let Some(moving) = self.moving else {
+            self.meet(&mut result, point, h);
             return result;
         };
         // The orientations of the start differ only slightly: the difference fades out.
