@@ -143,11 +143,20 @@ impl<'a> List<'a> {
         found.is_divided() || found.plan.duration() > SLOW * self.least
     }
 
+    /// Whether the list is longer than one window may be: no search starts from its motion as a whole.
+    fn is_long(&self) -> bool {
+        self.poses.len() > windows::MOST_POSES
+    }
+
     /// Whether another search may find a faster motion.
     fn is_doubtful(&self, found: &Found) -> bool {
         let over = found.plan.duration() / self.least;
         let fitted = found.plan.method() == Method::Fit && found.suffices();
-        let doubtful = if fitted { FITTED } else { DOUBTFUL };
+        let doubtful = if fitted {
+            FITTED[usize::from(self.is_long())]
+        } else {
+            DOUBTFUL
+        };
         let far = over > doubtful || (found.motion.retried && over > NEAR);
         !self.options.is_rough() && (found.is_divided() || (far && self.poses.len() > FEW))
     }
@@ -161,13 +170,12 @@ impl<'a> List<'a> {
             let turned = form.turned(self.poses, self.options);
             best = Found::faster(Some(best), self.by_windows(&turned, &turned.options))?;
         }
-        let long = self.poses.len() > windows::MOST_POSES;
         let before = best.plan.duration();
         best = self.refined(form, best);
-        if !long && best.plan.duration() >= before && self.is_only_fitted(form, &best) {
+        if !self.is_long() && best.plan.duration() >= before && self.is_only_fitted(form, &best) {
             best = Found::faster(Some(best), self.by_windows(form, &form.options))?;
         }
-        if hard || best.is_hard() || long {
+        if hard || best.is_hard() || self.is_long() {
             let before = best.plan.duration();
             best = self.within_less(form, best)?;
             if best.plan.duration() < before {
@@ -181,9 +189,8 @@ impl<'a> List<'a> {
     /// wide balls may fail where one in narrow ones does not.
     fn within_less(&self, form: &NormalForm, mut best: Found) -> Option<Found> {
         let fit = self.may_be_fitted(form);
-        let long = self.poses.len() > windows::MOST_POSES;
         let cheap = best.plan.method() != Method::Fit && !self.is_costly(&best.plan);
-        let spline = best.is_hard() || (long && cheap);
+        let spline = best.is_hard() || (self.is_long() && cheap);
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
@@ -294,9 +301,10 @@ const ROUNDS: usize = 3;
 const GAIN: f64 = 0.998;
 
 /// A motion that takes no more than so many times the lower bound, found at the first attempt, is rarely slower than
-/// others by more than a percent; and a fit as it should be, up to this.
+/// others by more than a percent; and a fit as it should be, up to this: of a list of one window, and of a longer one,
+/// where another search takes longer.
 const DOUBTFUL: f64 = 1.1;
-const FITTED: f64 = 1.25;
+const FITTED: [f64; 2] = [1.18, 1.25];
 
 /// A motion that takes no more than so many times the lower bound cannot be much slower than another.
 const NEAR: f64 = 1.02;
