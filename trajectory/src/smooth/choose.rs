@@ -126,7 +126,11 @@ struct Attempts<'a> {
 
 impl<'a> Window<'a> {
     /// A window that starts at rest.
-    fn from_rest(poses: &'a [Isometry3<f64>], options: &'a SmoothOptions, then: Then) -> Self {
+    pub(crate) fn from_rest(
+        poses: &'a [Isometry3<f64>],
+        options: &'a SmoothOptions,
+        then: Then,
+    ) -> Self {
         Self {
             poses,
             options,

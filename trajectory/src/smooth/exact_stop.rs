@@ -126,27 +126,91 @@ pub(crate) fn duration(poses: &[Isometry3<f64>], limits: &ToolLimits) -> f64 {
 /// The poses without those that the straight leg between their neighbours passes anyway, in
 /// position and in orientation.
 pub(crate) fn corners(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
-    let mut kept: Vec<Isometry3<f64>> = Vec::with_capacity(poses.len());
-    // Index of the pose at which the current leg begins.
-    let mut begin = 0;
-    for (i, pose) in poses.iter().enumerate() {
-        let inner = &poses[(begin + 1).min(i)..i];
-        let grows = kept.len() > 1 && {
-            let leg = Leg::new(&poses[begin], pose);
-            let mut last = 0.0;
-            inner.iter().all(|pose| {
-                let share = leg.share(pose);
-                let ahead = share.is_some_and(|share| share > last && share < 1.0);
-                last = share.unwrap_or(last);
-                ahead
-            })
-        };
-        if grows {
-            kept.pop();
-        } else {
-            begin = i.saturating_sub(1);
-        }
-        kept.push(*pose);
+    let mut kept: Vec<_> = poses.first().copied().into_iter().collect();
+    let (last, mut from) = (poses.len().saturating_sub(1), 0);
+    while from < last {
+        from = farthest(poses, from);
+        kept.push(poses[from]);
     }
     kept
+}
+
+/// The farthest pose that is found to which a leg from pose `from` passes those between: doubling finds one too
+/// far, halving the farthest before it, so a long straight way costs little more than one look at each pose.
+fn farthest(poses: &[Isometry3<f64>], from: usize) -> usize {
+    let last = poses.len() - 1;
+    let (mut good, mut bad, mut step) = (from + 1, last + 1, 2);
+    while good < last && bad > last {
+        let to = (from + step).min(last);
+        if passes(&poses[from..=to]) {
+            good = to;
+            step *= 2;
+        } else {
+            bad = to;
+        }
+    }
+    while good + 1 < bad {
+        let middle = good.midpoint(bad);
+        if passes(&poses[from..=middle]) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    good
+}
+
+/// Whether the leg from the first pose to the last passes those between, in order.
+fn passes(poses: &[Isometry3<f64>]) -> bool {
+    let [first, inner @ .., goal] = poses else {
+        return true;
+    };
+    let leg = Leg::new(first, goal);
+    let mut last = 0.0;
+    inner.iter().all(|pose| {
+        let share = leg.share(pose);
+        let ahead = share.is_some_and(|share| share > last && share < 1.0);
+        last = share.unwrap_or(last);
+        ahead
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    fn at(x: f64, y: f64) -> Isometry3<f64> {
+        Isometry3::translation(x, y, 0.0)
+    }
+
+    /// Poses on straight legs are left out, however many; tips, repeats and other orientations stay.
+    #[test]
+    fn corners_are_kept() {
+        let mut way: Vec<_> = (0..1000_i32)
+            .map(|i| at(1e-3 * f64::from(i), 0.0))
+            .collect();
+        way.extend((1..700_i32).map(|i| at(0.999, 1e-3 * f64::from(i))));
+        assert_eq!(corners(&way), [way[0], way[999], way[1698]]);
+        let back = [
+            at(0.0, 0.0),
+            at(0.2, 0.0),
+            at(0.1, 0.0),
+            at(0.1, 0.0),
+            at(0.0, 0.0),
+        ];
+        assert_eq!(corners(&back[..3]), back[..3]);
+        assert_eq!(corners(&back).len(), 5);
+        let turned = |x: f64, angle: f64| {
+            Isometry3::from_parts(
+                at(x, 0.0).translation,
+                UnitQuaternion::from_scaled_axis(Vector3::x() * angle),
+            )
+        };
+        let even = [turned(0.0, 0.0), turned(0.1, 0.2), turned(0.2, 0.4)];
+        assert_eq!(corners(&even), [even[0], even[2]]);
+        let uneven = [turned(0.0, 0.0), turned(0.1, 0.3), turned(0.2, 0.4)];
+        assert_eq!(corners(&uneven), uneven);
+        assert_eq!(corners(&[]), []);
+    }
 }

@@ -5,14 +5,15 @@ use std::cell::Cell;
 use nalgebra::Isometry3;
 
 use super::certificate::certify_whole;
-use super::fit::Fit;
+use super::crossing::RESOLUTION;
+use super::found::Found;
 use super::lower_bound::lower_bound;
 use super::method::Method;
 use super::motion::Motion;
 use super::narrower::{narrower, within};
 use super::normal_form::NormalForm;
 use super::options::{SmoothError, SmoothOptions};
-use super::plan::{SmoothPlan, faster};
+use super::plan::SmoothPlan;
 use super::rest::RestCause;
 use super::windows::{self, Windows};
 use super::{bridge, dense, exact_stop};
@@ -46,19 +47,30 @@ use super::{bridge, dense, exact_stop};
 pub fn plan(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Result<SmoothPlan, SmoothError> {
     options.check(poses)?;
     let finite = options.finite();
-    let list = List::new(poses, &finite);
-    match list.fastest() {
-        Some(mut plan) => {
-            plan.certificate.lower_bound = list.least;
-            Ok(plan)
-        }
+    let legs = legs(poses, &finite);
+    let planned = |through: &[Isometry3<f64>]| List::new(poses, through, &finite).fastest();
+    let fewer = (legs.len() < poses.len()).then(|| planned(&legs));
+    match fewer.flatten().or_else(|| planned(poses)) {
+        Some(plan) => Ok(plan),
         // Without a tolerance, or if the form was too coarse.
         None => Ok(Windows::new(poses, options)?.finish()),
     }
 }
 
+/// The poses between which the legs are straight: further poses on a leg change nothing of the way, and in a
+/// corridor no wider than the balls most motions pass them, too.
+fn legs(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f64>> {
+    if options.tolerance <= RESOLUTION || options.corridor() > options.tolerance {
+        poses.to_vec()
+    } else {
+        exact_stop::corners(poses)
+    }
+}
+
 /// A list as it was given, with finite options, and the times (s) with a stop at each pose and of the bound.
 struct List<'a> {
+    given: &'a [Isometry3<f64>],
+    /// Those of the poses that the motion is planned through.
     poses: &'a [Isometry3<f64>],
     options: &'a SmoothOptions,
     exact_stop: f64,
@@ -69,12 +81,17 @@ struct List<'a> {
 }
 
 impl<'a> List<'a> {
-    /// A list under finite options.
-    fn new(poses: &'a [Isometry3<f64>], options: &'a SmoothOptions) -> Self {
+    /// The list `given` under finite options, planned through some of its `poses`.
+    fn new(
+        given: &'a [Isometry3<f64>],
+        poses: &'a [Isometry3<f64>],
+        options: &'a SmoothOptions,
+    ) -> Self {
         Self {
+            given,
             poses,
             options,
-            exact_stop: exact_stop::duration(poses, &options.limits),
+            exact_stop: exact_stop::duration(given, &options.limits),
             least: lower_bound(poses, options),
             best: Cell::new(f64::INFINITY),
         }
@@ -84,144 +101,153 @@ impl<'a> List<'a> {
     /// tolerance, and where no certificate holds.
     fn fastest(&self) -> Option<SmoothPlan> {
         let form = &NormalForm::new(self.poses, self.options)?;
-        let best = self.within_all(form)?;
-        self.within_less(form, best)
+        let first = self.at_first(form)?;
+        let best = if self.is_doubtful(&first) {
+            self.compared(form, first)?
+        } else {
+            first
+        };
+        let mut plan = best.plan;
+        plan.certificate.lower_bound = self.least;
+        Some(plan)
     }
 
-    /// The fastest of a motion and of those within less of the tolerance: what holds there holds here. A search
-    /// does not find the optimum for sure, and one in narrower balls may come nearer to it.
-    fn within_less(&self, form: &NormalForm, mut best: SmoothPlan) -> Option<SmoothPlan> {
-        let over = best.duration() / self.least;
-        let doubtful = best.retried || over > DOUBTFUL;
-        if !doubtful || self.poses.len() <= FEW || over <= NEAR || self.options.is_rough() {
+    /// The motion of the way of planning that suits the list, or the faster one of two.
+    fn at_first(&self, form: &NormalForm) -> Option<Found> {
+        let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
+        let fitted = if dense { self.fitted(form) } else { None };
+        let enough = fitted.as_ref().is_some_and(Found::suffices);
+        if enough && dense::suffices(&form.poses, &form.options) {
+            return fitted;
+        }
+        let spline = self.by_windows(form, &form.options);
+        let spline = spline.or_else(|| {
+            let turned = form.turned(self.poses, self.options);
+            self.by_windows(&turned, &turned.options)
+        });
+        let best = Found::faster(fitted, spline)?;
+        if self.options.is_rough() || dense || !self.is_slow(&best) || !self.may_be_fitted(form) {
             return Some(best);
         }
-        let fitted = best.method() == Method::Fit;
-        let fit = self.options.fit && dense::may_be_fitted(&form.poses, &form.options);
-        let spline = !fitted && (best.retried || !self.is_costly(&best));
-        let mut left = if best.retried { PATIENCE } else { 1 };
+        Found::faster(Some(best), self.fitted(form))
+    }
+
+    /// Whether a fit was taken without a look at another way.
+    fn is_only_fitted(&self, form: &NormalForm, found: &Found) -> bool {
+        let fitted = found.plan.method() == Method::Fit;
+        fitted && found.suffices() && dense::suffices(&form.poses, &form.options)
+    }
+
+    /// Whether a curve may be fitted through the list.
+    fn may_be_fitted(&self, form: &NormalForm) -> bool {
+        self.options.fit && dense::may_be_fitted(&form.poses, &form.options)
+    }
+
+    /// Whether a motion may be much slower than another: it rests on its way, or is far above the bound.
+    fn is_slow(&self, found: &Found) -> bool {
+        found.is_divided() || found.plan.duration() > SLOW * self.least
+    }
+
+    /// Whether the list is longer than one window may be: no search starts from its motion as a whole.
+    fn is_long(&self) -> bool {
+        self.poses.len() > windows::MOST_POSES
+    }
+
+    /// Whether another search may find a faster motion.
+    fn is_doubtful(&self, found: &Found) -> bool {
+        let over = found.plan.duration() / self.least;
+        let fitted = found.plan.method() == Method::Fit && found.suffices();
+        let doubtful = if fitted {
+            FITTED[usize::from(self.is_long())]
+        } else {
+            DOUBTFUL
+        };
+        let far = over > doubtful || (found.motion.retried && over > NEAR);
+        !self.options.is_rough() && (found.is_divided() || (far && self.poses.len() > FEW))
+    }
+
+    /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need, of a
+    /// search that starts from the motion, and, where that finds nothing or an attempt failed, of those found otherwise
+    /// and within less of the tolerance.
+    fn compared(&self, form: &NormalForm, first: Found) -> Option<Found> {
+        let (hard, mut best) = (first.is_hard(), first);
+        if best.is_divided() {
+            let turned = form.turned(self.poses, self.options);
+            best = Found::faster(Some(best), self.by_windows(&turned, &turned.options))?;
+        }
+        let before = best.plan.duration();
+        best = self.refined(form, best);
+        if !self.is_long() && best.plan.duration() >= before && self.is_only_fitted(form, &best) {
+            best = Found::faster(Some(best), self.by_windows(form, &form.options))?;
+        }
+        if hard || best.is_hard() || self.is_long() {
+            let before = best.plan.duration();
+            best = self.within_less(form, best)?;
+            if best.plan.duration() < before {
+                best = self.refined(form, best);
+            }
+        }
+        Some(best)
+    }
+
+    /// The fastest of a motion and of those within less of the tolerance: what holds there holds here, and a search in
+    /// wide balls may fail where one in narrow ones does not.
+    fn within_less(&self, form: &NormalForm, mut best: Found) -> Option<Found> {
+        let fit = self.may_be_fitted(form);
+        let cheap = best.plan.method() != Method::Fit && !self.is_costly(&best.plan);
+        let spline = best.is_hard() || (self.is_long() && cheap);
+        let mut left = if best.is_hard() { PATIENCE } else { 1 };
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
-            let before = best.duration();
+            let before = best.plan.duration();
             if fit {
-                best = faster(Some(best), self.fit(form, &options).map(|fit| fit.plan))?;
+                best = Found::faster(Some(best), self.fit(form, &options))?;
             }
             if spline {
-                best = faster(Some(best), self.by_windows(form, &options))?;
+                best = Found::faster(Some(best), self.by_windows(form, &options))?;
             }
-            left -= usize::from(best.duration() > GAIN * before);
-            if left == 0 {
+            left -= usize::from(best.plan.duration() > GAIN * before);
+            if left == 0 || !self.is_doubtful(&best) {
                 break;
             }
         }
         Some(best)
     }
 
-    /// The fastest certified motion within the whole tolerance.
-    fn within_all(&self, form: &NormalForm) -> Option<SmoothPlan> {
-        let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
-        let fitted = if dense { self.fitted(form) } else { None };
-        match fitted {
-            Some(fit) if fit.suffices() && dense::suffices(&form.poses, &form.options) => {
-                Some(fit.plan)
-            }
-            fitted => {
-                let spline = self.by_spline(form);
-                let spline =
-                    spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
-                let mut best = faster(fitted.map(|fit| fit.plan), spline);
-                if self.options.is_rough() {
-                    return best;
-                }
-                let slow = best.as_ref().is_some_and(|plan| self.is_slow(plan));
-                if slow
-                    && self.options.fit
-                    && !dense
-                    && dense::may_be_fitted(&form.poses, &form.options)
-                {
-                    best = faster(best, self.fitted(form).map(|fit| fit.plan));
-                }
-                match best {
-                    Some(plan) if plan.is_divided() => self.without_rests(form, plan),
-                    other => other,
-                }
+    /// The motion with which searches end that start from the one found and from each other, as far as they are faster.
+    fn refined(&self, form: &NormalForm, mut found: Found) -> Found {
+        let other =
+            (found.backwards != form.backwards).then(|| form.turned(self.poses, self.options));
+        let form = other.as_ref().unwrap_or(form);
+        for _ in 0..ROUNDS {
+            let before = found.plan.duration();
+            let motion = windows::refined(&form.poses, &form.options, &found.motion);
+            let refined = motion.and_then(|motion| self.certified(form, motion));
+            let Some(refined) = refined.filter(|refined| refined.plan.duration() < before) else {
+                break;
+            };
+            found = refined;
+            if found.plan.duration() > GAIN * before {
+                break;
             }
         }
-    }
-
-    /// Whether a motion may be much slower than another: it rests on its way, or is far above the bound.
-    fn is_slow(&self, plan: &SmoothPlan) -> bool {
-        plan.is_divided() || plan.duration() > SLOW * self.least
+        found
     }
 
     /// The motion along a fitted curve: the faster one from both ends if that from the first is
     /// slower than it might be.
-    fn fitted(&self, form: &NormalForm) -> Option<Fit> {
-        let first = self.fitted_from(form);
-        if first.as_ref().is_some_and(Fit::suffices) {
-            return first;
-        }
-        let other = self.fitted_from(&form.turned(self.poses, self.options));
-        Fit::faster(first, other)
-    }
-
-    /// The same from one end. A curve that was found only at a second attempt is compared with one within
-    /// half of the tolerance.
-    fn fitted_from(&self, form: &NormalForm) -> Option<Fit> {
+    fn fitted(&self, form: &NormalForm) -> Option<Found> {
         let first = self.fit(form, &form.options);
-        if !first.as_ref().is_some_and(|fit| fit.plan.retried) {
+        if first.as_ref().is_some_and(Found::suffices) {
             return first;
         }
-        let half = self.fit(form, &within(&form.options, 0.5));
-        Fit::faster(first, half)
+        let turned = form.turned(self.poses, self.options);
+        Found::faster(first, self.fit(&turned, &turned.options))
     }
 
-    /// The same under options of the form, once.
-    fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Fit> {
-        let motion = dense::plan(&form.poses, options)?;
-        let eased = motion.eased || !motion.rests.is_empty();
-        let plan = self.certified(form, motion)?;
-        Some(Fit { plan, eased })
-    }
-
-    /// The fastest motion of a plan with rests that the way does not ask for, of the splines from the
-    /// other end, and of those within less of the tolerance: what holds there holds here, and a search in
-    /// wide balls may fail where one in narrow ones does not.
-    fn without_rests(&self, form: &NormalForm, plan: SmoothPlan) -> Option<SmoothPlan> {
-        let mut best = Some(plan);
-        if best.as_ref().is_some_and(SmoothPlan::is_divided) {
-            let other = form.turned(self.poses, self.options);
-            best = faster(best, self.by_spline(&other));
-        }
-        for share in SHARES {
-            if best.as_ref().is_some_and(SmoothPlan::is_divided) {
-                best = faster(best, self.by_windows(form, &within(&form.options, share)));
-            }
-        }
-        best
-    }
-
-    /// The motion by time-optimal splines, window by window.
-    fn by_spline(&self, form: &NormalForm) -> Option<SmoothPlan> {
-        let plan = self.by_windows(form, &form.options)?;
-        // A motion within half of the tolerance is within all of it. A second motion is cheap if
-        // poses are close to each other and fit in one window.
-        let costly = self.is_costly(&plan) || plan.parts.len() > 1;
-        if costly
-            || self.options.is_rough()
-            || self.poses.len() <= SHORT
-            || plan.method() != Method::Spline
-        {
-            return Some(plan);
-        }
-        let mut half = form.options.clone();
-        half.tolerance *= 0.5;
-        let before = plan.before;
-        let mut best = faster(Some(plan), self.by_windows(form, &half))?;
-        if before.1 {
-            best.before = before;
-        }
-        Some(best)
+    /// The same from one end, under options of the form.
+    fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Found> {
+        self.certified(form, dense::plan(&form.poses, options)?)
     }
 
     /// Whether another spline takes long: poses are far apart.
@@ -229,56 +255,63 @@ impl<'a> List<'a> {
         plan.spans.len() > SPANS_PER_POSE * self.poses.len()
     }
 
-    /// The same under options of the form, once.
-    fn by_windows(&self, form: &NormalForm, options: &SmoothOptions) -> Option<SmoothPlan> {
+    /// The motion by time-optimal splines under options of the form, window by window.
+    fn by_windows(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Found> {
         let motion = windows::motion(&form.poses, options, form.backwards)?;
         self.certified(form, motion)
     }
 
-    /// A motion through the normal form as a plan for the list, past its rests as far as one is found that is
+    /// A motion through the normal form as one of the list, past its rests as far as one is found that is
     /// certified, if its certificate holds.
-    fn certified(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
+    fn certified(&self, form: &NormalForm, motion: Motion) -> Option<Found> {
         let mut rests = motion.rests.iter();
         let divided = rests.any(|rest| rest.cause != RestCause::TurnsBack);
         let before = (motion.duration(), divided);
-        let holds = |motion: &Motion| self.placed(form, motion.clone()).is_some();
+        let eased = motion.eased || !motion.rests.is_empty();
         let bridged = if motion.rests.is_empty() || self.options.is_rough() {
             None
         } else {
+            let holds = |motion: &Motion| self.placed(form, motion).is_some();
             let best = self.best.get();
             bridge::bridged(&motion, (&form.poses, &form.options), best, &holds)
         };
-        let mut plan = bridged
-            .and_then(|motion| self.placed(form, motion))
-            .or_else(|| self.placed(form, motion))?;
-        plan.before = before;
+        let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
+        let (plan, motion) = bridged.and_then(placed).or_else(|| placed(motion))?;
         self.best.set(self.best.get().min(plan.duration()));
-        Some(plan)
+        Some(Found {
+            plan,
+            motion,
+            backwards: form.backwards,
+            before,
+            eased,
+        })
     }
 
     /// A motion through the normal form, laid back, if its certificate holds.
-    fn placed(&self, form: &NormalForm, motion: Motion) -> Option<SmoothPlan> {
-        let motion = form.place(motion);
-        let whole = certify_whole(&motion.spans, self.poses, self.options);
+    fn placed(&self, form: &NormalForm, motion: &Motion) -> Option<SmoothPlan> {
+        let motion = form.place(motion.clone());
+        let whole = certify_whole(&motion.spans, self.given, self.options);
         let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
         let good = whole.0.holds() && soon;
-        good.then(|| SmoothPlan::new(self.poses, motion, whole, self.exact_stop))
+        good.then(|| SmoothPlan::new(self.given, motion, whole, self.exact_stop))
     }
 }
-
-/// Shares of the tolerance within which a list is planned that rests within all of it.
-const SHARES: [f64; 3] = [0.7, 0.5, 0.35];
 
 /// Most narrower tolerances that are tried, and how many of them without a gain where an attempt failed.
 const MOST_NARROWER: usize = 5;
 const PATIENCE: usize = 2;
 
-/// A motion within less has gained something if it takes less than this share.
+/// Most searches from a motion, each from the one that the search before ended with.
+const ROUNDS: usize = 3;
+
+/// An attempt has gained something if its motion takes less than this share.
 const GAIN: f64 = 0.998;
 
 /// A motion that takes no more than so many times the lower bound, found at the first attempt, is rarely slower than
-/// one within less of the tolerance.
-const DOUBTFUL: f64 = 1.25;
+/// others by more than a percent; and a fit as it should be, up to this: of a list of one window, and of a longer one,
+/// where another search takes longer.
+const DOUBTFUL: f64 = 1.1;
+const FITTED: [f64; 2] = [1.18, 1.25];
 
 /// A motion that takes no more than so many times the lower bound cannot be much slower than another.
 const NEAR: f64 = 1.02;
@@ -286,13 +319,10 @@ const NEAR: f64 = 1.02;
 /// A motion that takes so many times the lower bound may be slow: three in four splines take less.
 const SLOW: f64 = 1.4;
 
-/// Lists up to this length are planned once.
-const SHORT: usize = 5;
-
 /// Lists up to this length are not planned within less: a curve of a few poses is one of many that a move may try.
 const FEW: usize = 12;
 
-/// Longer lists are planned twice if they need no more than this many spans per pose.
+/// Another spline is cheap if it needs no more than this many spans per pose.
 const SPANS_PER_POSE: usize = 24;
 
 #[cfg(test)]

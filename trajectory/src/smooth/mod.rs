@@ -19,7 +19,7 @@ mod choose;
 mod crossing;
 mod dense;
 mod exact_stop;
-mod fit;
+mod found;
 mod list;
 mod lower_bound;
 mod method;

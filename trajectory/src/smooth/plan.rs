@@ -26,11 +26,6 @@ pub struct SmoothPlan {
     pub(super) parts: Vec<(Method, usize)>,
     rests: Vec<Rest>,
     exact_stop: f64,
-    /// Of the fastest of the motions that were tried, before their rests were bridged: its time (s), and
-    /// whether it rested elsewhere than where the way turns back.
-    pub(super) before: (f64, bool),
-    /// Whether within less of the tolerance there may be a faster motion.
-    pub(super) retried: bool,
 }
 
 impl SmoothPlan {
@@ -53,8 +48,6 @@ impl SmoothPlan {
             certificate,
             parts: motion.parts,
             exact_stop,
-            before: (0.0, false),
-            retried: motion.retried,
         }
     }
 
@@ -110,12 +103,6 @@ impl SmoothPlan {
         self.rests.len()
     }
 
-    /// Whether it rests elsewhere than where the way turns back, or did before its rests were bridged: then
-    /// another way of planning may be faster.
-    pub(super) fn is_divided(&self) -> bool {
-        self.before.1
-    }
-
     /// Time the motion would take with a stop at each pose, s.
     #[must_use]
     pub fn exact_stop(&self) -> f64 {
@@ -128,22 +115,6 @@ impl SmoothPlan {
         let span = self.spans.get(next.saturating_sub(1))?;
         Some((span, (time - span.start).clamp(0.0, span.duration)))
     }
-}
-
-/// The faster of two plans, the first if they are equal.
-pub(super) fn faster(first: Option<SmoothPlan>, second: Option<SmoothPlan>) -> Option<SmoothPlan> {
-    let (mut first, mut second) = match (first, second) {
-        (Some(first), Some(second)) => (first, second),
-        (first, second) => return first.or(second),
-    };
-    let later = second.before.0 < first.before.0;
-    let before = if later { second.before } else { first.before };
-    (first.before, second.before) = (before, before);
-    Some(if second.duration() < first.duration() {
-        second
-    } else {
-        first
-    })
 }
 
 /// The rests with the poses at which they are, and those where the way turns back, and no others, said to be there.

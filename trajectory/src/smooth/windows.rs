@@ -31,7 +31,7 @@ const LONG_BRAKES: f64 = 64.0;
 const AGAIN_BRAKES: f64 = 2.0;
 
 /// Most poses of one window.
-const MOST_POSES: usize = 400;
+pub(super) const MOST_POSES: usize = 400;
 
 /// Times that a list is divided where its windows miss a pose.
 const DIVISIONS: usize = 3;
@@ -45,6 +45,20 @@ pub(super) fn motion(
     backwards: bool,
 ) -> Option<Motion> {
     in_parts(poses, options, (backwards, DIVISIONS))
+}
+
+/// The spline with which a search ends that starts from a motion through the list, if it is certified and faster.
+pub(super) fn refined(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    known: &Motion,
+) -> Option<Motion> {
+    let poses = divided(poses, options);
+    if poses.len() > MOST_POSES {
+        return None;
+    }
+    let window = Window::from_rest(&poses, options, Then::Stop);
+    window.spline(Some(&known.spans), known.duration())
 }
 
 /// The same, divided at most so many times.

@@ -29,6 +29,11 @@ const AT_END: f64 = 1.0 + 1e-5;
 /// Poses up to which position and orientation have bands of their own.
 const FEW: usize = 26;
 
+/// Most Newton steps of a search from rest to rest that starts from a motion, and those after which it is given up: where
+/// the tolerance shows many corners 90 end far from the optimum. With orientations a step takes ten times as long.
+const STEPS: usize = 300;
+const SEARCH: usize = 200;
+
 /// Times that the jump of an angular velocity within one knot may exceed the angular jerk where the
 /// orientation is to follow the progress.
 const HOPELESS: f64 = 30.0;
@@ -281,6 +286,9 @@ impl Task<'_> {
         let mut point = match self.request.known {
             Some(spans) => {
                 effort.spread = None;
+                if D == 3 && self.moving.is_none() {
+                    (effort.steps, effort.search) = (STEPS, SEARCH);
+                }
                 self.known(&mut problem, spans, used)
             }
             None => {
@@ -440,6 +448,7 @@ impl Task<'_> {
             result.push(self.poses[foot.leg - 1].rotation * UnitQuaternion::from_scaled_axis(turn));
         }
         let Some(moving) = self.moving else {
+            self.meet(&mut result, point, h);
             return result;
         };
         // The orientations of the start differ only slightly: the difference fades out.

@@ -38,6 +38,11 @@ const STILL: f64 = 1e-6;
 /// Samples of an average.
 const PARTS: u32 = 8;
 
+/// Knots in the time of the corner that the tolerance allows, and by how much a spline without orientations may have
+/// more of them than others.
+const KNOTS_PER_CORNER: f64 = 6.0;
+const FINER: f64 = 2.0;
+
 /// A known motion, sampled for the control points of a spline.
 #[derive(Clone, Debug)]
 pub(super) struct Known<'a> {
@@ -90,15 +95,22 @@ impl<'a> Known<'a> {
         self.spans.last().map_or(0.0, Span::end)
     }
 
-    /// Knot spacing of a spline that starts at rest, s.
+    /// Knot spacing of a spline that starts at rest, s: fine enough for the corners that the tolerance shows, where
+    /// orientations do not make each knot dear.
     pub(super) fn spacing<const D: usize>(&self, problem: &Problem<D>) -> f64 {
-        let ramp = (0..Problem::<D>::GROUPS)
-            .map(|g| problem.groups[g].caps[1] / problem.groups[g].caps[2])
-            .fold(0.0, f64::max);
+        let groups = &problem.groups[..Problem::<D>::GROUPS];
+        let ramps = groups.iter().map(|group| group.caps[1] / group.caps[2]);
+        let ramp = ramps.fold(0.0, f64::max) / KNOTS_PER_RAMP;
         let total = self.duration();
-        (ramp / KNOTS_PER_RAMP)
+        if D > 3 {
+            return ramp.min(total / FEWEST).max(total / MOST);
+        }
+        // The time in which a jerk turns the motion at a corner.
+        let near = groups[0].radius.min(groups[0].width);
+        let corner = (96.0 * near / groups[0].caps[2]).cbrt() / KNOTS_PER_CORNER;
+        ramp.min(corner)
             .min(total / FEWEST)
-            .max(total / MOST)
+            .max(total / (FINER * MOST))
     }
 
     /// Position and unrolled rotation vector of each control point at a knot spacing (s), and when
@@ -132,6 +144,8 @@ impl<'a> Known<'a> {
         }
         if onwards {
             join(&mut control);
+        } else if !moving && self.rests.is_empty() {
+            reproduce(&mut control, |_| 1.0);
         }
         let end = (knots - 4) as f64;
         let pass = |time: &f64| (self.after(*time, &follow) / spacing + lead).min(end);
@@ -219,17 +233,24 @@ impl<'a> Known<'a> {
 }
 
 /// Moves the places near both ends to where control points are that reproduce cubics, as those are that the
-/// ends fix: away from a place by 5/24 of its second difference.
+/// ends fix.
 fn join(control: &mut [[Vector3<f64>; 2]]) {
     let last = control.len() - 1;
     let fade = FADE.min(last as f64 / 3.0);
-    let places = control.to_vec();
-    for k in 1..last {
+    reproduce(control, |k| {
         let x = ((k.min(last - k) as f64 - 4.0) / fade).clamp(0.0, 1.0);
-        let share = 1.0 - x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
+        1.0 - x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    });
+}
+
+/// Moves each place by a share of the way to the control point that reproduces cubics: away from the place by 5/24 of
+/// its second difference.
+fn reproduce(control: &mut [[Vector3<f64>; 2]], share: impl Fn(usize) -> f64) {
+    let places = control.to_vec();
+    for k in 1..control.len() - 1 {
         for (g, place) in control[k].iter_mut().enumerate() {
             let bend = places[k - 1][g] - places[k][g] * 2.0 + places[k + 1][g];
-            *place -= bend * (5.0 / 24.0 * share);
+            *place -= bend * (5.0 / 24.0 * share(k));
         }
     }
 }
