@@ -122,6 +122,8 @@ struct Attempts<'a> {
     effort: Effort,
     /// Whether the orientation has to be part of the optimum, once that is decided.
     coupled: Option<bool>,
+    /// Whether it may be.
+    dear: bool,
 }
 
 impl<'a> Window<'a> {
@@ -145,6 +147,15 @@ impl<'a> Window<'a> {
     /// From a motion that is `known`, the search has a point that holds every bound, so a motion
     /// that need not rest is found where the one that is known rests.
     pub(crate) fn spline(&self, known: Option<&[Span]>, most: f64) -> Option<Motion> {
+        self.found(known, most, true)
+    }
+
+    /// The same from a motion; where the orientation has to be part of the search only if it may be `dear`.
+    pub(crate) fn refined(&self, known: &[Span], most: f64, dear: bool) -> Option<Motion> {
+        self.found(Some(known), most, dear)
+    }
+
+    fn found(&self, known: Option<&[Span]>, most: f64, dear: bool) -> Option<Motion> {
         let options = self.options;
         if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
             return None;
@@ -165,6 +176,7 @@ impl<'a> Window<'a> {
                 ..EFFORT
             },
             coupled: None,
+            dear,
         };
         let (spans, retried) = attempts.run()?;
         let soon = spans.last()?.end() <= most;
@@ -209,6 +221,9 @@ impl Attempts<'_> {
             };
             request.coupled = self.coupled.unwrap_or(!request.can_follow());
             let turns = request.moves()[1];
+            if turns && request.coupled && !self.dear {
+                return None;
+            }
             let Some(mut spans) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
                 retried = true;

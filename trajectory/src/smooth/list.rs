@@ -132,12 +132,6 @@ impl<'a> List<'a> {
         Found::faster(Some(best), self.fitted(form))
     }
 
-    /// Whether a fit was taken without a look at another way.
-    fn is_only_fitted(&self, form: &NormalForm, found: &Found) -> bool {
-        let fitted = found.plan.method() == Method::Fit;
-        fitted && found.suffices() && dense::suffices(&form.poses, &form.options)
-    }
-
     /// Whether a curve may be fitted through the list.
     fn may_be_fitted(&self, form: &NormalForm) -> bool {
         self.options.fit && dense::may_be_fitted(&form.poses, &form.options)
@@ -167,19 +161,15 @@ impl<'a> List<'a> {
     }
 
     /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need, of a
-    /// search that starts from the motion, and, where that finds nothing or an attempt failed, of those found otherwise
-    /// and within less of the tolerance.
+    /// search that starts from the motion, and, where an attempt failed or the list is too long for that, of those within
+    /// less of the tolerance.
     fn compared(&self, form: &NormalForm, first: Found) -> Option<Found> {
         let (hard, mut best) = (first.is_hard(), first);
         if best.is_divided() {
             let turned = form.turned(self.poses, self.options);
             best = Found::faster(Some(best), self.by_windows(&turned, &turned.options))?;
         }
-        let before = best.plan.duration();
         best = self.refined(form, best);
-        if !self.is_long() && best.plan.duration() >= before && self.is_only_fitted(form, &best) {
-            best = Found::faster(Some(best), self.by_windows(form, &form.options))?;
-        }
         if hard || best.is_hard() || self.is_long() {
             let before = best.plan.duration();
             best = self.within_less(form, best)?;
@@ -194,8 +184,9 @@ impl<'a> List<'a> {
     /// wide balls may fail where one in narrow ones does not.
     fn within_less(&self, form: &NormalForm, mut best: Found) -> Option<Found> {
         let fit = self.may_be_fitted(form);
-        let cheap = best.plan.method() != Method::Fit && !self.is_costly(&best.plan);
-        let spline = best.is_hard() || (self.is_long() && cheap);
+        let fitted = best.plan.method() == Method::Fit;
+        let cheap = best.motion.retried || !self.is_costly(&best.plan);
+        let spline = best.is_divided() || (!fitted && cheap);
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
@@ -219,9 +210,11 @@ impl<'a> List<'a> {
         let other =
             (found.backwards != form.backwards).then(|| form.turned(self.poses, self.options));
         let form = other.as_ref().unwrap_or(form);
+        // A search with orientations is dear, and finds little that a good fit has not.
+        let dear = !(found.plan.method() == Method::Fit && found.suffices());
         for _ in 0..ROUNDS {
             let before = found.plan.duration();
-            let motion = windows::refined(&form.poses, &form.options, &found.motion);
+            let motion = windows::refined(&form.poses, &form.options, &found.motion, dear);
             let refined = motion.and_then(|motion| self.certified(form, motion));
             let Some(refined) = refined.filter(|refined| refined.plan.duration() < before) else {
                 break;

@@ -47,18 +47,20 @@ pub(super) fn motion(
     in_parts(poses, options, (backwards, DIVISIONS))
 }
 
-/// The spline with which a search ends that starts from a motion through the list, if it is certified and faster.
+/// The spline with which a search ends that starts from a motion through the list, if it is certified and faster;
+/// with the orientation as a part of the search only where that may be `dear`.
 pub(super) fn refined(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
     known: &Motion,
+    dear: bool,
 ) -> Option<Motion> {
     let poses = divided(poses, options);
     if poses.len() > MOST_POSES {
         return None;
     }
     let window = Window::from_rest(&poses, options, Then::Stop);
-    window.spline(Some(&known.spans), known.duration())
+    window.refined(&known.spans, known.duration(), dear)
 }
 
 /// The same, divided at most so many times.
