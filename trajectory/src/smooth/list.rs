@@ -190,7 +190,14 @@ impl<'a> List<'a> {
             let options = within(&form.options, tolerance / form.options.tolerance);
             let before = best.plan.duration();
             if fit {
-                best = Found::faster(Some(best), self.fit(form, &options))?;
+                let fit = self.fit(form, &options);
+                // Where an attempt failed the search from the best motion may have failed, too.
+                let fit = if best.is_hard() {
+                    fit.map(|fit| self.refined(form, fit))
+                } else {
+                    fit
+                };
+                best = Found::faster(Some(best), fit)?;
             }
             if spline {
                 best = Found::faster(Some(best), self.by_windows(form, &options))?;
