@@ -45,13 +45,20 @@ fn main() {
     }
     machine();
     let mut ratios = Vec::new();
-    governor();
-    for rate in [1000.0, 2000.0, 4000.0] {
-        wake_up(rate, &mut ratios);
+    // `cargo bench --bench servo -- wake-up` or `-- lock-step` measures that part only.
+    let parts = ["wake-up", "ping", "lock-step"];
+    let one = words.iter().find(|word| parts.contains(&word.as_str()));
+    let asked = |part| one.is_none_or(|one| one == part);
+    if asked("wake-up") {
+        governor();
+        for rate in [1000.0, 2000.0, 4000.0] {
+            wake_up(rate, &mut ratios);
+        }
     }
-    // `cargo bench --bench servo -- wake-up` ends here.
-    if !words.iter().any(|word| word == "wake-up") {
+    if asked("ping") {
         ping(&mut ratios);
+    }
+    if asked("lock-step") {
         lock_steps(&mut ratios);
     }
     for (name, ratio) in ratios {
