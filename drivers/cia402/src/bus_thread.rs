@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use driver_kit::{RobotFault, TimedReferences};
+use driver_kit::{RobotFault, TimedReferences, pause};
 use ethercrab::{
     Command, MainDevice, MainDeviceConfig, PduStorage, RegisterAddress, RetryBehaviour,
     SubDeviceState, Timeouts,
 };
 use ipc::{MAX_JOINTS, bytes_of};
 use rtrb::{Consumer, Producer};
-use scheduling::{RealTimeRequest, now_ns, request_real_time, sleep_until_ns};
+use scheduling::{now_ns, sleep_until_ns};
 
 use crate::Cia402Options;
 use crate::axes::Axes;
@@ -27,9 +27,8 @@ use crate::snapshot::{Phase, Snapshot};
 const FRAMES: usize = 16;
 const DATA: usize = 1400;
 
-/// Time between two tries to bring up the bus (ns), and of a look at whether the driver ends.
+/// Time between two tries to bring up the bus.
 const AGAIN: Duration = Duration::from_millis(500);
-const LOOK: Duration = Duration::from_millis(20);
 
 /// The request of a device's first state.
 const INIT: u16 = 1;
@@ -66,13 +65,6 @@ pub(crate) struct BusThread {
 impl BusThread {
     /// Until the driver ends: brings the bus up, serves it, brings it up again.
     pub(crate) fn run(mut self) {
-        // What is refused is told by the kit's own thread.
-        let _granted = request_real_time(RealTimeRequest {
-            priority: self.options.priority,
-            lock_memory: false,
-            low_latency: false,
-            ..RealTimeRequest::default()
-        });
         while !self.ends() {
             // The library has assertions about what devices send (decision 0133).
             let served = catch_unwind(AssertUnwindSafe(|| self.serve()));
@@ -82,11 +74,7 @@ impl BusThread {
                 Err(_) => "a device sent what the EtherCAT library does not know".to_owned(),
             };
             self.lose(&reason);
-            let mut waited = Duration::ZERO;
-            while waited < AGAIN && !self.ends() {
-                std::thread::sleep(LOOK);
-                waited += LOOK;
-            }
+            pause(AGAIN, || self.ends());
         }
     }
 

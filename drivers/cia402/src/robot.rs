@@ -68,7 +68,8 @@ impl Cia402 {
             snapshot: Snapshot::default(),
             stop: Arc::clone(&stop),
         };
-        let thread = OwnThread::start("ethercat", move || thread.run())?;
+        let thread =
+            OwnThread::start_real_time("ethercat", thread.options.priority, move || thread.run())?;
         Ok(Self {
             about,
             cycle,

@@ -2,26 +2,24 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::sleep;
 use std::time::Duration;
 
-use driver_kit::{Reference, Resampler, RobotFault, TimedReferences};
+use driver_kit::{Reference, Resampler, RobotFault, TimedReferences, pause};
 use franka::{
     ActiveMotionGenerator, Errors, FrankaError, JointPositions, MoveControllerMode, RealtimeConfig,
     Robot, RobotMode, RobotOptions, RobotState, motion_finished,
 };
 use ipc::{Payload, bytes_of};
 use rtrb::{Consumer, Producer};
-use scheduling::{RealTimeRequest, now_ns, request_real_time};
+use scheduling::now_ns;
 
 use crate::arrivals::{Arrivals, Sockets};
 use crate::snapshot::{Phase, Snapshot, Wish};
 use crate::taken::Taken;
 use crate::{FrankaOptions, JOINTS};
 
-/// Time between two tries to connect, and the length of a look at whether the driver ends.
+/// Time between two tries to connect.
 const AGAIN: Duration = Duration::from_millis(500);
-const LOOK: Duration = Duration::from_millis(10);
 
 /// The controller goes on by itself when the driver slept for longer than this (s), or when so many
 /// states in a row show a command that was not sent.
@@ -59,13 +57,6 @@ type Control<'a> = ActiveMotionGenerator<'a, JointPositions>;
 impl ArmThread {
     /// Until the driver ends: connects, serves, connects again.
     pub(crate) fn run(mut self) {
-        // What is refused is told by the kit's own thread.
-        let _granted = request_real_time(RealTimeRequest {
-            priority: self.options.priority,
-            lock_memory: false,
-            low_latency: false,
-            ..RealTimeRequest::default()
-        });
         while !self.ends() {
             let options = RobotOptions::new(RealtimeConfig::Ignore).with_log_size(0);
             let before = Sockets::now();
@@ -79,11 +70,7 @@ impl ArmThread {
             };
             self.arrivals = None;
             self.lose(&lost);
-            let mut waited = Duration::ZERO;
-            while waited < AGAIN && !self.ends() {
-                sleep(LOOK);
-                waited += LOOK;
-            }
+            pause(AGAIN, || self.ends());
         }
     }
 

@@ -83,7 +83,8 @@ impl Franka {
             stop: Arc::clone(&stop),
             arrivals: None,
         };
-        let thread = OwnThread::start("franka", move || thread.run())?;
+        let thread =
+            OwnThread::start_real_time("franka", thread.options.priority, move || thread.run())?;
         Ok(Self {
             about,
             address,

@@ -39,7 +39,7 @@ use end_speeds::NearEnds;
 pub use error::DriverError;
 use limiter::Limiter;
 pub use measured::{Inputs, Measured, Measurement, Outputs, RobotFault, Sensors};
-pub use own_thread::OwnThread;
+pub use own_thread::{OwnThread, pause};
 pub use process::{DriverReport, RunOptions, asked_to_end, run};
 use ramp::Ramp;
 pub use reference::Reference;

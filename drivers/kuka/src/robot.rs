@@ -80,7 +80,8 @@ impl Kuka {
             origin: [0.0; JOINTS],
             stop: Arc::clone(&stop),
         };
-        let thread = OwnThread::start("kuka", move || thread.run())?;
+        let thread =
+            OwnThread::start_real_time("kuka", thread.options.priority, move || thread.run())?;
         Ok(Self {
             about,
             options,

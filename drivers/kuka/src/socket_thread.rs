@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use driver_kit::{About, Resampler, ResamplerOptions, TimedReferences};
 use rtrb::{Consumer, Producer};
-use scheduling::{RealTimeRequest, now_ns, request_real_time};
+use scheduling::now_ns;
 
 use crate::telegram::{Telegram, answer, read};
 use crate::{JOINTS, KukaOptions};
@@ -66,13 +66,6 @@ pub(crate) struct SocketThread {
 impl SocketThread {
     /// Answers until the driver ends.
     pub(crate) fn run(mut self) {
-        // What is refused is told by the kit's own thread.
-        let _granted = request_real_time(RealTimeRequest {
-            priority: self.options.priority,
-            lock_memory: false,
-            low_latency: false,
-            ..RealTimeRequest::default()
-        });
         let mut bytes = [0; LONGEST];
         let mut text = String::with_capacity(LONGEST);
         while !self.stop.load(Ordering::Relaxed) {

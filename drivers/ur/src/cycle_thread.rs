@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::sleep;
 use std::time::Duration;
 
-use driver_kit::{About, Reference, Resampler, ResamplerOptions, RobotFault, TimedReferences};
+use driver_kit::{
+    About, Reference, Resampler, ResamplerOptions, RobotFault, TimedReferences, pause,
+};
 use ipc::{bytes_of, text_of};
 use rtrb::{Consumer, Producer};
-use scheduling::{RealTimeRequest, now_ns, request_real_time};
+use scheduling::now_ns;
 
 use crate::link::{Link, Refusal};
 use crate::rtde::Cycle;
@@ -16,9 +17,8 @@ use crate::snapshot::{Alarm, Connection, Modes, Phase, Snapshot};
 use crate::stream::Stream;
 use crate::{JOINTS, UrOptions, words};
 
-/// Time between two tries to connect, and the length of a look at whether the driver ends.
+/// Time between two tries to connect.
 const AGAIN: Duration = Duration::from_millis(500);
-const LOOK: Duration = Duration::from_millis(10);
 
 /// The controller is lost when it sends nothing for this time (ns).
 const SILENCE: u64 = 500_000_000;
@@ -67,24 +67,13 @@ struct Session {
 impl CycleThread {
     /// Until the driver ends: connects, serves, connects again.
     pub(crate) fn run(mut self) {
-        // What is refused is told by the kit's own thread.
-        let _granted = request_real_time(RealTimeRequest {
-            priority: self.options.priority,
-            lock_memory: false,
-            low_latency: false,
-            ..RealTimeRequest::default()
-        });
         while !self.ends() {
             let lost = match Link::connect(&self.options, &self.modes) {
                 Ok(mut link) => self.serve(&mut link),
                 Err(refusal) => refusal,
             };
             self.lose(&lost);
-            let mut waited = Duration::ZERO;
-            while waited < AGAIN && !self.ends() {
-                sleep(LOOK);
-                waited += LOOK;
-            }
+            pause(AGAIN, || self.ends());
         }
     }
 

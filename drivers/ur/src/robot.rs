@@ -87,7 +87,7 @@ impl Ur {
             snapshot: Snapshot::default(),
             modes: Arc::clone(&modes),
         };
-        let cycle = OwnThread::start("ur", move || cycle.run())?;
+        let cycle = OwnThread::start_real_time("ur", cycle.options.priority, move || cycle.run())?;
         // Without the second thread the first shall end: it is waited for.
         let control = OwnThread::start("ur-control", move || control.run())
             .inspect_err(|_| modes.stop.store(true, Ordering::Relaxed))?;
