@@ -8,6 +8,7 @@ use std::time::Duration;
 use driver_sim::{Places, Wall};
 use engine::session::{Note, RunSample, Session, SessionConfig};
 use ipc::Clock;
+use measure::Random;
 use nalgebra::SVector;
 use planner::dry_run::FailurePolicy;
 use planner::robot::Robot;
@@ -19,23 +20,6 @@ const STIFFNESS: f64 = 20_000.0;
 /// Where every guarded move begins and would end (mm).
 const ABOVE: f64 = 320.0;
 const BELOW: f64 = 120.0;
-
-/// Random numbers from a seed.
-///
-/// # Source
-/// G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
-struct Random(u64);
-
-impl Random {
-    fn between(&mut self, from: f64, to: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits ^= bits >> 31;
-        from + (to - from) * (bits >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// A session in lock-step with a simulated arm over a table whose height can be set.
 pub(crate) struct Cell {
@@ -271,7 +255,7 @@ fn the_stop_is_within_what_was_stated() {
     let count = std::env::var("CANTER_GUARDS").map_or(25, |count| count.parse().unwrap());
     let cell = Cell::start("random", FailurePolicy::Abort);
     cell.execute("InitCanon()");
-    let mut random = Random(14);
+    let mut random = Random::new(14);
     for _ in 0..count {
         Trial::random(&mut random).run(&cell);
     }
