@@ -22,7 +22,9 @@ use super::spline::{KNOTS_PER_RAMP, Moving};
 use crate::{ToolLimits, ToolPoint};
 
 /// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
-const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
+pub(super) const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
+/// The same where a rest is left in the end.
+pub(super) const MORE_REACHES: [f64; 9] = [4.0, 3.0, 2.5, 2.0, 1.6, 1.25, 0.9, 0.6, 0.4];
 /// Most splines that are tried for one motion: one that stops at thousands of poses is not worth thousands.
 const MOST: usize = 48;
 /// Rounds over all rests: where a rest beside another is gone, a bridge may reach farther.
@@ -62,11 +64,12 @@ struct Bridges<'a> {
 }
 
 /// The motion through poses without those of its rests for which a faster way past is found, with which
-/// the whole `holds`; `None` if there is none, or if it would not be faster than `best` (s).
+/// the whole `holds`; `None` if there is none, or if it would not be faster than `best` (s). Bridges are tried at some
+/// `reaches`, in braking times.
 pub(super) fn bridged(
     motion: &Motion,
     (poses, options): (&[Isometry3<f64>], &SmoothOptions),
-    best: f64,
+    (best, reaches): (f64, &[f64]),
     holds: &dyn Fn(&Motion) -> bool,
 ) -> Option<Motion> {
     let mut spans = motion.spans.clone();
@@ -103,7 +106,7 @@ pub(super) fn bridged(
             // A spline has to be faster than both sides of the rest at the same time.
             let other = bridges.overlapped(k, holds);
             let saved = other.map_or(0.0, |other| bridges.duration() - other.duration());
-            let passed = REACHES.iter().find_map(|reach| {
+            let passed = reaches.iter().find_map(|reach| {
                 left = left.checked_sub(1)?;
                 bridges.passed(k, (*reach, saved), holds)
             });
@@ -405,5 +408,33 @@ mod tests {
         };
         assert!(joins(span(0.8, 0.0)) && joins(span(0.8, 6.4e-7)));
         assert!(!joins(span(0.8 + 1e-6, 0.0)) && !joins(span(0.8, 0.1)));
+    }
+
+    /// Both ends of a bridge are at the limits of the speed and of the angular speed: its search, in which they stay those of
+    /// a slower motion at first, goes on all the same.
+    #[test]
+    fn ends_at_limits_do_not_hold_a_bridge() {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 3.0,
+            angular_acceleration: 30.0,
+            angular_jerk: 600.0,
+        };
+        let options = SmoothOptions::new(2e-5, limits);
+        let pose = |x: f64, y: f64, turn: f64| {
+            Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * turn)
+        };
+        // Legs that turn as fast as the tool may while it moves as fast as it may.
+        let poses = [
+            pose(0.0, 0.0, 0.0),
+            pose(0.3, 0.0, 1.8),
+            pose(0.5, 0.1, 1.8 + 6.0 * 0.05_f64.sqrt()),
+        ];
+        let motion = super::super::choose::corners(&poses, &options);
+        let reaches = (f64::INFINITY, &[1.25][..]);
+        let bridged = bridged(&motion, (&poses, &options), reaches, &|_| true);
+        assert!(bridged.is_some_and(|bridged| bridged.rests.is_empty()));
     }
 }
