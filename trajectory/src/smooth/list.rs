@@ -250,8 +250,8 @@ impl<'a> List<'a> {
             };
             let options = within(&form.options, share);
             let holds = |motion: &Motion| self.placed(form, motion).is_some();
-            let reaches = (f64::INFINITY, &bridge::MORE_REACHES[..]);
-            let bridged = bridge::bridged(&motion, (&form.poses, &options), reaches, &holds);
+            let search = (f64::INFINITY, bridge::LAST);
+            let bridged = bridge::bridged(&motion, (&form.poses, &options), search, &holds);
             let placed = bridged.and_then(|motion| Some((self.placed(form, &motion)?, motion)));
             let before = found.plan.duration();
             if let Some((plan, motion)) = placed.filter(|(plan, _)| plan.duration() < before) {
@@ -325,8 +325,12 @@ impl<'a> List<'a> {
         } else {
             let holds = |motion: &Motion| self.placed(form, motion).is_some();
             let best = self.best.get();
-            let reaches = (best, &bridge::REACHES[..]);
-            bridge::bridged(&motion, (&form.poses, &form.options), reaches, &holds)
+            bridge::bridged(
+                &motion,
+                (&form.poses, &form.options),
+                (best, bridge::USUAL),
+                &holds,
+            )
         };
         let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
         let (plan, motion) = bridged.and_then(placed).or_else(|| placed(motion))?;

@@ -21,6 +21,8 @@ pub(crate) struct Effort {
     pub(crate) gap: f64,
     /// Longest useful time (s): an iterate is given up if its optimum is above it.
     pub(crate) most: f64,
+    /// Whether a search between two ends in motion goes on where they hold it.
+    pub(crate) onward: bool,
 }
 
 /// Growth of the weight on `z` at each centre.
@@ -183,7 +185,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             if moved && missed > AIMED {
                 continue;
             }
-            if !done && is_held_by_ends(problem, point) {
+            if !done && effort.onward && is_held_by_ends(problem, point) {
                 weight = parameter / (2.0 * point.z);
                 known = Known::nothing(&room);
                 // Where it keeps the bounds as it is they need not be widened.
