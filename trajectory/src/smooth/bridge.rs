@@ -21,8 +21,24 @@ use super::span::Span;
 use super::spline::{KNOTS_PER_RAMP, Moving};
 use crate::{ToolLimits, ToolPoint};
 
-/// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
-const REACHES: [f64; 5] = [3.0, 2.0, 1.25, 0.6, 0.3];
+/// How bridges are searched for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    /// Reaches of a bridge to both sides of the rest, in braking times, one after the other.
+    reaches: &'static [f64],
+    /// Whether a search goes on where its ends hold it.
+    onward: bool,
+}
+
+/// The search for a motion that may be compared with others, and that for one at whose rests no other way was found.
+pub(super) const USUAL: Search = Search {
+    reaches: &[3.0, 2.0, 1.25, 0.6, 0.3],
+    onward: false,
+};
+pub(super) const LAST: Search = Search {
+    reaches: &[4.0, 3.0, 2.5, 2.0, 1.6, 1.25, 0.9, 0.6, 0.4],
+    onward: true,
+};
 /// Most splines that are tried for one motion: one that stops at thousands of poses is not worth thousands.
 const MOST: usize = 48;
 /// Rounds over all rests: where a rest beside another is gone, a bridge may reach farther.
@@ -59,6 +75,7 @@ struct Bridges<'a> {
     passes: Vec<f64>,
     /// Whether a part was found only at a further attempt.
     retried: bool,
+    search: Search,
 }
 
 /// The motion through poses without those of its rests for which a faster way past is found, with which
@@ -66,7 +83,7 @@ struct Bridges<'a> {
 pub(super) fn bridged(
     motion: &Motion,
     (poses, options): (&[Isometry3<f64>], &SmoothOptions),
-    best: f64,
+    (best, search): (f64, Search),
     holds: &dyn Fn(&Motion) -> bool,
 ) -> Option<Motion> {
     let mut spans = motion.spans.clone();
@@ -84,6 +101,7 @@ pub(super) fn bridged(
             .collect(),
         spans,
         retried: motion.retried,
+        search,
         rests: motion
             .rests
             .iter()
@@ -103,7 +121,7 @@ pub(super) fn bridged(
             // A spline has to be faster than both sides of the rest at the same time.
             let other = bridges.overlapped(k, holds);
             let saved = other.map_or(0.0, |other| bridges.duration() - other.duration());
-            let passed = REACHES.iter().find_map(|reach| {
+            let passed = search.reaches.iter().find_map(|reach| {
                 left = left.checked_sub(1)?;
                 bridges.passed(k, (*reach, saved), holds)
             });
@@ -168,6 +186,7 @@ impl Bridges<'_> {
             moving: Some(&moving),
             finish: Some(&ends[1]),
             then: Then::Stop,
+            onward: self.search.onward,
         };
         let most = ((to - from) * (1.0 - GAIN)).min(to - from - saved);
         let bridge = window.spline(Some(&known), most)?;
@@ -405,5 +424,41 @@ mod tests {
         };
         assert!(joins(span(0.8, 0.0)) && joins(span(0.8, 6.4e-7)));
         assert!(!joins(span(0.8 + 1e-6, 0.0)) && !joins(span(0.8, 0.1)));
+    }
+
+    /// Both ends of a bridge are at the limits of the speed and of the angular speed: its search, in which they stay those of
+    /// a slower motion at first, goes on all the same.
+    #[test]
+    fn ends_at_limits_do_not_hold_a_bridge() {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 3.0,
+            angular_acceleration: 30.0,
+            angular_jerk: 600.0,
+        };
+        let options = SmoothOptions::new(2e-5, limits);
+        let pose = |x: f64, y: f64, turn: f64| {
+            Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * turn)
+        };
+        // Legs that turn as fast as the tool may while it moves as fast as it may.
+        let poses = [
+            pose(0.0, 0.0, 0.0),
+            pose(0.3, 0.0, 1.8),
+            pose(0.5, 0.1, 1.8 + 6.0 * 0.05_f64.sqrt()),
+        ];
+        let motion = super::super::choose::corners(&poses, &options);
+        let search = Search {
+            reaches: &[1.25],
+            ..LAST
+        };
+        let bridged = bridged(
+            &motion,
+            (&poses, &options),
+            (f64::INFINITY, search),
+            &|_| true,
+        );
+        assert!(bridged.is_some_and(|bridged| bridged.rests.is_empty()));
     }
 }

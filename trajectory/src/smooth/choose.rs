@@ -20,6 +20,7 @@ const EFFORT: Effort = Effort {
     spread: Some(1.0),
     gap: f64::INFINITY,
     most: f64::INFINITY,
+    onward: false,
 };
 
 /// An attempt that breaks a bound by more than this (its first, a later one)
@@ -63,6 +64,8 @@ pub(crate) struct Window<'a> {
     pub(crate) finish: Option<&'a ToolPoint>,
     /// What comes after it.
     pub(crate) then: Then,
+    /// Whether a search between two ends in motion goes on where they hold it.
+    pub(crate) onward: bool,
 }
 
 /// Fastest certified motion from rest in the first pose to rest in the last.
@@ -139,6 +142,7 @@ impl<'a> Window<'a> {
             moving: None,
             finish: None,
             then,
+            onward: false,
         }
     }
 
@@ -173,6 +177,7 @@ impl<'a> Window<'a> {
             effort: Effort {
                 most,
                 gap: options.gap,
+                onward: self.onward,
                 ..EFFORT
             },
             coupled: None,
@@ -205,6 +210,7 @@ impl Attempts<'_> {
             moving,
             finish,
             then,
+            ..
         } = self.window;
         let whole = self.inner.clone();
         let mut retried = false;
@@ -293,12 +299,13 @@ impl Attempts<'_> {
             return None;
         } else {
             let most = self.most;
-            let gap = self.window.options.gap;
+            let (gap, onward) = (self.window.options.gap, self.window.onward);
             (self.coupled, self.effort) = (
                 Some(true),
                 Effort {
                     most,
                     gap,
+                    onward,
                     ..EFFORT
                 },
             );

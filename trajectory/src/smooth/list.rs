@@ -107,7 +107,7 @@ impl<'a> List<'a> {
         } else {
             first
         };
-        let mut plan = best.plan;
+        let mut plan = self.without_rests(form, best).plan;
         plan.certificate.lower_bound = self.least;
         Some(plan)
     }
@@ -232,6 +232,40 @@ impl<'a> List<'a> {
         found
     }
 
+    /// The motion without those of its rests past which a faster way is found: with the whole tolerance, as it may have
+    /// been planned within less, within less, and from either end.
+    fn without_rests(&self, form: &NormalForm, mut found: Found) -> Found {
+        for (share, turned) in UNRESTED {
+            if found.plan.rests().is_empty() || self.options.is_rough() {
+                break;
+            }
+            let backwards = found.backwards != turned;
+            let other =
+                (backwards != form.backwards).then(|| form.turned(self.poses, self.options));
+            let form = other.as_ref().unwrap_or(form);
+            let motion = if turned {
+                found.motion.reversed()
+            } else {
+                found.motion.clone()
+            };
+            let options = within(&form.options, share);
+            let holds = |motion: &Motion| self.placed(form, motion).is_some();
+            let search = (f64::INFINITY, bridge::LAST);
+            let bridged = bridge::bridged(&motion, (&form.poses, &options), search, &holds);
+            let placed = bridged.and_then(|motion| Some((self.placed(form, &motion)?, motion)));
+            let before = found.plan.duration();
+            if let Some((plan, motion)) = placed.filter(|(plan, _)| plan.duration() < before) {
+                found = Found {
+                    plan,
+                    motion,
+                    backwards,
+                    ..found
+                };
+            }
+        }
+        found
+    }
+
     /// The motion along a fitted curve: the faster one from both ends if that from the first is
     /// slower than it might be.
     fn fitted(&self, form: &NormalForm) -> Option<Found> {
@@ -291,7 +325,12 @@ impl<'a> List<'a> {
         } else {
             let holds = |motion: &Motion| self.placed(form, motion).is_some();
             let best = self.best.get();
-            bridge::bridged(&motion, (&form.poses, &form.options), best, &holds)
+            bridge::bridged(
+                &motion,
+                (&form.poses, &form.options),
+                (best, bridge::USUAL),
+                &holds,
+            )
         };
         let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
         let (plan, motion) = bridged.and_then(placed).or_else(|| placed(motion))?;
@@ -321,6 +360,16 @@ const PATIENCE: usize = 2;
 
 /// Most searches from a motion, each from the one that the search before ended with.
 const ROUNDS: usize = 3;
+
+/// Shares of the tolerance within which rests that are left are bridged once more, and whether from the other end.
+const UNRESTED: [(f64, bool); 6] = [
+    (1.0, false),
+    (1.0, true),
+    (0.7, false),
+    (0.7, true),
+    (0.4, false),
+    (0.4, true),
+];
 
 /// An attempt has gained something if its motion takes less than this share.
 const GAIN: f64 = 0.998;

@@ -289,6 +289,7 @@ impl Windows {
             moving: moving.as_ref(),
             finish: None,
             then,
+            onward: false,
         };
         let most = self.tail.duration() + corners(more, options).duration();
         window.spline(None, most).unwrap_or_else(|| {

@@ -21,6 +21,8 @@ pub(crate) struct Effort {
     pub(crate) gap: f64,
     /// Longest useful time (s): an iterate is given up if its optimum is above it.
     pub(crate) most: f64,
+    /// Whether a search between two ends in motion goes on where they hold it.
+    pub(crate) onward: bool,
 }
 
 /// Growth of the weight on `z` at each centre.
@@ -114,6 +116,9 @@ impl Pace {
 /// Most Newton steps between two ends in motion.
 const BETWEEN: usize = 400;
 
+/// Up to so many times the knot spacing of its start, cubed, an iterate is held by its ends.
+const HELD: f64 = 1.02;
+
 /// Back-tracking factor of the line search.
 const BACK: f64 = 0.6;
 
@@ -178,6 +183,20 @@ pub(crate) fn solve<const D: usize, const B: usize>(
         }
         if tight && parameter / weight <= effort.gap * point.z {
             if moved && missed > AIMED {
+                continue;
+            }
+            if !done && effort.onward && is_held_by_ends(problem, point) {
+                weight = parameter / (2.0 * point.z);
+                known = Known::nothing(&room);
+                // Where it keeps the bounds as it is they need not be widened.
+                if pace
+                    .barrier(problem, &room, weight)
+                    .look(point, &[])
+                    .is_none()
+                {
+                    room = Room::new(problem, point);
+                    (tight, since) = (room.tighten(problem, point), 0);
+                }
                 continue;
             }
             return done.then_some(count);
@@ -293,6 +312,22 @@ fn is_let_go<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>) -> 
     };
     problem.anchor = None;
     point.z = z;
+    true
+}
+
+/// Whether an iterate between two ends in motion cannot become faster than its start only because of them: while their
+/// control points stay those of the start, an end at a limit allows no less time. The iterate is then let go as it is.
+fn is_held_by_ends<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>) -> bool {
+    let Some(z) = problem.anchor.filter(|z| point.z < HELD * *z) else {
+        return false;
+    };
+    if problem.finish.is_none() {
+        return false;
+    }
+    problem.anchor = None;
+    follow(problem, point, z);
+    problem.pin(point);
+    project(problem, point, None, 20);
     true
 }
 
