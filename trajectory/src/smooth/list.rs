@@ -16,7 +16,7 @@ use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::rest::RestCause;
 use super::windows::{self, Windows};
-use super::{bridge, dense, exact_stop};
+use super::{bridge, dense, exact_stop, missed};
 
 /// Plans a motion from the first pose to the last that passes those between in
 /// order, each within tolerance: the fastest motion that is certified.
@@ -294,7 +294,10 @@ impl<'a> List<'a> {
             bridge::bridged(&motion, (&form.poses, &form.options), best, &holds)
         };
         let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
-        let (plan, motion) = bridged.and_then(placed).or_else(|| placed(motion))?;
+        let (plan, motion) = bridged
+            .and_then(placed)
+            .or_else(|| placed(motion.clone()))
+            .or_else(|| placed(self.met(form, &motion)?))?;
         self.best.set(self.best.get().min(plan.duration()));
         Some(Found {
             plan,
@@ -303,6 +306,12 @@ impl<'a> List<'a> {
             before,
             eased,
         })
+    }
+
+    /// A motion through the normal form with orientations that meet all poses of the list.
+    fn met(&self, form: &NormalForm, motion: &Motion) -> Option<Motion> {
+        let whole = form.through(self.given, self.options);
+        missed::met(motion, &whole.poses, &whole.options)
     }
 
     /// A motion through the normal form, laid back, if its certificate holds.
