@@ -222,7 +222,11 @@ impl Attempts<'_> {
             request.coupled = self.coupled.unwrap_or(!request.can_follow());
             let turns = request.moves()[1];
             if turns && request.coupled && !self.dear {
-                return None;
+                // Where legs are shorter than the tolerance orientations may follow, too.
+                if self.coupled.is_some() || !request.may_follow() {
+                    return None;
+                }
+                request.coupled = false;
             }
             let Some(mut spans) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;

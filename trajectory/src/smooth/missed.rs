@@ -10,6 +10,7 @@ use super::choose::stretch;
 use super::crossing::{Crossing, crossings};
 use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::span::Span;
 use super::spline::meet_spans;
 
 /// Times that the passes are looked for and met.
@@ -49,6 +50,27 @@ pub(super) fn met(
         }
     }
     Some(next)
+}
+
+/// Some of the poses of a list with those that a motion misses beside them, in order; `None` if it misses no others.
+///
+/// The poses that are known are among those of the list, to the last digit.
+pub(super) fn with(
+    some: &[Isometry3<f64>],
+    poses: &[Isometry3<f64>],
+    spans: &[Span],
+    options: &SmoothOptions,
+) -> Option<Vec<Isometry3<f64>>> {
+    let passes = crossings(spans, poses, options);
+    let missed = |k: usize| k > 0 && passes.get(k - 1).is_some_and(|pass| !pass.holds());
+    let mut next = some.iter().peekable();
+    let mut result = Vec::with_capacity(some.len());
+    for (k, pose) in poses.iter().enumerate() {
+        if next.next_if(|known| *known == pose).is_some() || missed(k) {
+            result.push(*pose);
+        }
+    }
+    (result.len() > some.len() && next.peek().is_none()).then_some(result)
 }
 
 /// Turns the orientations of the parts that miss a pose; false where that is not possible.
