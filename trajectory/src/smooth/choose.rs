@@ -6,10 +6,12 @@ use super::certificate::{Certificate, Peak, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
+use super::missed;
 use super::motion::Motion;
 use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::span::Span;
+pub(crate) use super::span::stretch;
 use super::spline::{self, Effort, Moving, Request};
 use crate::{ToolLimits, ToolPoint};
 
@@ -28,6 +30,11 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
+
+/// The most by which a motion may miss a pose by the angle for its orientations to be turned to it, and the factor on its
+/// time that this may cost.
+const TURNED: f64 = 4.0;
+const SLOWER: f64 = 1.01;
 
 /// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
 const AT_END: f64 = 1.0 + 1e-3;
@@ -243,6 +250,12 @@ impl Attempts<'_> {
             if certificate.holds() && settled {
                 return Some((spans, retried));
             }
+            if moving.is_none()
+                && settled
+                && let Some(met) = self.met(&spans, &crossings)
+            {
+                return Some((met, retried));
+            }
             if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
                 *nearly = Some((spans.clone(), retried));
             }
@@ -263,6 +276,22 @@ impl Attempts<'_> {
             self.narrow((&certificate, &crossings), request.coupled, settled)?;
         }
         None
+    }
+
+    /// The spans of a motion from rest that misses poses by the angle only, turned to them, if that takes little more time.
+    fn met(&self, spans: &[Span], crossings: &[Crossing]) -> Option<Vec<Span>> {
+        let Window { poses, options, .. } = self.window;
+        let near = |pass: &Crossing| {
+            pass.deviation <= pass.tolerance && pass.angle <= TURNED * pass.angular_tolerance
+        };
+        if !crossings.iter().all(near) {
+            return None;
+        }
+        let motion = Motion::new(spans.to_vec(), Method::Spline);
+        let most = SLOWER * motion.duration();
+        let met = missed::met(&motion, poses, options).filter(|met| met.duration() <= most)?;
+        let holds = certify(&met.spans, poses, options).0.holds();
+        holds.then_some(met.spans)
     }
 
     /// Prepares the attempt after one that broke bounds; `None` if it would be the same.
@@ -383,21 +412,5 @@ fn between(limits: &ToolLimits, certificate: &Certificate, ends: [&ToolPoint; 2]
         angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
             end.angular[2].norm()
         }),
-    }
-}
-
-/// Slows a motion down by a factor; its path does not change.
-pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
-    for span in spans {
-        span.start *= factor;
-        span.duration *= factor;
-        let mut scale = 1.0;
-        for k in 0..5 {
-            span.point[k] /= scale;
-            for turn in &mut span.turns {
-                turn.angle[k] /= scale;
-            }
-            scale *= factor;
-        }
     }
 }

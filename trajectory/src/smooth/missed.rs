@@ -6,11 +6,10 @@
 use nalgebra::Isometry3;
 
 use super::certificate::certify;
-use super::choose::stretch;
 use super::crossing::{Crossing, crossings};
 use super::motion::Motion;
 use super::options::SmoothOptions;
-use super::span::Span;
+use super::span::{Span, stretch};
 use super::spline::meet_spans;
 
 /// Times that the passes are looked for and met.

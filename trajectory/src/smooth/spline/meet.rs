@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::basis::{power, weights};
+use super::band::Band;
+use super::basis::{THIRD, power, weights};
 use super::turns::turns;
 use crate::line::body_turn;
 use crate::smooth::span::{Span, Turn};
@@ -10,6 +11,18 @@ use crate::smooth::span::{Span, Turn};
 /// Rounds over all passes; the share of the angular tolerance up to which a pose is met, and that to which it is turned.
 const ROUNDS: usize = 12;
 const MET: [f64; 2] = [0.97, 0.9];
+
+/// Rounds of the smoothest change; the weight that a pass has where it is missed first, and its growth while it is. A weight
+/// of one is that of a third difference of a tolerance in one knot.
+const SMOOTH_ROUNDS: usize = 24;
+const WEIGHT: f64 = 1e-6;
+const GROWTH: f64 = 8.0;
+/// Weight of the change itself: it fades out over some fifty knots.
+const FADING: f64 = 1e-10;
+/// Weight of the control orientations that stay.
+const FIXED: f64 = 1e12;
+/// Diagonals of the system, with those that its solver needs free.
+const BAND: usize = 8;
 
 /// Relative difference of two numbers that are the same but for rounding.
 const SAME: f64 = 1e-9;
@@ -84,12 +97,113 @@ pub(crate) fn meet_spans(spans: &mut [Span], passes: &[(f64, &Isometry3<f64>)], 
         .zip(passes)
         .map(|((first, share), (_, pose))| (first, share, *pose))
         .collect();
-    meet(&mut control, &passes, (h, most));
+    Smoothest::new(control.len()).meet(&mut control, &passes, (h, most));
     for (span, control) in spans.iter_mut().zip(control.windows(5)) {
         span.base = control[0];
         span.turns = turns(control, h);
     }
     true
+}
+
+/// The change of control orientations with the least third differences, squared and summed, with which passes are met: the
+/// least of angular jerk.
+///
+/// # Source
+/// Weights that rise where a pass is missed: C. L. Lawson, "Contributions to the theory of linear least maximum
+/// approximation", 1961.
+struct Smoothest {
+    /// Rotation vector by which each control orientation is turned.
+    change: Vec<Vector3<f64>>,
+    band: Band<BAND>,
+    sides: [Vec<f64>; 3],
+}
+
+impl Smoothest {
+    fn new(count: usize) -> Self {
+        Self {
+            change: vec![Vector3::zeros(); count],
+            band: Band::zeros(count),
+            sides: std::array::from_fn(|_| vec![0.0; count + BAND]),
+        }
+    }
+
+    /// Turns the control orientations, knots `h` (s) apart, until all passes are met within `most` (rad), or for so many
+    /// rounds. Four at each end stay.
+    fn meet(
+        &mut self,
+        control: &mut [UnitQuaternion<f64>],
+        passes: &[Pass<'_>],
+        (h, most): (f64, f64),
+    ) {
+        let before = control.to_vec();
+        let mut wanted = vec![(0.0, Vector3::zeros()); passes.len()];
+        for _ in 0..SMOOTH_ROUNDS {
+            let mut missed = false;
+            for ((first, share, pose), wanted) in passes.iter().zip(&mut wanted) {
+                let off = seen(&control[*first..first + 5], *share, h, pose);
+                if off.norm() > MET[0] * most {
+                    missed = true;
+                    wanted.0 = (GROWTH * wanted.0).max(WEIGHT);
+                }
+                let changes = self.change[*first..].iter().zip(weights(*share)[0]);
+                let changed: Vector3<f64> = changes.map(|(change, weight)| change * weight).sum();
+                let kept = (MET[1] * most / off.norm().max(1e-300)).min(1.0);
+                wanted.1 = changed - off * (1.0 - kept);
+            }
+            if !missed || !self.solve(passes, &wanted) {
+                break;
+            }
+            for ((to, from), change) in control.iter_mut().zip(&before).zip(&self.change) {
+                *to = from * UnitQuaternion::from_scaled_axis(*change);
+            }
+        }
+    }
+
+    /// Solves for the change at passes with the weights and changes that are wanted; false where that is not possible.
+    fn solve(&mut self, passes: &[Pass<'_>], wanted: &[(f64, Vector3<f64>)]) -> bool {
+        let count = self.change.len();
+        self.band.clear();
+        for side in &mut self.sides {
+            side.fill(0.0);
+        }
+        for first in 0..count - 3 {
+            self.add(first, &THIRD, (1.0, &Vector3::zeros()));
+        }
+        for ((first, share, _), (weight, change)) in passes.iter().zip(wanted) {
+            if *weight > 0.0 {
+                self.add(*first, &weights(*share)[0], (*weight, change));
+            }
+        }
+        for (k, column) in self.band.columns.iter_mut().enumerate() {
+            let fixed = k < 4 || k + 4 >= count;
+            column[0] += if fixed { FIXED } else { FADING };
+        }
+        if !self.band.factor() {
+            return false;
+        }
+        let [a, b, c] = &mut self.sides;
+        self.band.solve([&mut a[..], &mut b[..], &mut c[..]]);
+        for (k, change) in self.change.iter_mut().enumerate() {
+            *change = if k < 4 || k + 4 >= count {
+                Vector3::zeros()
+            } else {
+                Vector3::from_fn(|d, _| self.sides[d][k])
+            };
+        }
+        true
+    }
+
+    /// Adds a weight on the square of a sum of changes less a wanted one.
+    fn add(&mut self, first: usize, factors: &[f64], (weight, wanted): (f64, &Vector3<f64>)) {
+        for (i, a) in factors.iter().enumerate() {
+            for (j, b) in factors[i..].iter().enumerate() {
+                self.band.columns[first + i][j] += weight * a * b;
+            }
+            for (side, wanted) in self.sides.iter_mut().zip(wanted.iter()) {
+                side[first + i] += weight * a * wanted;
+            }
+        }
+    }
 }
 
 /// The control orientations of the spans of one uniform spline that turns.
