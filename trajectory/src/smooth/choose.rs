@@ -31,10 +31,8 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
 
-/// The most by which a motion may miss a pose by the angle for its orientations to be turned to it, and the factor on its
-/// time that this may cost.
+/// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
 const TURNED: f64 = 4.0;
-const SLOWER: f64 = 1.01;
 
 /// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
 const AT_END: f64 = 1.0 + 1e-3;
@@ -131,6 +129,10 @@ struct Attempts<'a> {
     coupled: Option<bool>,
     /// Whether it may be.
     dear: bool,
+    /// Whether motions that miss poses by the angle are turned to them.
+    keeps: bool,
+    /// The fastest of these, and whether an attempt before it failed by far.
+    turned: Option<(Vec<Span>, bool)>,
 }
 
 impl<'a> Window<'a> {
@@ -154,15 +156,15 @@ impl<'a> Window<'a> {
     /// From a motion that is `known`, the search has a point that holds every bound, so a motion
     /// that need not rest is found where the one that is known rests.
     pub(crate) fn spline(&self, known: Option<&[Span]>, most: f64) -> Option<Motion> {
-        self.found(known, most, true)
+        self.found(known, most, [true, false])
     }
 
     /// The same from a motion; where the orientation has to be part of the search only if it may be `dear`.
     pub(crate) fn refined(&self, known: &[Span], most: f64, dear: bool) -> Option<Motion> {
-        self.found(Some(known), most, dear)
+        self.found(Some(known), most, [dear, true])
     }
 
-    fn found(&self, known: Option<&[Span]>, most: f64, dear: bool) -> Option<Motion> {
+    fn found(&self, known: Option<&[Span]>, most: f64, [dear, keeps]: [bool; 2]) -> Option<Motion> {
         let options = self.options;
         if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
             return None;
@@ -184,6 +186,8 @@ impl<'a> Window<'a> {
             },
             coupled: None,
             dear,
+            keeps,
+            turned: None,
         };
         let (spans, retried) = attempts.run()?;
         let soon = spans.last()?.end() <= most;
@@ -200,7 +204,13 @@ impl Attempts<'_> {
     fn run(mut self) -> Option<(Vec<Span>, bool)> {
         let mut nearly = None;
         let held = self.held(&mut nearly);
-        held.or(nearly)
+        let turned = self.turned.take();
+        let time = |found: &(Vec<Span>, bool)| found.0.last().map_or(0.0, Span::end);
+        let faster = |found: &(Vec<Span>, bool)| {
+            let held = held.as_ref().map_or(f64::INFINITY, time);
+            time(found) < held
+        };
+        turned.filter(faster).or(held).or(nearly)
     }
 
     /// The same without the one that is `nearly` within its limits; bounds that one attempt breaks are narrowed for
@@ -250,11 +260,8 @@ impl Attempts<'_> {
             if certificate.holds() && settled {
                 return Some((spans, retried));
             }
-            if moving.is_none()
-                && settled
-                && let Some(met) = self.met(&spans, &crossings)
-            {
-                return Some((met, retried));
+            if self.keeps && settled {
+                self.keep(&spans, &crossings, retried);
             }
             if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
                 *nearly = Some((spans.clone(), retried));
@@ -278,20 +285,23 @@ impl Attempts<'_> {
         None
     }
 
-    /// The spans of a motion from rest that misses poses by the angle only, turned to them, if that takes little more time.
-    fn met(&self, spans: &[Span], crossings: &[Crossing]) -> Option<Vec<Span>> {
+    /// Keeps the spans of a motion from rest that misses poses by the angle only, turned to them, if no faster ones are kept.
+    fn keep(&mut self, spans: &[Span], crossings: &[Crossing], retried: bool) {
         let Window { poses, options, .. } = self.window;
         let near = |pass: &Crossing| {
             pass.deviation <= pass.tolerance && pass.angle <= TURNED * pass.angular_tolerance
         };
         if !crossings.iter().all(near) {
-            return None;
+            return;
         }
+        let most = self.turned.as_ref().and_then(|(spans, _)| spans.last());
+        let most = most.map_or(f64::INFINITY, Span::end);
         let motion = Motion::new(spans.to_vec(), Method::Spline);
-        let most = SLOWER * motion.duration();
-        let met = missed::met(&motion, poses, options).filter(|met| met.duration() <= most)?;
-        let holds = certify(&met.spans, poses, options).0.holds();
-        holds.then_some(met.spans)
+        let met = missed::met(&motion, poses, options).filter(|met| met.duration() < most);
+        let holds = |met: &Motion| certify(&met.spans, poses, options).0.holds();
+        if let Some(met) = met.filter(holds) {
+            self.turned = Some((met.spans, retried));
+        }
     }
 
     /// Prepares the attempt after one that broke bounds; `None` if it would be the same.
