@@ -6,10 +6,12 @@ use super::certificate::{Certificate, Peak, certify};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
+use super::missed;
 use super::motion::Motion;
 use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::span::Span;
+pub(crate) use super::span::stretch;
 use super::spline::{self, Effort, Moving, Request};
 use crate::{ToolLimits, ToolPoint};
 
@@ -29,6 +31,9 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
+
+/// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
+const TURNED: f64 = 4.0;
 
 /// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
 const AT_END: f64 = 1.0 + 1e-3;
@@ -127,6 +132,10 @@ struct Attempts<'a> {
     coupled: Option<bool>,
     /// Whether it may be.
     dear: bool,
+    /// Whether motions that miss poses by the angle are turned to them.
+    keeps: bool,
+    /// The fastest of these, and whether an attempt before it failed by far.
+    turned: Option<(Vec<Span>, bool)>,
 }
 
 impl<'a> Window<'a> {
@@ -151,15 +160,15 @@ impl<'a> Window<'a> {
     /// From a motion that is `known`, the search has a point that holds every bound, so a motion
     /// that need not rest is found where the one that is known rests.
     pub(crate) fn spline(&self, known: Option<&[Span]>, most: f64) -> Option<Motion> {
-        self.found(known, most, true)
+        self.found(known, most, [true, false])
     }
 
     /// The same from a motion; where the orientation has to be part of the search only if it may be `dear`.
     pub(crate) fn refined(&self, known: &[Span], most: f64, dear: bool) -> Option<Motion> {
-        self.found(Some(known), most, dear)
+        self.found(Some(known), most, [dear, true])
     }
 
-    fn found(&self, known: Option<&[Span]>, most: f64, dear: bool) -> Option<Motion> {
+    fn found(&self, known: Option<&[Span]>, most: f64, [dear, keeps]: [bool; 2]) -> Option<Motion> {
         let options = self.options;
         if options.tolerance <= RESOLUTION || options.corridor() <= RESOLUTION {
             return None;
@@ -182,6 +191,8 @@ impl<'a> Window<'a> {
             },
             coupled: None,
             dear,
+            keeps,
+            turned: None,
         };
         let (spans, retried) = attempts.run()?;
         let soon = spans.last()?.end() <= most;
@@ -198,7 +209,13 @@ impl Attempts<'_> {
     fn run(mut self) -> Option<(Vec<Span>, bool)> {
         let mut nearly = None;
         let held = self.held(&mut nearly);
-        held.or(nearly)
+        let turned = self.turned.take();
+        let time = |found: &(Vec<Span>, bool)| found.0.last().map_or(0.0, Span::end);
+        let faster = |found: &(Vec<Span>, bool)| {
+            let held = held.as_ref().map_or(f64::INFINITY, time);
+            time(found) < held
+        };
+        turned.filter(faster).or(held).or(nearly)
     }
 
     /// The same without the one that is `nearly` within its limits; bounds that one attempt breaks are narrowed for
@@ -228,7 +245,11 @@ impl Attempts<'_> {
             request.coupled = self.coupled.unwrap_or(!request.can_follow());
             let turns = request.moves()[1];
             if turns && request.coupled && !self.dear {
-                return None;
+                // Where legs are shorter than the tolerance orientations may follow, too.
+                if self.coupled.is_some() || !request.may_follow() {
+                    return None;
+                }
+                request.coupled = false;
             }
             let Some(mut spans) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
@@ -244,6 +265,9 @@ impl Attempts<'_> {
             let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
             if certificate.holds() && settled {
                 return Some((spans, retried));
+            }
+            if self.keeps && settled {
+                self.keep(&spans, &crossings, retried);
             }
             if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
                 *nearly = Some((spans.clone(), retried));
@@ -265,6 +289,25 @@ impl Attempts<'_> {
             self.narrow((&certificate, &crossings), request.coupled, settled)?;
         }
         None
+    }
+
+    /// Keeps the spans of a motion from rest that misses poses by the angle only, turned to them, if no faster ones are kept.
+    fn keep(&mut self, spans: &[Span], crossings: &[Crossing], retried: bool) {
+        let Window { poses, options, .. } = self.window;
+        let near = |pass: &Crossing| {
+            pass.deviation <= pass.tolerance && pass.angle <= TURNED * pass.angular_tolerance
+        };
+        if !crossings.iter().all(near) {
+            return;
+        }
+        let most = self.turned.as_ref().and_then(|(spans, _)| spans.last());
+        let most = most.map_or(f64::INFINITY, Span::end);
+        let motion = Motion::new(spans.to_vec(), Method::Spline);
+        let met = missed::met(&motion, poses, options).filter(|met| met.duration() < most);
+        let holds = |met: &Motion| certify(&met.spans, poses, options).0.holds();
+        if let Some(met) = met.filter(holds) {
+            self.turned = Some((met.spans, retried));
+        }
     }
 
     /// Prepares the attempt after one that broke bounds; `None` if it would be the same.
@@ -386,21 +429,5 @@ fn between(limits: &ToolLimits, certificate: &Certificate, ends: [&ToolPoint; 2]
         angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
             end.angular[2].norm()
         }),
-    }
-}
-
-/// Slows a motion down by a factor; its path does not change.
-pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
-    for span in spans {
-        span.start *= factor;
-        span.duration *= factor;
-        let mut scale = 1.0;
-        for k in 0..5 {
-            span.point[k] /= scale;
-            for turn in &mut span.turns {
-                turn.angle[k] /= scale;
-            }
-            scale *= factor;
-        }
     }
 }

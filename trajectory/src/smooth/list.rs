@@ -16,7 +16,7 @@ use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::rest::RestCause;
 use super::windows::{self, Windows};
-use super::{bridge, dense, exact_stop};
+use super::{bridge, dense, exact_stop, missed};
 
 /// Plans a motion from the first pose to the last that passes those between in
 /// order, each within tolerance: the fastest motion that is certified.
@@ -219,7 +219,7 @@ impl<'a> List<'a> {
         let dear = !(found.plan.method() == Method::Fit && found.suffices());
         for _ in 0..ROUNDS {
             let before = found.plan.duration();
-            let motion = windows::refined(&form.poses, &form.options, &found.motion, dear);
+            let motion = windows::refined(&form.poses, &form.options, &found.motion, 1.0, dear);
             let refined = motion.and_then(|motion| self.certified(form, motion));
             let Some(refined) = refined.filter(|refined| refined.plan.duration() < before) else {
                 break;
@@ -333,7 +333,10 @@ impl<'a> List<'a> {
             )
         };
         let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
-        let (plan, motion) = bridged.and_then(placed).or_else(|| placed(motion))?;
+        let (plan, motion) = bridged
+            .and_then(placed)
+            .or_else(|| placed(motion.clone()))
+            .or_else(|| self.repaired(form, motion))?;
         self.best.set(self.best.get().min(plan.duration()));
         Some(Found {
             plan,
@@ -342,6 +345,32 @@ impl<'a> List<'a> {
             before,
             eased,
         })
+    }
+
+    /// The motion nearest to one through the normal form that misses poses on the legs: with orientations that meet them,
+    /// else that with which a search ends that starts there and passes those poses, too.
+    fn repaired(&self, form: &NormalForm, mut motion: Motion) -> Option<(SmoothPlan, Motion)> {
+        let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
+        if self.poses.len() == self.given.len() {
+            return None;
+        }
+        let whole = form.through(self.given, self.options);
+        let mut through = form.poses.clone();
+        for _ in 0..REPAIRS {
+            let met = missed::met(&motion, &whole.poses, &whole.options);
+            if let Some(good) = met.and_then(placed) {
+                return Some(good);
+            }
+            let far = motion.duration() > WORSE * self.best.get();
+            through = missed::with(&through, &whole.poses, &motion.spans, &whole.options)
+                .filter(|_| !far)?;
+            let known = &motion;
+            motion = windows::refined(&through, &whole.options, known, WORSE, true)?;
+            if let Some(good) = placed(motion.clone()) {
+                return Some(good);
+            }
+        }
+        None
     }
 
     /// A motion through the normal form, laid back, if its certificate holds.
@@ -357,6 +386,10 @@ impl<'a> List<'a> {
 /// Most narrower tolerances that are tried, and how many of them without a gain where an attempt failed.
 const MOST_NARROWER: usize = 5;
 const PATIENCE: usize = 2;
+
+/// Most searches in which poses that a motion misses are added, and the factor on its time that they may cost.
+const REPAIRS: usize = 3;
+const WORSE: f64 = 1.05;
 
 /// Most searches from a motion, each from the one that the search before ended with.
 const ROUNDS: usize = 3;

@@ -23,6 +23,7 @@ mod found;
 mod list;
 mod lower_bound;
 mod method;
+mod missed;
 mod motion;
 mod narrower;
 mod normal_form;

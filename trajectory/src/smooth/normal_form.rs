@@ -56,6 +56,11 @@ impl NormalForm {
         Self::towards(given, options, !self.backwards)
     }
 
+    /// The form of more poses between the same ends, from the same end.
+    pub(super) fn through(&self, given: &[Isometry3<f64>], options: &SmoothOptions) -> Self {
+        Self::towards(given, options, self.backwards)
+    }
+
     /// The form that begins at one end.
     fn towards(given: &[Isometry3<f64>], options: &SmoothOptions, backwards: bool) -> Self {
         let unit = unit(options);

@@ -140,6 +140,22 @@ impl Span {
     }
 }
 
+/// Slows a motion down by a factor; its path does not change.
+pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
+    for span in spans {
+        span.start *= factor;
+        span.duration *= factor;
+        let mut scale = 1.0;
+        for k in 0..5 {
+            span.point[k] /= scale;
+            for turn in &mut span.turns {
+                turn.angle[k] /= scale;
+            }
+            scale *= factor;
+        }
+    }
+}
+
 /// Power form of the first derivative of a quartic.
 fn first(power: &[Vector3<f64>; 5]) -> [Vector3<f64>; 4] {
     let [_, c1, c2, c3, c4] = *power;

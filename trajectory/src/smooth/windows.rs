@@ -47,12 +47,13 @@ pub(super) fn motion(
     in_parts(poses, options, (backwards, DIVISIONS))
 }
 
-/// The spline with which a search ends that starts from a motion through the list, if it is certified and faster;
-/// with the orientation as a part of the search only where that may be `dear`.
+/// The spline with which a search ends that starts from a motion through the list, if it is certified and takes no more
+/// than so many `times` as long; with the orientation as a part of the search only where that may be `dear`.
 pub(super) fn refined(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
     known: &Motion,
+    times: f64,
     dear: bool,
 ) -> Option<Motion> {
     let poses = divided(poses, options);
@@ -60,7 +61,7 @@ pub(super) fn refined(
         return None;
     }
     let window = Window::from_rest(&poses, options, Then::Stop);
-    window.refined(&known.spans, known.duration(), dear)
+    window.refined(&known.spans, times * known.duration(), dear)
 }
 
 /// The same, divided at most so many times.

@@ -96,6 +96,17 @@ impl Request<'_> {
     /// can follow the progress, and when no pose is passed with a jump of the angular velocity that is
     /// far above the angular jerk.
     pub(crate) fn can_follow(&self) -> bool {
+        let least = self.options.tolerance.min(1e-3);
+        self.follows(least)
+    }
+
+    /// The same where legs may be short: then poses are missed more often.
+    pub(crate) fn may_follow(&self) -> bool {
+        self.follows(0.0)
+    }
+
+    /// The same where legs that turn are longer than `least` (m).
+    fn follows(&self, least: f64) -> bool {
         let limits = &self.options.limits;
         let ramps = [
             limits.acceleration / limits.jerk,
@@ -108,7 +119,7 @@ impl Request<'_> {
             let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
             let turn = body_turn(&pair[0].rotation, &pair[1].rotation);
             let angle = turn.norm();
-            let far = way > self.options.tolerance.min(1e-3);
+            let far = way > least;
             let slow = angle / limits.angular_speed < 1.5 * way / limits.speed;
             let rate = turn / way.max(1e-300);
             let jump = before
