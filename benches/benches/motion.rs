@@ -165,11 +165,12 @@ const MOVES: [(Shape, &str, usize); 3] = [
 ];
 
 /// Processor time of planning random moves; refused moves count too. Words name the robots and
-/// shapes that are wanted; all, if none is named.
+/// shapes that are wanted; all, if none is named. A number says how many moves of each.
 fn random_moves(words: &[String]) {
     let each = words.iter().any(|word| word == "moves");
     let named = |all: &[&str]| words.iter().any(|word| all.contains(&word.as_str()));
     let wanted = |name: &str, all: &[&str]| !named(all) || named(&[name]);
+    let fewer = words.iter().find_map(|word| word.parse().ok());
     let mut lines = Vec::new();
     const ROBOTS: [&str; 2] = ["ur5e", "panda"];
     for name in ROBOTS.into_iter().filter(|name| wanted(name, &ROBOTS)) {
@@ -179,7 +180,8 @@ fn random_moves(words: &[String]) {
         };
         let suffix = if name == "ur5e" { "" } else { "-7" };
         let words = MOVES.map(|(_, word, _)| word);
-        for (shape, word, count) in MOVES.into_iter().filter(|row| wanted(row.1, &words)) {
+        for (shape, word, all) in MOVES.into_iter().filter(|row| wanted(row.1, &words)) {
+            let count = fewer.map_or(all, |fewer: usize| fewer.clamp(1, all));
             let moves = RandomMoves {
                 shape,
                 count,

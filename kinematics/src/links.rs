@@ -176,8 +176,13 @@ impl<const N: usize> Links<N> {
 /// Four of `N` numbers, starting at one of them; filled with zeros if `N` is below four.
 #[inline(always)]
 fn four<A: Four, const N: usize>(a: A, numbers: &[f64; N], first: usize) -> F4<A> {
-    let (mut four, count) = ([0.0; 4], N.min(4));
-    four[..count].copy_from_slice(&numbers[first..first + count]);
+    if let Some(four) = numbers[first..].first_chunk() {
+        return F4::new(a, *four);
+    }
+    let mut four = [0.0; 4];
+    for (to, from) in four.iter_mut().zip(numbers) {
+        *to = *from;
+    }
     F4::new(a, four)
 }
 

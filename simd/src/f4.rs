@@ -54,7 +54,9 @@ impl<S: Four> F4<S> {
             return Self::load(a, &all[at..at + LANES]);
         }
         let mut lanes = [0.0; LANES];
-        lanes[..all.len()].copy_from_slice(all);
+        for (to, from) in lanes.iter_mut().zip(all) {
+            *to = *from;
+        }
         Self::load(a, &lanes)
     }
 
@@ -65,8 +67,9 @@ impl<S: Four> F4<S> {
             self.a.store(self.v, &mut all[at..at + LANES]);
             return;
         }
-        let (lanes, count) = (self.array(), all.len());
-        all.copy_from_slice(&lanes[..count]);
+        for (to, from) in all.iter_mut().zip(self.array()) {
+            *to = from;
+        }
     }
 
     /// Writes the numbers to memory.

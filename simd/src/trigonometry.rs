@@ -8,13 +8,21 @@ use crate::four::Four;
 pub fn sin_cos<S: Four, const N: usize>(a: S, angles: [f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
     for first in (0..N).step_by(4) {
+        // Not by copies of slices, which would be calls.
         let mut four = [0.0; 4];
-        let count = (N - first).min(4);
-        four[..count].copy_from_slice(&angles[first..first + count]);
+        for (to, from) in four.iter_mut().zip(&angles[first..]) {
+            *to = *from;
+        }
         let (s, c) = sin_cos_of(F4::new(a, four));
         let (s, c) = (s.array(), c.array());
-        sin[first..first + count].copy_from_slice(&s[..count]);
-        cos[first..first + count].copy_from_slice(&c[..count]);
+        for (i, (sin, cos)) in sin[first..]
+            .iter_mut()
+            .zip(&mut cos[first..])
+            .enumerate()
+            .take(4)
+        {
+            (*sin, *cos) = (s[i], c[i]);
+        }
     }
     (sin, cos)
 }

@@ -12,6 +12,8 @@ const TRIED: usize = 4;
 const TRIED_REDUNDANT: usize = 12;
 /// Number of values of the free parameter of a seven-joint arm that are tried.
 const SWEEP: usize = 48;
+/// Configurations with no joint farther apart are the same, rad or m.
+const SAME: f64 = 1e-6;
 /// Configurations of a seven-joint arm count as equal if no joint differs by more, rad.
 const ALIKE: f64 = 0.3;
 /// Distance from a limit, rad, from which a seven-joint arm can move on well.
@@ -54,7 +56,7 @@ impl<const N: usize> Planner<N> {
         self.soonest(motion, start, &goals, goals.len())
     }
 
-    /// The goals that need the least time at constant velocity.
+    /// The goals that need the least time at constant velocity, each once.
     pub(super) fn promising(
         &self,
         mut goals: Vec<SVector<f64, N>>,
@@ -63,8 +65,7 @@ impl<const N: usize> Planner<N> {
         let way =
             |goal: &SVector<f64, N>| (goal - start).abs().component_div(&self.limits.velocity);
         goals.sort_by(|a, b| way(a).max().total_cmp(&way(b).max()));
-        goals.truncate(TRIED);
-        goals
+        apart(Vec::new(), goals.into_iter(), (TRIED, SAME))
     }
 
     /// First the goals with the least time at constant velocity for their ease, and their number;
@@ -167,5 +168,38 @@ impl<const N: usize> Planner<N> {
                 degrees: report.rotation_error.to_degrees(),
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The nearest solution is one of all solutions too; no configuration is compared twice.
+    #[test]
+    fn no_configuration_is_promising_twice() {
+        let robot = crate::robot::load("ur5e").unwrap();
+        let planner = Planner::<6>::new(
+            &robot.chain().unwrap(),
+            Isometry3::identity(),
+            robot.joint_limits(),
+            robot.joint_names(),
+        );
+        let home = SVector::from_column_slice(&robot.home);
+        let mut compared = 0;
+        for i in 0..40 {
+            let turn = |j: usize| 0.4 * (f64::from(i) * (1.3 + 0.7 * j as f64)).sin();
+            let start = home + SVector::from_fn(|j, _| turn(j));
+            let end = home + SVector::from_fn(|j, _| turn(j + 6));
+            let pose = planner.chain().forward(&end);
+            let goals = planner.configurations(&pose, &start).unwrap();
+            let goals = planner.promising(goals, &start);
+            for (k, goal) in goals.iter().enumerate() {
+                let twice = goals[..k].iter().any(|other| (other - goal).amax() < 1e-3);
+                assert!(!twice, "{i}: {goals:?}");
+            }
+            compared += goals.len();
+        }
+        assert!(compared > 80, "{compared}");
     }
 }

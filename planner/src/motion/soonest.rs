@@ -2,8 +2,9 @@
 //! each.
 //!
 //! Every way has a lower bound of its time, which becomes closer step by step. The way with the
-//! least bound is looked at next, until a motion is known that no bound is below. So only few motions
-//! are computed in full, and the result is the fastest of all.
+//! least bound is looked at next, a line whose law without jerk limits is known when its expected time
+//! comes, until a motion is known that no bound is below. So only few motions are computed in full, and
+//! the result is the fastest of all.
 
 use nalgebra::SVector;
 use trajectory::bounds::JointsToTool;
@@ -50,6 +51,8 @@ enum Stage<'a, const N: usize> {
 struct Open<'a, const N: usize> {
     /// No motion this way is shorter, s.
     least: f64,
+    /// When it is looked at, among the others: the bound, or about how long the motion takes, s.
+    turn: f64,
     end: usize,
     stage: Stage<'a, N>,
 }
@@ -85,10 +88,14 @@ impl<const N: usize> Planner<N> {
         let lines = ends.iter().map(|end| JointLine::new(*start, *end, tool));
         let lines: Vec<_> = lines.collect();
         let lines: Vec<&dyn Path<N>> = lines.iter().map(|line| line as _).collect();
-        let open = ends.iter().enumerate().map(|(end, goal)| Open {
-            least: self.least_of_joints(start, goal),
-            end,
-            stage: Stage::End,
+        let open = ends.iter().enumerate().map(|(end, goal)| {
+            let least = self.least_of_joints(start, goal);
+            Open {
+                least,
+                turn: least,
+                end,
+                stage: Stage::End,
+            }
         });
         let mut search = Search {
             planner: self,
@@ -174,22 +181,20 @@ impl<const N: usize> Planner<N> {
 }
 
 impl<'a, const N: usize> Search<'a, N> {
-    /// Looks closer at the way with the least bound; false if no way can be faster than the best
-    /// motion so far.
+    /// Looks closer at the way whose turn it is; false if no way can be faster than the best motion so
+    /// far.
     fn look(&mut self) -> bool {
-        let rank = |way: &Open<'a, N>| {
-            let gain = if way.end < self.sure { 0.0 } else { GAIN };
-            way.least * (1.0 + gain)
-        };
-        let ways = self.open.iter().map(rank).enumerate();
-        // The first of ways with equal bounds, so that the order of the ends decides.
-        let Some((index, rank)) = ways.min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
+        let (sure, limit) = (self.sure, self.limit());
+        let worth = |end: usize, time: f64| time * (1.0 + if end < sure { 0.0 } else { GAIN });
+        self.open.retain(|way| worth(way.end, way.least) < limit);
+        let turns = self.open.iter().map(|way| worth(way.end, way.turn));
+        // The first of equal ways, so that the order of the ends decides.
+        let Some((index, _)) = turns.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
             return false;
         };
-        if rank >= self.limit() {
-            return false;
-        }
-        let Open { end, stage, least } = self.open.remove(index);
+        let Open {
+            end, stage, least, ..
+        } = self.open.remove(index);
         match stage {
             Stage::End => self.expand(end, least),
             Stage::Free(free) => {
@@ -204,7 +209,12 @@ impl<'a, const N: usize> Search<'a, N> {
                 match PathTiming::new(self.lines[end], limits, tool, &RESTING) {
                     Ok(timing) => {
                         let least = least.max(timing.lower_bound());
-                        self.push(least, end, Stage::Timed(Box::new(timing)));
+                        self.open.push(Open {
+                            least,
+                            turn: least.max(timing.expected()),
+                            end,
+                            stage: Stage::Timed(Box::new(timing)),
+                        });
                     }
                     // The other way to this end is never refused.
                     Err(_) => return true,
@@ -237,7 +247,12 @@ impl<'a, const N: usize> Search<'a, N> {
     }
 
     fn push(&mut self, least: f64, end: usize, stage: Stage<'a, N>) {
-        self.open.push(Open { least, end, stage });
+        self.open.push(Open {
+            least,
+            turn: least,
+            end,
+            stage,
+        });
     }
 
     /// The time of the best motion so far, s.

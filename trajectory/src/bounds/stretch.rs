@@ -145,10 +145,10 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
             6.0 * w[6] * h2,
             42.0 * w[7] * h3,
         ];
-        let mut error = errors;
-        let control = values.map(|values| quartic(&values));
-        let mut upper = [0.0; 6];
+        // Not by `map` of arrays, which would be calls.
+        let (mut error, mut control, mut upper) = (errors, values, [0.0; 6]);
         for q in 0..6 {
+            control[q] = quartic(&values[q]);
             error[q] = if self.narrow[q] > 0.0 {
                 errors[q] * self.narrow[q]
             } else {

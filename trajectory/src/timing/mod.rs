@@ -132,6 +132,13 @@ impl<'a, const N: usize> PathTiming<'a, N> {
         self.reachability.bound
     }
 
+    /// About how long the fastest motion along this path takes (s), no bound: the law without jerk limits
+    /// loses the time once in which its accelerations build up.
+    #[must_use]
+    pub fn expected(&self) -> f64 {
+        self.reachability.duration() + self.reachability.ramp
+    }
+
     /// The fastest motion along the path.
     ///
     /// # Errors

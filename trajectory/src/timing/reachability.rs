@@ -69,7 +69,8 @@ impl ReachabilityPass {
         if joint.jerk.iter().all(|jerk| jerk.is_finite()) {
             corners(path, bends.sizes)?;
         }
-        let grid = rows.grid(&at, &bends, 1);
+        let caps = rows.caps(&bends);
+        let grid = rows.grid(&at, (&bends, &caps), 1);
         let first = first_value(options);
         let last = if options.end == Boundary::Rest {
             0.0
@@ -89,7 +90,7 @@ impl ReachabilityPass {
             return Err(TimingError::Unbounded);
         }
         // The difference from a grid of half the points estimates the error of this one.
-        let coarse = rows.grid(&at, &bends, 2);
+        let coarse = rows.grid(&at, (&bends, &caps), 2);
         let slow = coarse.solve(first, last);
         let both = [(&at[..], &a[..]), (coarse.at(), &slow[..])];
         let [fine, coarse] = match bends.rise(joint, options) {
@@ -287,24 +288,29 @@ struct Rows<'a, const N: usize> {
 }
 
 impl<const N: usize> Rows<'_, N> {
-    /// The grid at every `step`-th of the places `at`, and at the last.
-    fn grid(&self, at: &[f64], bends: &Bends<N>, step: usize) -> ReachGrid {
+    /// The caps from speeds at all places.
+    fn caps(&self, bends: &Bends<N>) -> Vec<f64> {
+        let mut caps: Vec<f64> = (0..bends.joints.len())
+            .map(|i| self.cap(bends, i))
+            .collect();
+        let finite = caps.iter().copied().filter(|cap| *cap < FREE);
+        let most = finite.fold(0.0, f64::max);
+        // Where the path does not move with its parameter, no limit bounds the rate.
+        let most = if most > 0.0 { most } else { FREE };
+        caps.iter_mut().for_each(|cap| *cap = cap.min(most));
+        caps
+    }
+
+    /// The grid at every `step`-th of the places `at`, and at the last, with the caps there.
+    fn grid(&self, at: &[f64], (bends, caps): (&Bends<N>, &[f64]), step: usize) -> ReachGrid {
         let tool = [self.tool.acceleration, self.tool.angular_acceleration];
         let tools = tool.iter().filter(|limit| limit.is_finite()).count();
         let joints = if self.leading.is_some() { 1 } else { N };
         let mut grid = ReachGrid::with_room(joints + 3 * tools, at.len() / step + 2);
-        let caps: Vec<f64> = (0..at.len()).map(|i| self.cap(bends, i)).collect();
-        let most = caps
-            .iter()
-            .copied()
-            .filter(|cap| *cap < FREE)
-            .fold(0.0, f64::max);
-        // Where the path does not move with its parameter, no limit bounds the rate.
-        let most = if most > 0.0 { most } else { FREE };
         let narrow = self.joint.acceleration.map(|x| 1.0 / x);
         for (i, cap) in caps.iter().enumerate() {
             if i % step == 0 || i + 1 == at.len() {
-                grid.push(at[i], cap.min(most), self.rows(bends, i, &narrow));
+                grid.push(at[i], *cap, self.rows(bends, i, &narrow));
             }
         }
         grid

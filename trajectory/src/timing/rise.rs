@@ -38,16 +38,22 @@ pub(super) struct Rise {
     jerk: f64,
     /// The cube root of `6 J^2`.
     root: f64,
+    /// Where the acceleration reaches its limit, and half of the squared rate there.
+    full: (f64, f64),
 }
 
 impl Rise {
     /// For joints that move by `step` for one unit of `u` (rad).
     pub(super) fn new<const N: usize>(step: &SVector<f64, N>, limits: &JointLimits<N>) -> Self {
+        let acceleration = 1.0 / joint_ratio(step, &limits.acceleration);
         let jerk = 1.0 / joint_ratio(step, &limits.jerk);
+        let root = (6.0 * jerk * jerk).cbrt();
+        let full = acceleration * acceleration * acceleration / (6.0 * jerk * jerk);
         Self {
-            acceleration: 1.0 / joint_ratio(step, &limits.acceleration),
+            acceleration,
             jerk,
-            root: (6.0 * jerk * jerk).cbrt(),
+            root,
+            full: (full, half(root, full)),
         }
     }
 
@@ -61,12 +67,17 @@ impl Rise {
         if !j.is_finite() {
             return 2.0 * a * u;
         }
-        // Where the acceleration reaches its limit.
-        let full = a * a * a / (6.0 * j * j);
-        let rising = u.min(full);
-        let half = 0.75 * self.root * rising.cbrt().powi(4);
-        2.0 * (half + a * (u - rising))
+        let (full, most) = self.full;
+        if u >= full {
+            return 2.0 * (most + a * (u - full));
+        }
+        2.0 * half(self.root, u)
     }
+}
+
+/// Half of the squared rate at the distance `u` while the acceleration rises.
+fn half(root: f64, u: f64) -> f64 {
+    0.75 * root * u.cbrt().powi(4)
 }
 
 #[cfg(test)]
