@@ -3,7 +3,8 @@
 //! time.
 //!
 //! Then random moves of two robots: the processor time of planning. Budget of MoveTo: 1.5 ms (median)
-//! and 5 ms (p99) with six joints, 3 and 10 ms with seven; of straight moves 1.5 and 3 ms. With the
+//! and 5 ms (p99) with six joints, 3 and 10 ms with seven; of straight moves 1.5 and 3 ms; of smooth moves
+//! 1 % of the motion (median) and 5 % (p95). With the
 //! argument `moves` these alone, with one line for each move: how long it is, and how long it is
 //! planned.
 //!
@@ -15,8 +16,8 @@
 //! 1e5 mm/s3), computed once outside of this repository.
 #![allow(missing_docs, clippy::print_stdout, reason = "a benchmark prints")]
 
-use measure::RandomMoves;
 use measure::smooth::measure;
+use measure::{PlanningTime, RandomMoves};
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 use planner::controller::Controller;
 use planner::motion::Planner;
@@ -213,11 +214,34 @@ fn random_moves(words: &[String]) {
                 let at = planning[((count - 1) as f64 * share) as usize];
                 lines.push(format!("ratio {word}{suffix}-planning-{name}-ms {at:.3}"));
             }
+            if shape == Shape::Smooth {
+                lines.extend(shares(&times, &format!("{word}{suffix}")));
+            }
         }
     }
     for line in lines {
         println!("{line}");
     }
+}
+
+/// Planning time over the time of the motion, of the moves that can be made, one line for each quantile.
+fn shares(times: &[PlanningTime], name: &str) -> Vec<String> {
+    let share =
+        |time: &PlanningTime| Some(time.planning / time.motion.filter(|motion| *motion > 0.0)?);
+    let mut shares: Vec<f64> = times.iter().filter_map(share).collect();
+    shares.sort_by(f64::total_cmp);
+    let at =
+        |quantile: f64| shares.get((shares.len().saturating_sub(1) as f64 * quantile) as usize);
+    let line = |(word, quantile): (&str, f64)| {
+        let percent = 100.0 * at(quantile)?;
+        Some(format!(
+            "ratio {name}-planning-share-{word}-percent {percent:.3}"
+        ))
+    };
+    [("p50", 0.5), ("p95", 0.95)]
+        .into_iter()
+        .filter_map(line)
+        .collect()
 }
 
 fn lists() {

@@ -40,8 +40,9 @@ impl<const D: usize> Ball<D> {
     pub(super) fn new(at: &Iterate<'_, D>, i: usize, goal: &[f64; D]) -> Self {
         let (point, room) = (at.point, at.room);
         let (first, share) = point.locate(point.crossings[i]);
-        let [p, v, a] = point.at(point.crossings[i]);
-        let [weights, slopes, _] = weights(share);
+        let all = weights(share);
+        let [p, v, a] = point.with(first, &all);
+        let [weights, slopes, _] = all;
         let mut ball = Self {
             first,
             weights,

@@ -127,22 +127,28 @@ impl<const D: usize, const B: usize> System<D, B> {
         }
         let free = self.sides.len() / D;
         let (first, w) = (ball.first, &ball.weights);
-        for i in 0..5 {
-            if first + i < 4 || first + i - 4 >= free {
-                continue;
+        // Its control points that are free.
+        let (from, to) = (4_usize.saturating_sub(first), (free + 4 - first).min(5));
+        let rows = (first + from - 4) * D..(first + to - 4) * D;
+        let points = self.sides[rows.clone()].chunks_exact_mut(D);
+        for (sides, w) in points.zip(&w[from..to]) {
+            for (d, side) in sides.iter_mut().enumerate() {
+                side[0] += w * ball.gradient[d];
+                side[1] += w * border[d];
             }
-            let row = (first + i - 4) * D;
-            for d in 0..D {
-                self.sides[row + d][0] += w[i] * ball.gradient[d];
-                self.sides[row + d][1] += w[i] * border[d];
+        }
+        let columns = &mut self.band.columns[rows];
+        for (b, row) in hessian.iter().enumerate() {
+            // What the control points have of this coordinate.
+            let mut all = [[0.0; D]; 5];
+            for (all, w) in all.iter_mut().zip(w) {
+                *all = row.map(|x| w * x);
             }
-            for j in (0..=i).filter(|j| first + j >= 4) {
-                let (back, both) = ((i - j) * D, w[i] * w[j]);
-                let columns = &mut self.band.columns[row - back..row - back + D];
-                for (b, column) in columns.iter_mut().enumerate() {
-                    for a in (if i == j { b } else { 0 })..D {
-                        column[back + a - b] += both * hessian[a][b];
-                    }
+            let all = &all.as_flattened()[..to * D];
+            for (j, columns) in (from..to).zip(columns.chunks_exact_mut(D)) {
+                let below = columns[b].iter_mut().zip(&all[j * D + b..]);
+                for (entry, x) in below {
+                    *entry += w[j] * x;
                 }
             }
         }

@@ -17,6 +17,17 @@ const POWER: [[f64; 5]; 5] = [
     [0.0, 0.0, 0.0, 0.0, 1.0],
 ];
 
+/// The power coefficients.
+const SHARE: [[f64; 5]; 5] = {
+    let mut share = POWER;
+    let mut k = 0;
+    while k < 25 {
+        share[k / 5][k % 5] /= 24.0;
+        k += 1;
+    }
+    share
+};
+
 /// Weights of the position at a knot and in the middle of a span.
 pub(crate) const AT_KNOT: [f64; 5] = [1.0 / 24.0, 11.0 / 24.0, 11.0 / 24.0, 1.0 / 24.0, 0.0];
 pub(crate) const AT_MIDDLE: [f64; 5] = [
@@ -45,13 +56,17 @@ pub(crate) const START: [[f64; 3]; 4] = [
 /// Weights of the five control points for value, first and second derivative at the local parameter
 /// `s` of a span.
 pub(crate) fn weights(s: f64) -> [[f64; 5]; 3] {
-    let mut result = [[0.0; 5]; 3];
-    for (i, p) in POWER.iter().enumerate() {
-        result[0][i] = (p[0] + (p[1] + (p[2] + (p[3] + p[4] * s) * s) * s) * s) / 24.0;
-        result[1][i] = (p[1] + (2.0 * p[2] + (3.0 * p[3] + 4.0 * p[4] * s) * s) * s) / 24.0;
-        result[2][i] = (2.0 * p[2] + (6.0 * p[3] + 12.0 * p[4] * s) * s) / 24.0;
+    let mut result = [place(s), [0.0; 5], [0.0; 5]];
+    for (i, p) in SHARE.iter().enumerate() {
+        result[1][i] = p[1] + (2.0 * p[2] + (3.0 * p[3] + 4.0 * p[4] * s) * s) * s;
+        result[2][i] = 2.0 * p[2] + (6.0 * p[3] + 12.0 * p[4] * s) * s;
     }
     result
+}
+
+/// Weights of the five control points for the value at the local parameter `s` of a span.
+pub(crate) fn place(s: f64) -> [f64; 5] {
+    SHARE.map(|p| p[0] + (p[1] + (p[2] + (p[3] + p[4] * s) * s) * s) * s)
 }
 
 /// Power coefficients in time of the span of five control values, at knot spacing `h` (s).

@@ -78,7 +78,9 @@ impl<const D: usize, const B: usize> System<D, B> {
         room: &Room,
         t: f64,
     ) -> Option<Step> {
-        self.band.clear();
+        if Self::STRIDE > 3 {
+            self.band.clear();
+        }
         (self.gradient_z, self.hessian_z) = (t, 0.0);
         let at = Iterate {
             problem,
@@ -155,10 +157,18 @@ impl<const D: usize, const B: usize> System<D, B> {
             for d in 0..3 {
                 self.sides[row + d] = self.norms.side(k + 4, d);
             }
-            for back in 0..WIDE.min(k + 1) {
-                let block = self.norms.block(k + 4, back);
-                let row = Self::row(free, k - back, g);
-                for (b, column) in self.band.columns[row..row + 3].iter_mut().enumerate() {
+            let Some(columns) = self.band.columns[row..].first_chunk_mut::<3>() else {
+                continue;
+            };
+            if Self::STRIDE == 3 {
+                *columns = [[0.0; B]; 3];
+            }
+            for back in 0..WIDE {
+                if k + back >= free {
+                    continue;
+                }
+                let block = self.norms.block(k + back + 4, back);
+                for (b, column) in columns.iter_mut().enumerate() {
                     let above = if back == 0 { b } else { 0 };
                     for a in above..3 {
                         column[back * Self::STRIDE + a - b] = block[ENTRY[a][b]];

@@ -13,11 +13,14 @@ pub(super) const WIDE: usize = 5;
 const ENTRIES: usize = 6;
 pub(super) const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
-/// Gradient, border and Hessian of the terms of one group, each number by control point: so the sums of four
-/// neighbouring control points are made at once.
+/// Gradient, border and Hessian blocks of a control point, one number after the other.
+const SUMS: usize = 6 + WIDE * ENTRIES;
+
+/// Gradient, border and Hessian of the terms of one group, by control point.
 pub(super) struct Norms {
-    values: Vec<f64>,
-    length: usize,
+    /// The numbers of four neighbouring control points.
+    values: Vec<[[f64; LANES]; SUMS]>,
+    terms: Window,
     /// Sums of what the terms add to the slope along `z` and to its curvature.
     pub(super) along_z: [f64; 2],
 }
@@ -25,53 +28,141 @@ pub(super) struct Norms {
 impl Norms {
     /// Room for so many control points.
     pub(super) fn new(count: usize) -> Self {
-        let length = count + 2 * LANES;
         Self {
-            values: vec![0.0; (6 + WIDE * ENTRIES) * length],
-            length,
+            values: vec![[[0.0; LANES]; SUMS]; count.div_ceil(LANES)],
+            terms: Window::default(),
             along_z: [0.0; 2],
         }
     }
 
-    fn clear(&mut self) {
-        self.values.fill(0.0);
-        self.along_z = [0.0; 2];
-    }
-
     /// Gradient and border of a coordinate of a control point.
+    #[inline(always)]
     pub(super) fn side(&self, k: usize, d: usize) -> [f64; 2] {
-        [0, 1].map(|m| self.values[(3 * m + d) * self.length + k])
+        let four = &self.values[k / LANES];
+        [four[d][k % LANES], four[3 + d][k % LANES]]
     }
 
     /// The block of a control point and of the one `back` before it.
+    #[inline(always)]
     pub(super) fn block(&self, k: usize, back: usize) -> [f64; ENTRIES] {
-        let first = 6 + back * ENTRIES;
-        std::array::from_fn(|entry| self.values[(first + entry) * self.length + k])
+        let four = &self.values[k / LANES];
+        let mut block = [0.0; ENTRIES];
+        for (entry, to) in block.iter_mut().enumerate() {
+            *to = four[6 + back * ENTRIES + entry][k % LANES];
+        }
+        block
+    }
+}
+
+/// Numbers of a term: gradient, border, and entries of the Hessian.
+const NUMBERS: usize = 6 + ENTRIES;
+/// Terms that are made before they are added up, and room for those before them.
+const MADE: usize = 32;
+const ROOM: usize = LANES + MADE;
+/// Speed, acceleration, jerk, corridor at knots and in the middles of spans.
+const KINDS: usize = 5;
+
+/// Terms of neighbouring control points by kind and number; the first four are the last ones of the window before. What
+/// a control point has of all terms is added up at once, and no sum is read or written twice.
+struct Window(Vec<[[f64; ROOM]; NUMBERS]>);
+
+impl Default for Window {
+    fn default() -> Self {
+        Self(vec![[[0.0; ROOM]; NUMBERS]; KINDS])
+    }
+}
+
+impl Window {
+    /// Removes all terms.
+    fn clear(&mut self) {
+        self.0.fill([[0.0; ROOM]; NUMBERS]);
     }
 
-    /// Adds to a number of the control points from `k` on.
-    #[inline(always)]
-    fn add<S: Four>(&mut self, number: usize, k: usize, value: F4<S>) {
-        let to = &mut self.values[number * self.length + k..][..LANES];
-        if let Some(to) = to.first_chunk_mut() {
-            (F4::load(value.build(), &*to) + value).store(to);
+    /// Makes the last four terms those before the next.
+    fn go_on(&mut self) {
+        for row in self.0.iter_mut().flatten() {
+            row.copy_within(MADE.., 0);
         }
     }
 
-    /// Adds four terms, each in the weighted sum of the control points from `k` on, the next from the one after.
+    /// Sets four terms of a kind, of the control points from `l` on.
     #[inline(always)]
-    fn add_terms<S: Four, const M: usize>(&mut self, terms: &Terms<S>, w: &[f64; M], k: usize) {
-        for i in 0..M {
-            for d in 0..3 {
-                self.add(d, k + i, terms.gradient[d] * w[i]);
-                self.add(3 + d, k + i, terms.border[d] * w[i]);
+    fn set<S: Four>(&mut self, kind: usize, l: usize, terms: &Terms<S>) {
+        let rows = &mut self.0[kind];
+        for d in 0..3 {
+            terms.gradient[d].put(&mut rows[d], LANES + l);
+            terms.border[d].put(&mut rows[3 + d], LANES + l);
+        }
+        for entry in 0..ENTRIES {
+            terms.hessian[entry].put(&mut rows[6 + entry], LANES + l);
+        }
+    }
+
+    /// What all terms add to the four control points from `l` on.
+    #[inline(always)]
+    fn sums<S: Four>(&self, simd: S, l: usize, to: &mut [[f64; LANES]; SUMS]) {
+        let [speeds, accelerations, jerks, knots, middles] = self.0.as_slice() else {
+            return;
+        };
+        let zero = F4::splat(simd, 0.0);
+        for number in 0..6 {
+            let mut sum = zero;
+            add_side(&mut sum, (&speeds[number], l), &FIRST);
+            add_side(&mut sum, (&accelerations[number], l), &SECOND);
+            add_side(&mut sum, (&jerks[number], l), &THIRD);
+            add_side(&mut sum, (&knots[number], l), &KNOT);
+            add_side(&mut sum, (&middles[number], l), &AT_MIDDLE);
+            sum.store(&mut to[number]);
+        }
+        for entry in 0..ENTRIES {
+            let (mut sums, number) = ([zero; WIDE], 6 + entry);
+            add_blocks(&mut sums, (&speeds[number], l), &FIRST);
+            add_blocks(&mut sums, (&accelerations[number], l), &SECOND);
+            add_blocks(&mut sums, (&jerks[number], l), &THIRD);
+            add_blocks(&mut sums, (&knots[number], l), &KNOT);
+            add_blocks(&mut sums, (&middles[number], l), &AT_MIDDLE);
+            for (back, sum) in sums.into_iter().enumerate() {
+                sum.store(&mut to[6 + back * ENTRIES + entry]);
             }
-            for j in 0..=i {
-                for entry in 0..ENTRIES {
-                    let number = 6 + (i - j) * ENTRIES + entry;
-                    self.add(number, k + i, terms.hessian[entry] * (w[i] * w[j]));
-                }
-            }
+        }
+    }
+}
+
+/// The weights of the position at a knot that are not zero.
+const KNOT: [f64; 4] = [AT_KNOT[0], AT_KNOT[1], AT_KNOT[2], AT_KNOT[3]];
+
+/// A number of terms, as far as the control points from `l` on are in them: the terms that begin there, one before, and
+/// so on.
+#[inline(always)]
+fn shifted<S: Four, const M: usize>(simd: S, (row, l): (&[f64; ROOM], usize)) -> [F4<S>; M] {
+    let near: &[f64; 2 * LANES] = row[l..].first_chunk().unwrap_or(&[0.0; 2 * LANES]);
+    let mut result = [F4::splat(simd, 0.0); M];
+    for i in 0..M {
+        result[i] = F4::load(simd, &near[LANES - i..]);
+    }
+    result
+}
+
+/// Adds to a number of four control points what the terms give that have them with these weights.
+#[inline(always)]
+fn add_side<S: Four, const M: usize>(sum: &mut F4<S>, row: (&[f64; ROOM], usize), w: &[f64; M]) {
+    let terms: [F4<S>; M] = shifted(sum.build(), row);
+    for i in 0..M {
+        *sum += terms[i] * w[i];
+    }
+}
+
+/// The same for an entry of the blocks of four control points with those before them.
+#[inline(always)]
+fn add_blocks<S: Four, const M: usize>(
+    sums: &mut [F4<S>; WIDE],
+    row: (&[f64; ROOM], usize),
+    w: &[f64; M],
+) {
+    let terms: [F4<S>; M] = shifted(sums[0].build(), row);
+    for i in 0..M {
+        for j in 0..=i {
+            sums[i - j] += terms[i] * (w[i] * w[j]);
         }
     }
 }
@@ -127,85 +218,78 @@ impl<const D: usize> Op for Sum<'_, D> {
 
     #[inline(always)]
     fn run<S: Four>(mut self, simd: S) {
-        self.norms.clear();
         let mut along = [F4::splat(simd, 0.0); 2];
-        self.limits(simd, &mut along);
-        if self.at.problem.groups[self.g].width.is_finite() {
-            self.corridor(simd, &mut along);
+        let count = self.at.point.control.len();
+        let tube = self.at.problem.groups[self.g].width.is_finite();
+        self.norms.terms.clear();
+        let mut first = 0;
+        while first < count {
+            let end = (first + MADE).min(count);
+            let mut k = first;
+            while k < end {
+                self.limits(simd, (k, k - first), &mut along);
+                if tube {
+                    self.corridor(simd, (k, k - first), &mut along);
+                }
+                k += LANES;
+            }
+            let Norms { values, terms, .. } = &mut *self.norms;
+            let fours = &mut values[first / LANES..end.div_ceil(LANES)];
+            for (i, four) in fours.iter_mut().enumerate() {
+                terms.sums(simd, LANES * i, four);
+            }
+            terms.go_on();
+            first = end;
         }
         self.norms.along_z = [along[0].sum(), along[1].sum()];
     }
 }
 
 impl<const D: usize> Sum<'_, D> {
-    /// Speed, acceleration and jerk.
+    /// Speed, acceleration and jerk of the control points from `k` on, which are terms from `l` on.
     #[inline(always)]
-    fn limits<S: Four>(&mut self, simd: S, along: &mut [F4<S>; 2]) {
+    fn limits<S: Four>(&mut self, simd: S, (k, l): (usize, usize), along: &mut [F4<S>; 2]) {
         let Self { at, g, .. } = *self;
         let last = at.point.control.len() - 1;
         let cap = |k: usize| at.problem.cap(g, k, at.point.z, at.room);
         let caps = [cap(1), cap(2), cap(3)];
-        let mut k = 0;
-        while k < last {
-            let [first, second, third] = self.coordinates.differences(simd, g, k);
-            let moves = self.moves.filter(|_| k < LANES || !at.slides.is_empty());
-            let [one, two, three] = match moves {
-                Some(moves) => {
-                    let [one, two, three] = moves.differences(simd, g, k);
-                    [Some(one), Some(two), Some(three)]
-                }
-                None => [None; 3],
-            };
-            let (speeds, accelerations, jerks) = (
-                norm(first, &caps[0], one, (held(simd, k, last), &mut *along)),
-                norm(
-                    second,
-                    &caps[1],
-                    two,
-                    (held(simd, k + 1, last), &mut *along),
-                ),
-                norm(
-                    third,
-                    &caps[2],
-                    three,
-                    (held(simd, k + 2, last), &mut *along),
-                ),
-            );
-            self.norms.add_terms(&speeds, &FIRST, k);
-            self.norms.add_terms(&accelerations, &SECOND, k);
-            self.norms.add_terms(&jerks, &THIRD, k);
-            k += LANES;
-        }
+        let [first, second, third] = self.coordinates.differences(simd, g, k);
+        let moves = self.moves.filter(|_| k < LANES || !at.slides.is_empty());
+        let [one, two, three] = match moves {
+            Some(moves) => {
+                let [one, two, three] = moves.differences(simd, g, k);
+                [Some(one), Some(two), Some(three)]
+            }
+            None => [None; 3],
+        };
+        let speeds = norm(first, &caps[0], one, (held(simd, k, last), &mut *along));
+        let valid = held(simd, k + 1, last);
+        let accelerations = norm(second, &caps[1], two, (valid, &mut *along));
+        let valid = held(simd, k + 2, last);
+        let jerks = norm(third, &caps[2], three, (valid, &mut *along));
+        self.norms.terms.set(0, l, &speeds);
+        self.norms.terms.set(1, l, &accelerations);
+        self.norms.terms.set(2, l, &jerks);
     }
 
     /// Corridor samples: at knots, and in the middles of spans.
     #[inline(always)]
-    fn corridor<S: Four>(&mut self, simd: S, along: &mut [F4<S>; 2]) {
+    fn corridor<S: Four>(&mut self, simd: S, (k, l): (usize, usize), along: &mut [F4<S>; 2]) {
         let (at, g) = (self.at, self.g);
-        let spans = at.point.spans();
-        let mut k = 0;
-        while k < spans {
-            let places = self.coordinates.samples(simd, g, k);
-            let moves = self.moves.filter(|_| !at.slides.is_empty());
-            let slides = match moves {
-                Some(moves) => {
-                    let [knots, middles] = moves.samples(simd, g, k);
-                    [Some(knots), Some(middles)]
-                }
-                None => [None; 2],
-            };
-            for half in 0..2 {
-                let slide = slides[half];
-                let feet = self.feet(places[half], 2 * k + half);
-                let valid = held(simd, k, spans);
-                let terms = away(&feet, slide, (valid, &mut *along));
-                if half == 0 {
-                    self.norms.add_terms(&terms, &AT_KNOT, k);
-                } else {
-                    self.norms.add_terms(&terms, &AT_MIDDLE, k);
-                }
+        let places = self.coordinates.samples(simd, g, k);
+        let moves = self.moves.filter(|_| !at.slides.is_empty());
+        let slides = match moves {
+            Some(moves) => {
+                let [knots, middles] = moves.samples(simd, g, k);
+                [Some(knots), Some(middles)]
             }
-            k += LANES;
+            None => [None; 2],
+        };
+        for half in 0..2 {
+            let feet = self.feet(places[half], 2 * k + half);
+            let valid = held(simd, k, at.point.spans());
+            let terms = away(&feet, slides[half], (valid, &mut *along));
+            self.norms.terms.set(3 + half, l, &terms);
         }
     }
 

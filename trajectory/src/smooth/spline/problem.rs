@@ -255,16 +255,27 @@ impl<const D: usize> Point<D> {
     /// Position and first two derivatives (to knots) at a time in knots.
     pub(crate) fn at(&self, time: f64) -> [[f64; D]; 3] {
         let (span, share) = self.locate(time);
-        let w = weights(share);
-        let mut result = [[0.0; D]; 3];
-        for (i, c) in self.control.iter().skip(span).take(5).enumerate() {
-            for k in 0..3 {
+        self.with(span, &weights(share))
+    }
+
+    /// The sums of five control points from `first` on with weights.
+    pub(crate) fn with<const M: usize>(&self, first: usize, w: &[[f64; 5]; M]) -> [[f64; D]; M] {
+        let five = &self.control[first..first + 5];
+        let mut result = [[0.0; D]; M];
+        for (result, w) in result.iter_mut().zip(w) {
+            for i in 0..5 {
                 for d in 0..D {
-                    result[k][d] += w[k][i] * c[d];
+                    result[d] += w[i] * five[i][d];
                 }
             }
         }
         result
+    }
+
+    /// Position of group `g` at a time in knots.
+    pub(crate) fn place(&self, time: f64, g: usize) -> [f64; 3] {
+        let (span, share) = self.locate(time);
+        self.sum(span, &basis::place(share), g)
     }
 
     /// Weighted sum of consecutive control points, the three of group `g`.

@@ -172,8 +172,10 @@ pub(crate) fn miss<const D: usize>(
     i: usize,
     g: usize,
 ) -> f64 {
-    let [p, ..] = point.at(point.crossings[i]);
-    let (p, goal) = (part(&p, g), part(&problem.inner()[i], g));
+    let (p, goal) = (
+        point.place(point.crossings[i], g),
+        part(&problem.inner()[i], g),
+    );
     square(&[p[0] - goal[0], p[1] - goal[1], p[2] - goal[2]]).sqrt()
 }
 
