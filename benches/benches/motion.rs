@@ -16,6 +16,8 @@
 //! 1e5 mm/s3), computed once outside of this repository.
 #![allow(missing_docs, clippy::print_stdout, reason = "a benchmark prints")]
 
+use std::borrow::Cow;
+
 use measure::smooth::measure;
 use measure::{PlanningTime, RandomMoves};
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
@@ -102,7 +104,7 @@ impl Windowed {
             most: 0.0,
             motion: f64::NAN,
         };
-        let Some(mut windowed) = planner.windows(motion, home) else {
+        let Some(mut windowed) = planner.windows(Cow::Borrowed(motion), home) else {
             if let Ok(planned) = planner.plan(motion, home) {
                 row.motion = planned.trajectory.duration();
             }

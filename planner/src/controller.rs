@@ -1,6 +1,7 @@
 //! The state of one arm during a program: modes, planner and the joints reached so far.
 
 use std::any::Any;
+use std::borrow::Cow;
 
 use crcl::LengthUnit;
 use kinematics::{Chain, Inertia};
@@ -231,7 +232,7 @@ impl<const N: usize> Controller<N> {
         if !modal.take_guards().is_empty() {
             return None;
         }
-        let windowed = self.planner.windows(&motion, &self.joints)?;
+        let windowed = self.planner.windows(Cow::Owned(motion), &self.joints)?;
         self.modal = modal;
         self.plans += 1;
         self.joints = *windowed.end();

@@ -1,6 +1,7 @@
 //! Long smooth moves that are planned in windows.
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
@@ -71,7 +72,7 @@ fn the_windows_together_are_the_plan() {
     let (planner, home, limits) = arm("ur5e");
     let motion = waves(&planner.chain().forward(&home), 1e-3, 1e-4, limits);
     let whole = planner.plan(&motion, &home).unwrap();
-    let mut windowed = planner.windows(&motion, &home).unwrap();
+    let mut windowed = planner.windows(Cow::Borrowed(&motion), &home).unwrap();
     let (mut windows, mut pieces) = (0, Vec::new());
     let mut before = Sample::rest(home);
     loop {
@@ -121,7 +122,7 @@ fn what_is_driven_may_be_forgotten() {
     let (planner, home, limits) = arm("ur5e");
     let motion = waves(&planner.chain().forward(&home), 1e-3, 1e-4, limits);
     let whole = planner.plan(&motion, &home).unwrap();
-    let mut windowed = planner.windows(&motion, &home).unwrap();
+    let mut windowed = planner.windows(Cow::Borrowed(&motion), &home).unwrap();
     let mut pieces = Vec::new();
     loop {
         let window = planner.window_of(&mut windowed).unwrap();
@@ -178,7 +179,7 @@ fn a_yes_is_never_followed_by_a_refusal() {
             tolerance,
             limits,
         };
-        let Some(mut windowed) = planner.windows(&motion, begin) else {
+        let Some(mut windowed) = planner.windows(Cow::Borrowed(&motion), begin) else {
             refused += 1;
             continue;
         };
@@ -211,7 +212,7 @@ fn a_way_out_of_reach_is_not_begun() {
     for (i, pose) in motion.poses.iter_mut().enumerate() {
         pose.translation.vector.x += 1e-3 * i as f64;
     }
-    assert!(planner.windows(&motion, &home).is_none());
+    assert!(planner.windows(Cow::Borrowed(&motion), &home).is_none());
     let error = planner.plan(&motion, &home).unwrap_err();
     let named = match error {
         MotionError::OutOfReach { pose, .. } | MotionError::Blocked { pose, .. } => pose,

@@ -43,22 +43,6 @@ impl<const N: usize, C: ToolCurve> HermitePath<N, C> {
         self.at[self.at.len() - 1]
     }
 
-    /// Frees the points and knots before `u`, once they are most of all: nothing may ask for places before
-    /// it any more.
-    pub fn forget(&mut self, u: f64) {
-        let before = self.at.partition_point(|x| *x <= u).saturating_sub(1);
-        if 2 * before <= self.at.len() || self.at.len() - before < 2 {
-            return;
-        }
-        self.at.drain(..before);
-        self.at.shrink_to_fit();
-        self.points.drain(..before);
-        self.points.shrink_to_fit();
-        let passed = self.knots.partition_point(|knot| *knot < self.at[0]);
-        self.knots.drain(..passed);
-        self.knots.shrink_to_fit();
-    }
-
     /// The joints and their three derivatives at `u`.
     fn joints(&self, u: f64) -> JointPoint<N> {
         let last = self.at.len() - 1;

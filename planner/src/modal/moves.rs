@@ -106,19 +106,17 @@ impl Modal {
     ) -> Result<Task, CommandError> {
         let limits = self.settings.tool_limits(&self.maxima)?;
         let workstation_from_frame = self.workstation_from_frame(workstation_from_flange);
-        let poses = poses
-            .iter()
-            .enumerate()
-            .map(|(index, pose)| {
-                isometry(pose, self.length, self.angle)
-                    .map(|frame_from_tool| workstation_from_frame * frame_from_tool)
-                    .map_err(|error| numbered(error, index, poses.len()))
-            })
-            .collect::<Result<_, _>>()?;
+        // A list may be long: no more room than it needs.
+        let mut placed = Vec::with_capacity(poses.len());
+        for (index, pose) in poses.iter().enumerate() {
+            let frame_from_tool = isometry(pose, self.length, self.angle)
+                .map_err(|error| numbered(error, index, poses.len()))?;
+            placed.push(workstation_from_frame * frame_from_tool);
+        }
         let tolerance = self.settings.intermediate_ball();
         Ok(Task::Move(Move {
             shape,
-            poses,
+            poses: placed,
             tolerance,
             limits,
         }))

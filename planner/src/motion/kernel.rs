@@ -6,6 +6,7 @@
 //! that is not generic. Crates above this one compile the calls only.
 
 use std::any::Any;
+use std::borrow::Cow;
 
 use kinematics::{Chain, Solver};
 use nalgebra::{Isometry3, SVector};
@@ -40,7 +41,7 @@ pub(super) struct Kernel<const N: usize> {
     pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
     pub timed: Timed<N>,
     pub postures: Postures<N>,
-    pub windows: fn(&Planner<N>, &Move, &SVector<f64, N>) -> Option<WindowedMove<N>>,
+    pub windows: fn(&Planner<N>, Cow<'_, Move>, &SVector<f64, N>) -> Option<WindowedMove<N>>,
     pub window_of: fn(&Planner<N>, &mut WindowedMove<N>) -> Result<MoveWindow<N>, MotionError>,
 }
 

@@ -32,6 +32,8 @@ mod timed_refusal;
 mod windowed;
 
 use kinematics::{Chain, Solver};
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, SVector};
 use realtime::Sample;
 use trajectory::bounds::Held;
@@ -225,9 +227,13 @@ impl<const N: usize> Planner<N> {
 
     /// Checks the whole way of a long smooth move from `start`, at rest, and times its first window; see
     /// [`WindowedMove`]. All windows of [`Self::window_of`] together are the motion of [`Self::plan`].
-    /// `None` for a move that is planned as a whole.
+    /// `None` for a move that is planned as a whole. A move that is owned is not copied.
     #[must_use]
-    pub fn windows(&self, motion: &Move, start: &SVector<f64, N>) -> Option<WindowedMove<N>> {
+    pub fn windows(
+        &self,
+        motion: Cow<'_, Move>,
+        start: &SVector<f64, N>,
+    ) -> Option<WindowedMove<N>> {
         (self.kernel.windows)(self, motion, start)
     }
 

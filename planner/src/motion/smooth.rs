@@ -1,5 +1,7 @@
 //! MoveSmoothlyTo: which of the motions that can be certified is taken.
 
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, SVector};
 use trajectory::smooth::{RestCause, SmoothOptions, least_time};
 use trajectory::{Line, Trajectory};
@@ -75,7 +77,7 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
-        if let Some(windowed) = self.begin_windows(motion, start) {
+        if let Some(windowed) = self.begin_windows(Cow::Borrowed(motion), start) {
             return self.all_windows(windowed);
         }
         let planned = match self.blended(motion, start, motion) {

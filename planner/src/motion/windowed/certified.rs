@@ -15,8 +15,6 @@ use crate::task::Move;
 /// Least time of a window at full speed, s, and in times of braking from full speed.
 const HORIZON: f64 = 0.8;
 const BRAKES: f64 = 4.0;
-/// Most points of the joint path in a window.
-const MOST_POINTS: usize = 1500;
 /// How often a window that is too short to be cut is doubled.
 const DOUBLINGS: usize = 4;
 /// Share of the limits that a window leaves unused where it is cut, so that the next one can begin
@@ -76,25 +74,9 @@ impl<const N: usize> Divided<N> {
     }
 }
 
-impl<const N: usize> WindowedMove<N> {
-    /// The parameter at which a window ends that takes at least this time at full speed (s).
-    fn horizon(&self, time: f64) -> f64 {
-        let now = self.least.partition_point(|[u, _]| *u <= self.from).max(1) - 1;
-        let least = self.least[now][1];
-        let after = self.least.partition_point(|[_, at]| *at < least + time);
-        let far = after.min(now + MOST_POINTS).max(now + 2);
-        let end = self.least[self.least.len() - 1];
-        match self.least.get(far) {
-            // A short rest of the way joins this window.
-            Some([u, at]) if end[1] - at > 0.5 * time => *u,
-            _ => end[0],
-        }
-    }
-}
-
 impl<const N: usize> Planner<N> {
     /// The next window.
-    pub(super) fn window(&self, windowed: &WindowedMove<N>) -> Result<Window<N>, MotionError> {
+    pub(super) fn window(&self, windowed: &mut WindowedMove<N>) -> Result<Window<N>, MotionError> {
         let shares = match windowed.boundary {
             Boundary::Moving { .. } => &MOVING[..],
             _ => &FROM_REST[..],
@@ -112,24 +94,35 @@ impl<const N: usize> Planner<N> {
     /// The same under a share of the limits.
     fn window_within(
         &self,
-        windowed: &WindowedMove<N>,
+        windowed: &mut WindowedMove<N>,
         share: f64,
     ) -> Result<Window<N>, MotionError> {
-        let limits = &windowed.motion.limits;
+        let WindowedMove {
+            motion,
+            ahead,
+            from,
+            boundary,
+            ..
+        } = &mut *windowed;
+        let (limits, from, boundary) = (motion.limits, *from, *boundary);
         let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
         let mut time = HORIZON.max(BRAKES * brake);
         for _ in 0..=DOUBLINGS {
-            let part = Part::new(&windowed.path, windowed.from, windowed.horizon(time));
-            let is_last = part.to >= windowed.path.last();
+            let to = self
+                .look_ahead(ahead, motion, (from, time))
+                .ok_or(MotionError::NoWay)?;
+            let path = ahead.path().ok_or(MotionError::NoWay)?;
+            let part = Part::new(&path, from, to);
+            let is_last = part.to >= ahead.last();
             let reserve = if is_last { 0.0 } else { RESERVE };
             // A law that begins in motion keeps the reserve by itself.
-            let share = match windowed.boundary {
+            let share = match boundary {
                 Boundary::Moving { .. } => share,
                 _ => share - reserve,
             };
-            let (joints, tool) = lowered(&self.limits, limits, share);
+            let (joints, tool) = lowered(&self.limits, &limits, share);
             let options = TimingOptions {
-                start: windowed.boundary,
+                start: boundary,
                 end: Boundary::Rest,
                 reserve,
                 ..Default::default()
@@ -141,7 +134,8 @@ impl<const N: usize> Planner<N> {
                 cut(&part, &timed, &joints, &tool)
             };
             if pieces > 0 {
-                return self.certified(windowed, Divided::new(&part, &timed, pieces));
+                let divided = Divided::new(&part, &timed, pieces);
+                return self.certified(windowed, divided);
             }
             time *= 2.0;
         }
@@ -166,7 +160,7 @@ impl<const N: usize> Planner<N> {
         }
         let [head, tail] = bounds;
         let (at, boundary) = divided.at_cut();
-        let passes = windowed.path.tool().passes();
+        let passes = windowed.ahead.curve.passes();
         let ahead = &passes[windowed.passed..];
         let count = ahead.partition_point(|u| *u <= at);
         let times = |range: &[f64], since: f64| -> Vec<Crossing> {
@@ -218,7 +212,7 @@ impl<const N: usize> Planner<N> {
             None => windowed.origin,
         };
         let mut way = certificate::way(&own, self.chain(), &from, &draft, &bounds);
-        if to < windowed.path.last() {
+        if to < windowed.ahead.last() {
             (way.end_deviation_m, way.end_angle_rad) = (0.0, 0.0);
         }
         let mut certificate = self.proved(&draft, &bounds, way);

@@ -6,17 +6,20 @@
 //! both parts are certified, so a stop is always known. Where no law goes on from a cut, that stop is
 //! taken and the next window begins at rest.
 
+mod ahead;
 mod certified;
+mod joints;
 mod part;
 mod way;
 
 use nalgebra::{Isometry3, SVector};
 use realtime::Piece;
-use trajectory::smooth::{FittedCurve, RestCause, SmoothOptions, least_time};
-use trajectory::{Boundary, HermitePath, Path, Trajectory};
+use trajectory::smooth::{RestCause, SmoothOptions, least_time};
+use trajectory::{Boundary, Path, Trajectory};
 
 use super::{Blend, MotionError, MoveCertificate, PlannedMove, Planner};
 use crate::task::Move;
+use ahead::Ahead;
 use certified::Certified;
 
 /// Shares of the limits that a window is timed with, one after the other: bounds are up to one percent
@@ -35,9 +38,8 @@ pub struct WindowedMove<const N: usize> {
     start: SVector<f64, N>,
     /// Pose of the controlled point at the start.
     origin: Isometry3<f64>,
-    path: HermitePath<N, FittedCurve>,
-    /// Parameter of each followed point, and the least time from the start to it (s).
-    least: Vec<[f64; 2]>,
+    /// The checked way.
+    ahead: Ahead<N>,
     end: SVector<f64, N>,
     /// Where the next window begins, and how.
     from: f64,
@@ -92,7 +94,8 @@ impl<const N: usize> WindowedMove<N> {
     /// Joints at the end of the windows so far (rad, m).
     #[must_use]
     pub fn here(&self) -> SVector<f64, N> {
-        self.path.joint_at(self.from).q[0]
+        let path = self.ahead.path();
+        path.map_or(self.start, |path| path.joint_at(self.from).q[0])
     }
 
     /// Rests between the start and the end of the windows so far.
@@ -102,23 +105,16 @@ impl<const N: usize> WindowedMove<N> {
     }
 
     /// Frees what only the parts so far needed: how each pose of them was passed and when which limit was
-    /// active, and the joints along them. The certificate is complete in everything else.
+    /// active. The certificate is complete in everything else.
     pub fn forget(&mut self) {
         if let Some(certificate) = &mut self.certificate {
             certificate.poses = Vec::new();
             certificate.active = Vec::new();
         }
-        self.path.forget(self.from);
-        let passed = self.least.partition_point(|[u, _]| *u <= self.from);
-        let before = passed.saturating_sub(1);
-        if 2 * before > self.least.len() {
-            self.least.drain(..before);
-            self.least.shrink_to_fit();
-        }
     }
 
     fn is_done(&self) -> bool {
-        self.from >= self.path.last()
+        self.from >= self.ahead.last()
     }
 
     /// Takes over a certified part of the motion, and where it ends.
@@ -181,11 +177,12 @@ impl<const N: usize> Planner<N> {
 
     /// Completes the certificate of the whole move.
     fn conclude(&self, windowed: &mut WindowedMove<N>) {
-        let motion = &windowed.motion;
-        let mut poses = vec![windowed.origin];
-        poses.extend_from_slice(&motion.poses);
+        let motion = &mut windowed.motion;
         let options = SmoothOptions::new(motion.tolerance, motion.limits);
-        let tool = least_time(&poses, &options).unwrap_or(0.0);
+        motion.poses.reserve_exact(1);
+        motion.poses.insert(0, windowed.origin);
+        let tool = least_time(&motion.poses, &options).unwrap_or(0.0);
+        motion.poses.remove(0);
         let joints = self.least_of_joints(&windowed.start, &windowed.end);
         if let Some(certificate) = &mut windowed.certificate {
             certificate.lower_bound_s = tool.max(joints).min(certificate.duration_s);
@@ -206,7 +203,7 @@ impl<const N: usize> Planner<N> {
             }
         }
         let certificate = windowed.certificate.ok_or(MotionError::NoWay)?;
-        let curve = windowed.path.tool();
+        let curve = &windowed.ahead.curve;
         let blend = Blend {
             tolerance: windowed.motion.tolerance,
             exact_stop: curve.exact_stop(),
@@ -228,6 +225,8 @@ impl<const N: usize> Planner<N> {
 
 #[cfg(test)]
 mod tests {
+    use std::borrow::Cow;
+
     use super::*;
     use crate::controller::Controller;
     use crate::robot::load;
@@ -254,7 +253,7 @@ mod tests {
             tolerance: 1e-4,
             limits,
         };
-        let mut windowed = planner.windows(&motion, &home).unwrap();
+        let mut windowed = planner.windows(Cow::Borrowed(&motion), &home).unwrap();
         let first = planner.window_of(&mut windowed).unwrap();
         assert!(!first.last);
         (planner, windowed, first.pieces)

@@ -11,14 +11,14 @@ const BRAKES: f64 = 1.6;
 
 /// A path from one parameter to another, which is the end at most.
 pub(super) struct Part<'a, const N: usize> {
-    path: &'a HermitePath<N, FittedCurve>,
+    path: &'a HermitePath<N, &'a FittedCurve>,
     pub from: f64,
     pub to: f64,
     knots: Vec<f64>,
 }
 
 impl<'a, const N: usize> Part<'a, N> {
-    pub(super) fn new(path: &'a HermitePath<N, FittedCurve>, from: f64, to: f64) -> Self {
+    pub(super) fn new(path: &'a HermitePath<N, &'a FittedCurve>, from: f64, to: f64) -> Self {
         let all = path.knots();
         let first = all.partition_point(|u| *u <= from + NEAR);
         let last = all.partition_point(|u| *u < to - NEAR);

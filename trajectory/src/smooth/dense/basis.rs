@@ -5,6 +5,8 @@
 //! # Source
 //! C. de Boor, "A Practical Guide to Splines", 1978, chapter 10, for uniform knots.
 
+use simd::{F4, Four, LANES};
+
 /// Control points that act on one span.
 pub(super) const ORDER: usize = 6;
 
@@ -22,6 +24,37 @@ const POWER: [[f64; 6]; ORDER] = [
 /// Weights of the control points of a span for the value at the share `x` of it.
 pub(super) fn value(x: f64) -> [f64; ORDER] {
     POWER.map(|p| (p[0] + x * (p[1] + x * (p[2] + x * (p[3] + x * (p[4] + x * p[5]))))) / 120.0)
+}
+
+/// Length of the weights of a span with zeros after them, so that four may be loaded from each.
+pub(super) const PADDED: usize = ORDER + LANES - 1;
+
+/// [`POWER`] by powers, with zeros after the last control point.
+const BY_POWER: [[f64; 2 * LANES]; 6] = {
+    let mut powers = [[0.0; 2 * LANES]; 6];
+    let (mut i, mut k) = (0, 0);
+    while k < 6 {
+        powers[k][i] = POWER[i][k];
+        i += 1;
+        if i == ORDER {
+            (i, k) = (0, k + 1);
+        }
+    }
+    powers
+};
+
+/// [`value`], four control points at a time: the same numbers.
+#[inline(always)]
+pub(super) fn values<S: Four>(simd: S, x: f64, to: &mut [f64; PADDED]) {
+    let (x, all) = (F4::splat(simd, x), F4::splat(simd, 120.0));
+    for first in [0, LANES] {
+        let power = |k: usize| F4::load(simd, &BY_POWER[k][first..first + LANES]);
+        let mut sum = power(5);
+        for k in (0..5).rev() {
+            sum = power(k) + x * sum;
+        }
+        (sum / all).put(&mut to[first..first + LANES], 0);
+    }
 }
 
 /// The same for the first derivative (to the share).
@@ -71,6 +104,28 @@ pub(super) fn gram() -> [[f64; ORDER]; ORDER] {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    /// Four control points at a time have the weights of one at a time, to the last bit.
+    #[test]
+    fn lanes_change_nothing() {
+        struct Values(f64);
+        impl simd::Op for Values {
+            type Output = [f64; PADDED];
+
+            #[inline(always)]
+            fn run<S: Four>(self, simd: S) -> [f64; PADDED] {
+                let mut to = [0.0; PADDED];
+                values(simd, self.0, &mut to);
+                to
+            }
+        }
+        for k in 0..100 {
+            let x = f64::from(k) / 99.0;
+            let lanes = simd::Build::detect().run(Values(x));
+            assert_eq!(lanes[..ORDER], value(x));
+            assert_eq!(lanes[ORDER..], [0.0; PADDED - ORDER]);
+        }
+    }
 
     /// Cubics are reproduced with all derivatives: their control values are known.
     #[test]

@@ -1,16 +1,19 @@
 //! A curve fitted through a long dense list, for callers that make its time law themselves, part by
 //! part.
 
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, SVector, Vector3};
 
 use super::chords::Chords;
 use super::curve::Curve;
-use super::fit::{Balls, Fit, Orientation};
+use super::fit::{Fit, Orientation};
+use super::fitting::ROUNDS;
 use super::places::Units;
 use super::profile::Profile;
 use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
 use super::time_parameter::TimeParameter;
-use super::{TURNING, is_limited, moved, suffices};
+use super::{TURNING, are_dense, is_limited, moved};
 use crate::line::Line;
 use crate::smooth::exact_stop;
 use crate::smooth::options::SmoothOptions;
@@ -18,8 +21,12 @@ use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
 
 /// Radius of the balls of the fit, as a share of the tolerance, and the largest share that the check
 /// of the curve accepts: the rest is for what follows the curve.
-const AIM: f64 = 0.96;
+const AIM: f64 = 0.97;
 const KEPT: f64 = 0.98;
+/// Rounds of a fit that only says about how long the curve takes.
+const ROUGH: usize = 8;
+/// Rounds of the fit over that time: more of them change it too little to be worth their time.
+const GOOD: usize = 11;
 /// Parts of a knot interval in which the distance from the legs is bounded.
 const PARTS: f64 = 8.0;
 
@@ -67,25 +74,27 @@ impl FittedCurve {
     pub fn new(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Self> {
         options.check(poses).ok()?;
         let options = &options.finite();
-        if !is_limited(options) || !suffices(poses, options) {
+        let mut list = moved(poses);
+        if !is_limited(options) || !are_dense(&list, options) {
             return None;
         }
-        let mut list = moved(poses);
-        // The last pose is met exactly, also if it repeats one before it by rounding.
-        *list.last_mut()? = poses[poses.len() - 1];
+        if let Cow::Owned(list) = &mut list {
+            // The last pose is met exactly, also if it repeats one before it by rounding.
+            *list.last_mut()? = poses[poses.len() - 1];
+        }
         let units = Units::new(options);
         let (kind, parameters, corridor_ratio) = if list.windows(2).any(TURNING) {
-            let (curve, ratio) = laid::<7>(&list, units, &options.limits)?;
-            let parameters = curve.fit.parameters.clone();
-            (Kind::Turns(curve), parameters, ratio)
+            let mut laid = Laid::<7>::new(&list, units, &options.limits)?;
+            let parameters = std::mem::take(&mut laid.curve.fit.parameters);
+            (Kind::Turns(laid.curve), parameters, laid.far)
         } else {
-            let (curve, ratio) = laid::<3>(&list, units, &options.limits)?;
-            let parameters = curve.fit.parameters.clone();
-            (Kind::Places(curve), parameters, ratio)
+            let mut laid = Laid::<3>::new(&list, units, &options.limits)?;
+            let parameters = std::mem::take(&mut laid.curve.fit.parameters);
+            (Kind::Places(laid.curve), parameters, laid.far)
         };
         Some(Self {
             kind,
-            passes: passes(poses, &list, &parameters),
+            passes: passes(poses, &list, parameters),
             corridor_ratio: corridor_ratio * units.length / options.corridor(),
             exact_stop: exact_stop::duration(poses, &options.limits),
         })
@@ -134,43 +143,93 @@ impl ToolCurve for FittedCurve {
 }
 
 /// The curve through a list that is checked at every place, and its greatest distance from the legs
-/// in balls; `None` if the list needs another way of planning.
-fn laid<const D: usize>(
-    poses: &[Isometry3<f64>],
-    units: Units,
-    limits: &ToolLimits,
-) -> Option<(Curve<D>, f64)> {
-    let points = units.points::<D>(poses);
-    let chords = Chords::new(&points);
-    if !chords.turning_points(&points).is_empty() || chords.shows_corners(&points) {
-        return None;
-    }
-    let parameters = chords.parameters(&points);
-    let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
-    let checked = |parameters: &[f64], balls: &Balls| {
-        let fit = Fit::new(&points, parameters, balls).ok()?;
-        let far = off_legs(&fit, &points);
-        let good = passes_all(&fit, &points) && far <= KEPT;
-        good.then(|| (Curve::new(fit, units, &poses[0]), far))
-    };
-    for (density, orientation) in ways.into_iter().flatten() {
-        if D == 3 && orientation == Orientation::AtPoses {
-            continue;
-        }
-        let radii = vec![AIM; poses.len()];
-        let balls = Balls { radii, orientation };
-        let Some(first) = checked(&scaled(&parameters, density), &balls) else {
-            continue;
+/// in balls.
+struct Laid<const D: usize> {
+    curve: Curve<D>,
+    far: f64,
+}
+
+impl<const D: usize> Laid<D> {
+    /// `None` if the list needs another way of planning.
+    fn new(poses: &[Isometry3<f64>], units: Units, limits: &ToolLimits) -> Option<Self> {
+        let points = units.points::<D>(poses);
+        let parameters = {
+            let chords = Chords::new(&points);
+            if !chords.turning_points(&points).is_empty() || chords.shows_corners(&points) {
+                return None;
+            }
+            chords.parameters(&points)
         };
-        // A curve over the time that it takes bends less where it is fast.
-        let profile = Profile::new(&first.0, limits);
+        let laying = Laying {
+            points,
+            parameters,
+            units,
+            start: poses[0],
+            limits: *limits,
+        };
+        let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
+        let fitting = |(_, way): &(f64, Orientation)| D > 3 || *way == Orientation::Along;
+        let mut ways = ways.into_iter().flatten().filter(fitting);
+        ways.find_map(|(density, way)| laying.laid(density, way))
+    }
+}
+
+/// What a curve is laid through.
+struct Laying<const D: usize> {
+    points: Vec<SVector<f64, D>>,
+    /// Parameters along the chords.
+    parameters: Vec<f64>,
+    units: Units,
+    start: Isometry3<f64>,
+    limits: ToolLimits,
+}
+
+impl<const D: usize> Laying<D> {
+    /// A curve with so many times the knots: over the time that a rough one takes, or else that a good
+    /// one takes, or else that one.
+    fn laid(&self, density: f64, way: Orientation) -> Option<Laid<D>> {
+        let rough = self.along_chords(density, way, ROUGH);
+        if let Some(laid) = rough.and_then(|fit| self.over_time(fit, density, way)) {
+            return Some(laid);
+        }
+        let first = self.along_chords(density, way, ROUNDS)?;
+        let good = self.checked(first.clone())?;
+        self.over_time(first, density, way).or(Some(good))
+    }
+
+    /// A fit over the chords.
+    fn along_chords(&self, density: f64, way: Orientation, rounds: usize) -> Option<Fit<D>> {
+        let parameters = scaled(&self.parameters, density);
+        Fit::in_blocks((&self.points, &parameters), (AIM, way), rounds)
+    }
+
+    /// A curve over the time that another one takes bends less where it is fast.
+    fn over_time(&self, fit: Fit<D>, density: f64, way: Orientation) -> Option<Laid<D>> {
+        let mut curve = self.curve(fit);
+        let mut parameters = std::mem::take(&mut curve.fit.parameters);
+        let limits = &self.limits;
+        let profile = Profile::new(&curve, limits);
         let timed = (|time| profile.parameter(time), profile.duration());
         let ramp = limits.acceleration / limits.jerk;
-        let time = TimeParameter::new(&first.0, timed, ramp, density * FIT_KNOTS);
-        let again = checked(&time.map(&first.0.fit.parameters), &balls);
-        return again.or(Some(first));
+        TimeParameter::new(&curve, timed, ramp, density * FIT_KNOTS).change(&mut parameters);
+        drop((curve, profile));
+        let fit = Fit::in_blocks((&self.points, &parameters), (AIM, way), GOOD)?;
+        self.checked(fit)
     }
-    None
+
+    /// A curve that passes everywhere as it should.
+    fn checked(&self, fit: Fit<D>) -> Option<Laid<D>> {
+        let far = off_legs(&fit, &self.points);
+        let good = passes_all(&fit, &self.points) && far <= KEPT;
+        good.then(|| Laid {
+            curve: self.curve(fit),
+            far,
+        })
+    }
+
+    fn curve(&self, fit: Fit<D>) -> Curve<D> {
+        Curve::new(fit, self.units, &self.start)
+    }
 }
 
 /// Whether a fit passes all points in order within their balls.
@@ -222,7 +281,16 @@ fn off_legs<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> f64 {
 
 /// The parameter of each pose between the ends of a list, of which `list` has those that differ from
 /// the one before and more between them.
-fn passes(poses: &[Isometry3<f64>], list: &[Isometry3<f64>], parameters: &[f64]) -> Vec<f64> {
+fn passes(
+    poses: &[Isometry3<f64>],
+    list: &Cow<'_, [Isometry3<f64>]>,
+    mut parameters: Vec<f64>,
+) -> Vec<f64> {
+    if let Cow::Borrowed(_) = list {
+        parameters.remove(0);
+        parameters.pop();
+        return parameters;
+    }
     let (mut kept, mut at) = (poses[0], 0);
     let mut passes = Vec::with_capacity(poses.len());
     for pose in &poses[1..poses.len().max(2) - 1] {

@@ -10,17 +10,22 @@
 //! the same motion.
 
 mod basis;
+mod blocks;
 mod chords;
 mod curve;
 mod fit;
 mod fitted;
+mod fitting;
 mod places;
 mod profile;
 mod section;
 mod spans;
+mod targets;
 mod time_parameter;
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use std::borrow::Cow;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::crossing::RESOLUTION;
 use super::motion::Motion;
@@ -89,8 +94,12 @@ pub(super) fn is_dense(given: &[Isometry3<f64>], options: &SmoothOptions) -> boo
 /// Whether a list needs no other way of planning: it is long, and dense all along. Straight legs with few
 /// poses on them count as one leg each.
 pub(super) fn suffices(given: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
-    let poses = moved(given);
-    let points = Units::new(options).points::<3>(&poses);
+    are_dense(&moved(given), options)
+}
+
+/// The same of poses without repeats.
+fn are_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let points = Units::new(options).points::<3>(poses);
     let corners = Chords::legs(&points).corners;
     let even = |pair: &[Isometry3<f64>]| leg(pair, options) <= LONGEST * LEG;
     if poses.len() > SPLIT * corners.len() {
@@ -124,7 +133,14 @@ fn leg(pair: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
 }
 
 /// The poses without repeats, and with more of them where the tool turns far.
-fn moved(given: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+fn moved(given: &[Isometry3<f64>]) -> Cow<'_, [Isometry3<f64>]> {
+    let stays = |pair: &[Isometry3<f64>]| {
+        let turn = body_turn(&pair[0].rotation, &pair[1].rotation);
+        Line::new(pair[0], pair[1]).is_still() || parts(&turn) > 1
+    };
+    if !given.windows(2).any(stays) {
+        return Cow::Borrowed(given);
+    }
     let mut poses = vec![given[0]];
     for pose in &given[1..] {
         let from = poses[poses.len() - 1];
@@ -133,16 +149,21 @@ fn moved(given: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
         }
         let turn = body_turn(&from.rotation, &pose.rotation);
         let way = pose.translation.vector - from.translation.vector;
-        let parts = (turn.norm() / TURN).ceil().max(1.0);
-        for part in 1..parts as usize {
-            let share = part as f64 / parts;
+        let parts = parts(&turn);
+        for part in 1..parts {
+            let share = part as f64 / parts as f64;
             let place = from.translation.vector + way * share;
             let rotation = from.rotation * UnitQuaternion::from_scaled_axis(turn * share);
             poses.push(Isometry3::from_parts(place.into(), rotation));
         }
         poses.push(*pose);
     }
-    poses
+    Cow::Owned(poses)
+}
+
+/// Straight lines of quaternions that stand for a turn.
+fn parts(turn: &Vector3<f64>) -> usize {
+    (turn.norm() / TURN).ceil().max(1.0) as usize
 }
 
 /// The motion through all sections between places where the way turns back.

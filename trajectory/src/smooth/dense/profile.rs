@@ -16,7 +16,8 @@ const PLACES: f64 = 2.0;
 /// Time against the parameter of a curve.
 #[derive(Clone, Debug)]
 pub(super) struct Profile {
-    at: Vec<f64>,
+    /// Change of the parameter from one time to the next.
+    step: f64,
     time: Vec<f64>,
 }
 
@@ -64,9 +65,9 @@ impl Profile {
         let end = Path::end(curve);
         let count = (PLACES * end).ceil().max(2.0) as usize;
         let step = end / count as f64;
-        let at: Vec<f64> = (0..=count).map(|k| k as f64 * step).collect();
-        let seen = |u: &f64| {
-            let tool = curve.tool_at(*u);
+        // What is seen of the curve at a place is not kept: it would be most of the memory.
+        let seen = |k: usize| {
+            let tool = curve.tool_at(k as f64 * step);
             let [first, second, _] = tool.linear;
             let [turn, bend, _] = tool.angular;
             [
@@ -79,27 +80,29 @@ impl Profile {
                 ),
             ]
         };
-        let places: Vec<[Motion; 2]> = at.iter().map(seen).collect();
-        let mut squares: Vec<f64> = places.iter().map(|[a, b]| a.most.min(b.most)).collect();
-        squares[0] = 0.0;
-        squares[count] = 0.0;
-        let grown = |k: usize, square: f64, forwards: f64| {
-            let [a, b] = &places[k];
+        let grown = |[a, b]: &[Motion; 2], square: f64, forwards: f64| {
             let growth = a.growth(square, forwards).min(b.growth(square, forwards));
             square + growth * step
         };
+        let mut squares = vec![0.0; count + 1];
+        let mut here = seen(0);
         for k in 0..count {
-            squares[k + 1] = squares[k + 1].min(grown(k, squares[k], 1.0));
+            let most = grown(&here, squares[k], 1.0);
+            here = seen(k + 1);
+            let [a, b] = &here;
+            squares[k + 1] = a.most.min(b.most).min(most);
         }
+        squares[count] = 0.0;
         for k in (0..count).rev() {
-            squares[k] = squares[k].min(grown(k + 1, squares[k + 1], -1.0));
+            squares[k] = squares[k].min(grown(&seen(k + 1), squares[k + 1], -1.0));
         }
-        let mut time = vec![0.0];
+        let mut time = Vec::with_capacity(count + 1);
+        time.push(0.0);
         for pair in squares.windows(2) {
             let rate = 0.5 * (pair[0].sqrt() + pair[1].sqrt());
             time.push(time[time.len() - 1] + step / rate.max(1e-12));
         }
-        Self { at, time }
+        Self { step, time }
     }
 
     /// The whole time, s.
@@ -113,6 +116,6 @@ impl Profile {
         let next = self.time.partition_point(|t| *t <= time).clamp(1, last);
         let [from, to] = [self.time[next - 1], self.time[next]];
         let share = ((time - from) / (to - from).max(1e-300)).clamp(0.0, 1.0);
-        self.at[next - 1] + share * (self.at[next] - self.at[next - 1])
+        (next as f64 - 1.0 + share) * self.step
     }
 }

@@ -65,22 +65,25 @@ impl TimeParameter {
 
     /// The new parameters of ascending old ones.
     pub(super) fn map(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut moved = parameters.to_vec();
+        self.change(&mut moved);
+        moved
+    }
+
+    /// Puts the new parameters in the place of ascending old ones.
+    pub(super) fn change(&self, parameters: &mut [f64]) {
         let last = self.from.len() - 1;
         let mut k = 0;
-        let mut moved: Vec<f64> = parameters
-            .iter()
-            .map(|u| {
-                while k + 1 < last && self.from[k + 1] < *u {
-                    k += 1;
-                }
-                let share = (u - self.from[k]) / (self.from[k + 1] - self.from[k]).max(1e-300);
-                self.to[k] + share.clamp(0.0, 1.0) * (self.to[k + 1] - self.to[k])
-            })
-            .collect();
-        if let Some(end) = moved.last_mut() {
+        for u in &mut *parameters {
+            while k + 1 < last && self.from[k + 1] < *u {
+                k += 1;
+            }
+            let share = (*u - self.from[k]) / (self.from[k + 1] - self.from[k]).max(1e-300);
+            *u = self.to[k] + share.clamp(0.0, 1.0) * (self.to[k + 1] - self.to[k]);
+        }
+        if let Some(end) = parameters.last_mut() {
             *end = self.to[last];
         }
-        moved
     }
 }
 

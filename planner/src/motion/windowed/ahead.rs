@@ -1,0 +1,94 @@
+//! The part of the way that is being timed: the joints along it, and those a window further on.
+
+use trajectory::HermitePath;
+use trajectory::smooth::FittedCurve;
+
+use super::super::Planner;
+use super::joints::{JointsAlong, Stretch};
+use crate::task::Move;
+
+/// Most points of the joint path in a window.
+const MOST_POINTS: usize = 1500;
+
+/// A checked way, with the joints along the part of it that is being timed.
+#[derive(Clone, Debug)]
+pub(super) struct Ahead<const N: usize> {
+    pub curve: FittedCurve,
+    joints: JointsAlong<N>,
+    /// The points that were followed again, those before the window at the front.
+    open: Stretch<N>,
+    /// The stretch that comes after them.
+    next: usize,
+}
+
+impl<const N: usize> Ahead<N> {
+    pub(super) fn new(curve: FittedCurve, joints: JointsAlong<N>) -> Self {
+        Self {
+            curve,
+            joints,
+            open: Stretch::default(),
+            next: 0,
+        }
+    }
+
+    /// Last parameter.
+    pub(super) fn last(&self) -> f64 {
+        self.joints.end().0
+    }
+
+    /// Frees the joints before a parameter.
+    fn forget(&mut self, u: f64) {
+        let passed = self.open.points.partition_point(|(at, _)| *at <= u);
+        let before = passed.saturating_sub(1);
+        self.open.points.drain(..before);
+        self.open.least.drain(..before);
+    }
+
+    /// The parameter at which a window from `from` ends that takes at least this time at full speed (s);
+    /// `None` where more of the way has to be followed first.
+    fn horizon(&self, from: f64, time: f64) -> Option<f64> {
+        let Stretch { points, least } = &self.open;
+        let (end, whole) = self.joints.end();
+        let now = points.partition_point(|(u, _)| *u <= from).checked_sub(1)?;
+        let after = least.partition_point(|at| *at < least[now] + time);
+        let far = after.min(now + MOST_POINTS).max(now + 2);
+        match points.get(far) {
+            // A short rest of the way joins this window.
+            Some((u, _)) if whole - least[far] > 0.5 * time => Some(*u),
+            Some(_) => Some(end),
+            None => (self.next == self.joints.count()).then_some(end),
+        }
+    }
+
+    /// The joint path of the points that are open.
+    pub(super) fn path(&self) -> Option<HermitePath<N, &FittedCurve>> {
+        HermitePath::new(self.open.points.clone(), &self.curve)
+    }
+}
+
+impl<const N: usize> Planner<N> {
+    /// Follows the way again so far that a window from `from` can take this time at full speed (s); the
+    /// parameter at which it ends. `None` where the way cannot be followed.
+    pub(super) fn look_ahead(
+        &self,
+        ahead: &mut Ahead<N>,
+        motion: &Move,
+        (from, time): (f64, f64),
+    ) -> Option<f64> {
+        loop {
+            let to = ahead.horizon(from, time);
+            let reached = ahead.open.points.last().map_or(-1.0, |(u, _)| *u);
+            if let Some(to) = to.filter(|to| *to <= reached) {
+                return Some(to);
+            }
+            let stretch = self.stretch(&ahead.curve, &ahead.joints, ahead.next, motion)?;
+            ahead.next += 1;
+            // The first point of a stretch is the last of the one before it.
+            ahead.open.points.pop();
+            ahead.open.least.pop();
+            ahead.open.points.extend(stretch.points);
+            ahead.open.least.extend(stretch.least);
+            ahead.forget(from);
+        }
+    }
+}
