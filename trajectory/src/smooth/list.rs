@@ -236,7 +236,8 @@ impl<'a> List<'a> {
     /// been planned within less, within less, and from either end.
     fn without_rests(&self, form: &NormalForm, mut found: Found) -> Found {
         for (share, turned) in UNRESTED {
-            if found.plan.rests().is_empty() || self.options.is_rough() {
+            let left = found.plan.rests().len();
+            if left == 0 || left > FEW_RESTS || self.poses.len() <= FEW || self.options.is_rough() {
                 break;
             }
             let backwards = found.backwards != turned;
@@ -393,6 +394,9 @@ const WORSE: f64 = 1.05;
 
 /// Most searches from a motion, each from the one that the search before ended with.
 const ROUNDS: usize = 3;
+
+/// Most rests that are bridged once more: each costs up to a second.
+const FEW_RESTS: usize = 3;
 
 /// Shares of the tolerance within which rests that are left are bridged once more, and whether from the other end.
 const UNRESTED: [(f64, bool); 6] = [
