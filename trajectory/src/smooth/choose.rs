@@ -242,15 +242,8 @@ impl Attempts<'_> {
                 coupled: false,
                 known: self.known,
             };
-            request.coupled = self.coupled.unwrap_or(!request.can_follow());
             let turns = request.moves()[1];
-            if turns && request.coupled && !self.dear {
-                // Where legs are shorter than the tolerance orientations may follow, too.
-                if self.coupled.is_some() || !request.may_follow() {
-                    return None;
-                }
-                request.coupled = false;
-            }
+            request.coupled = self.couples(&request, turns)?;
             let Some(mut spans) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
                 retried = true;
@@ -278,7 +271,7 @@ impl Attempts<'_> {
             if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
                 return None;
             }
-            let couple = (attempt == 1 || over > 1.3) && turns;
+            let couple = ((attempt == 1 && self.dear) || over > 1.3) && turns;
             self.coupled = Some(request.coupled || couple);
             if couple && !request.coupled {
                 // What an orientation exceeds that follows the path says nothing about the optimum.
@@ -289,6 +282,16 @@ impl Attempts<'_> {
             self.narrow((&certificate, &crossings), request.coupled, settled)?;
         }
         None
+    }
+
+    /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are
+    /// shorter than the tolerance it need not be.
+    fn couples(&self, request: &Request<'_>, turns: bool) -> Option<bool> {
+        let coupled = self.coupled.unwrap_or(!request.can_follow());
+        if !turns || !coupled || self.dear {
+            return Some(coupled);
+        }
+        (self.coupled.is_none() && request.may_follow()).then_some(false)
     }
 
     /// Keeps the spans of a motion from rest that misses poses by the angle only, turned to them, if no faster ones are kept.
