@@ -1,11 +1,11 @@
 //! Bounds of every limited quantity over a motion in pieces.
 
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector3};
 use realtime::Piece;
 
 use super::bound::{Precision, bound};
 use super::grid::Bounded;
-use super::gridpoints::{Gridpoints, SeenTool, ToolGridpoint};
+use super::gridpoints::ToolGridpoint;
 use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
@@ -35,12 +35,8 @@ pub(super) struct Audit {
 }
 
 impl Audit {
-    /// Bounds every limit over every piece of a law over the grid of `gridpoints`.
-    pub(super) fn new<const N: usize>(
-        bounded: Bounded<'_, N>,
-        pieces: &Pieces<N>,
-        gridpoints: &Gridpoints<'_, N>,
-    ) -> Self {
+    /// Bounds every limit over every piece.
+    pub(super) fn new<const N: usize>(bounded: Bounded<'_, N>, pieces: &Pieces<N>) -> Self {
         let joint = [
             bounded.joint.velocity,
             bounded.joint.acceleration,
@@ -63,12 +59,11 @@ impl Audit {
             JointBounds::new([SVector::repeat(cap), free, free])
         });
         let mut seen = Seen::at(bounded.path, 0.0);
-        for (i, (piece, law)) in pieces.joint.iter().zip(&pieces.law).enumerate() {
+        for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
             let row = audit.ratios.len();
             joint.push(piece, &mut audit.ratios);
             raise_near_ends(piece, bounded.joint, &mut audit.ratios[row..]);
             if bounded.tool.limited() {
-                seen.next = gridpoints.seen(pieces.cell[i]);
                 audit.push_tool(bounded.path, law, (&tool, &mut seen));
             }
             if let Some(rate) = &rate {
@@ -84,23 +79,21 @@ impl Audit {
         &mut self,
         path: &dyn Path<N>,
         law: &Piece<1>,
-        (tool, seen): (&[Option<(Limit, f64)>; 6], &mut Seen<'_>),
+        (tool, seen): (&[Option<(Limit, f64)>; 6], &mut Seen),
     ) {
-        let time = |part: usize| law.duration * part as f64 / (TOOL_SAMPLES - 1) as f64;
-        let first = tool_norms(path, law, time(0), Some(seen));
-        let middle = tool_norms(path, law, time(2), None);
-        let last = tool_norms(path, law, time(TOOL_SAMPLES - 1), Some(seen));
-        let mut raised = Raised::new(tool, &[first, middle, last]);
-        // Where a limit may be near, more places say more.
-        if raised.most > FLOOR {
-            let second = tool_norms(path, law, time(1), None);
-            let fourth = tool_norms(path, law, time(3), None);
-            raised = Raised::new(tool, &[first, second, middle, fourth, last]);
+        let mut samples = [[0.0; 6]; TOOL_SAMPLES];
+        for (i, sample) in samples.iter_mut().enumerate() {
+            let t = law.duration * i as f64 / (TOOL_SAMPLES - 1) as f64;
+            *sample = tool_norms(path, law, t, seen);
         }
-        self.tool_margin = self.tool_margin.max(raised.margin);
-        for (ratio, entry) in raised.ratios.iter().zip(tool) {
-            if entry.is_some() {
-                self.ratios.push(*ratio);
+        for (column, entry) in tool.iter().enumerate() {
+            if let Some((_, limit)) = entry {
+                let values = samples.map(|sample| sample[column] / limit);
+                let most = values.iter().fold(0.0_f64, |most, x| most.max(*x));
+                let bend = values.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());
+                let margin = 0.125 * bend.fold(0.0, f64::max);
+                self.tool_margin = self.tool_margin.max(margin);
+                self.ratios.push(most + margin);
             }
         }
     }
@@ -277,84 +270,26 @@ impl<const N: usize> JointBounds<N> {
     }
 }
 
-/// Ratios of the tool over a piece.
-struct Raised {
-    /// Of each limit, 0 where it is infinite: the highest sample, raised by what may lie between.
-    ratios: [f64; 6],
-    /// The largest of them.
-    most: f64,
-    /// What a sample was raised by, at most.
-    margin: f64,
-}
-
-impl Raised {
-    /// From samples at equal steps.
-    fn new<const M: usize>(tool: &[Option<(Limit, f64)>; 6], samples: &[[f64; 6]; M]) -> Self {
-        let mut raised = Self {
-            ratios: [0.0; 6],
-            most: 0.0,
-            margin: 0.0,
-        };
-        for (column, entry) in tool.iter().enumerate() {
-            let Some((_, limit)) = entry else { continue };
-            let mut values = [0.0; M];
-            for (value, sample) in values.iter_mut().zip(samples) {
-                *value = sample[column] / limit;
-            }
-            let (mut most, mut bend) = (0.0_f64, 0.0_f64);
-            for value in values {
-                most = most.max(value);
-            }
-            for i in 1..M - 1 {
-                bend = bend.max((values[i - 1] - 2.0 * values[i] + values[i + 1]).abs());
-            }
-            let margin = 0.125 * bend;
-            raised.ratios[column] = most + margin;
-            raised.most = raised.most.max(most + margin);
-            raised.margin = raised.margin.max(margin);
-        }
-        raised
-    }
-}
-
 /// The tool at the place of the path that was looked at last: a piece starts where the one before it
-/// ends; and at places of which one may be its end.
-struct Seen<'a> {
+/// ends.
+struct Seen {
     u: f64,
     tool: ToolPoint,
-    next: [Option<SeenTool<'a>>; 2],
 }
 
-impl Seen<'_> {
+impl Seen {
     fn at<const N: usize>(path: &dyn Path<N>, u: f64) -> Self {
-        Self {
-            u,
-            tool: path.tool_at(u),
-            next: [None; 2],
-        }
-    }
-
-    /// Goes to `u`.
-    fn go<const N: usize>(&mut self, path: &dyn Path<N>, u: f64) {
-        let end = path.end();
-        // NaN is looked at again.
-        let same = |other: f64| (u - other).abs() <= SAME * end;
-        if same(self.u) {
-            return;
-        }
-        let known = self.next.iter().flatten().find(|(other, _)| same(*other));
-        self.tool = known.map_or_else(|| path.tool_at(u), |(_, tool)| **tool);
-        self.u = u;
+        let tool = path.tool_at(u);
+        Self { u, tool }
     }
 }
 
-/// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law; `seen` for
-/// the ends of pieces.
+/// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
 fn tool_norms<const N: usize>(
     path: &dyn Path<N>,
     law: &Piece<1>,
     t: f64,
-    seen: Option<&mut Seen<'_>>,
+    seen: &mut Seen,
 ) -> [f64; 6] {
     let at = law.sample(t);
     let reparametrization = [
@@ -363,24 +298,17 @@ fn tool_norms<const N: usize>(
         at.acceleration[0],
         at.jerk[0],
     ];
-    let u = at.position[0].clamp(0.0, path.end());
-    let local = match seen {
-        Some(seen) => {
-            seen.go(path, u);
-            ToolGridpoint::new(&seen.tool, reparametrization)
-        }
-        None => ToolGridpoint::new(&path.tool_at(u), reparametrization),
-    };
-    let [l1, l2, l3] = &local.linear;
-    let [a1, a2, a3] = &local.angular;
-    [
-        l1.norm(),
-        l2.norm(),
-        l3.norm(),
-        a1.norm(),
-        a2.norm(),
-        a3.norm(),
-    ]
+    let (u, end) = (at.position[0].clamp(0.0, path.end()), path.end());
+    // NaN is looked at again.
+    let same = (u - seen.u).abs() <= SAME * end;
+    if !same {
+        *seen = Seen::at(path, u);
+    }
+    let local = ToolGridpoint::new(&seen.tool, reparametrization);
+    let norm = |v: Vector3<f64>| v.norm();
+    let [l1, l2, l3] = local.linear.map(norm);
+    let [a1, a2, a3] = local.angular.map(norm);
+    [l1, l2, l3, a1, a2, a3]
 }
 
 /// Places that are nearer to each other than this fraction of the path are the same.

@@ -29,9 +29,6 @@ pub(super) struct ToolGridpoint {
 /// Joints and tool at one place.
 pub(super) type Place<const N: usize> = (Gridpoint<N>, ToolGridpoint);
 
-/// The tool at a place of the path, by the path parameter.
-pub(super) type SeenTool<'a> = (f64, &'a ToolPoint);
-
 /// The path at all nodes and middles of a grid.
 #[derive(Clone, Debug)]
 pub(super) struct Gridpoints<'a, const N: usize> {
@@ -41,8 +38,6 @@ pub(super) struct Gridpoints<'a, const N: usize> {
     joints: Vec<[Gridpoint<N>; 2]>,
     /// The tool there; nowhere if nothing limits it.
     tools: Vec<[ToolGridpoint; 2]>,
-    /// The same over the path parameter.
-    seen: Vec<[ToolPoint; 2]>,
     /// Nodes on knots as seen from before, and the last.
     before: Vec<Place<N>>,
     /// For each cell whose right end is such a node, its index.
@@ -92,25 +87,19 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
             grid,
             joints: Vec::with_capacity(count),
             tools: Vec::with_capacity(if limited { count } else { 0 }),
-            seen: Vec::with_capacity(if limited { count } else { 0 }),
             before: Vec::new(),
             ends: Vec::with_capacity(count),
         };
         for k in 0..count {
             // The same place from both sides has the same values; only jerks differ.
             let side = if grid.knot[k] { 1.0 } else { 0.0 };
-            let (left, left_tool) = grid.look(path, nodes[k], side);
+            let left = grid.place(path, nodes[k], side);
             let middle = nodes[k] + 0.5 * (nodes[k + 1] - nodes[k]);
-            let (middle, middle_tool) = grid.look(path, middle, 0.0);
+            let middle = grid.place(path, middle, 0.0);
+            gridpoints.joints.push([left.0, middle.0]);
             if limited {
-                let tools = [
-                    ToolGridpoint::new(&left_tool, left.reparametrization),
-                    ToolGridpoint::new(&middle_tool, middle.reparametrization),
-                ];
-                gridpoints.tools.push(tools);
-                gridpoints.seen.push([left_tool, middle_tool]);
+                gridpoints.tools.push([left.1, middle.1]);
             }
-            gridpoints.joints.push([left, middle]);
             let end = grid.knot[k + 1].then_some(gridpoints.before.len());
             if end.is_some() {
                 gridpoints.before.push(grid.place(path, nodes[k + 1], -1.0));
@@ -138,20 +127,6 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
         }
     }
 
-    /// Where the tool was looked at in cell `k`: its middle, and its right end unless there is a knot.
-    pub(super) fn seen(&self, k: usize) -> [Option<SeenTool<'_>>; 2] {
-        let at = |k: usize, i: usize| {
-            let tool = self.seen.get(k).map(|tools| &tools[i])?;
-            Some((self.joints[k][i].reparametrization[0], tool))
-        };
-        let end = if self.ends[k].is_none() {
-            at(k + 1, 0)
-        } else {
-            None
-        };
-        [at(k, 1), end]
-    }
-
     /// The tool at the left end and in the middle of cell `k`.
     pub(super) fn tools(&self, k: usize) -> [ToolGridpoint; 2] {
         let tools = self.tools.get(k).copied();
@@ -170,18 +145,6 @@ impl<'a, const N: usize> Gridpoints<'a, N> {
 impl Grid {
     /// The path at `w`; its third derivatives from the given side: -1 before, 0 at, 1 after.
     pub(super) fn place<const N: usize>(&self, path: &dyn Path<N>, w: f64, side: f64) -> Place<N> {
-        let (gridpoint, tool) = self.look(path, w, side);
-        let tool = ToolGridpoint::new(&tool, gridpoint.reparametrization);
-        (gridpoint, tool)
-    }
-
-    /// The same with the derivatives of the tool to the path parameter.
-    fn look<const N: usize>(
-        &self,
-        path: &dyn Path<N>,
-        w: f64,
-        side: f64,
-    ) -> (Gridpoint<N>, ToolPoint) {
         let reparametrization = self.reparametrization.at(w);
         let end = path.end();
         let mut point: PathPoint<N> = path.at(reparametrization[0].clamp(0.0, end));
@@ -197,6 +160,9 @@ impl Grid {
             joint: chain([q1, q2, q3], reparametrization),
             reparametrization,
         };
-        (gridpoint, point.tool)
+        (
+            gridpoint,
+            ToolGridpoint::new(&point.tool, reparametrization),
+        )
     }
 }

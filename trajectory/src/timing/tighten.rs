@@ -33,7 +33,7 @@ impl<const N: usize> Draft<N> {
         interior: &Interior,
     ) -> Self {
         let pieces = Maker::new(bounded, gridpoints).make(problem, &interior.x);
-        let audit = Audit::new(bounded, &pieces, gridpoints);
+        let audit = Audit::new(bounded, &pieces);
         let total: f64 = pieces.joint.iter().map(|piece| piece.duration).sum();
         let duration = total * audit.stretch;
         Self {
