@@ -287,8 +287,7 @@ impl<'a> List<'a> {
     /// tolerance: a search ends within 0.1 % of the optimum, which more tolerance may not cost.
     fn by_spline(&self, form: &NormalForm) -> Option<Found> {
         let found = self.by_windows(form, &form.options)?;
-        let costly = self.is_costly(&found.plan) || found.plan.parts.len() > 1;
-        if costly || self.poses.len() <= SHORT || found.plan.method() != Method::Spline {
+        if !self.is_planned_again(&found.plan) {
             return Some(found);
         }
         let before = found.before;
@@ -301,6 +300,13 @@ impl<'a> List<'a> {
             best.before = before;
         }
         Some(best)
+    }
+
+    /// Whether a motion by splines is planned once more within half of the tolerance: where that is cheap, and no rough
+    /// curve is wanted.
+    fn is_planned_again(&self, plan: &SmoothPlan) -> bool {
+        let cheap = !self.is_costly(plan) && plan.parts.len() <= 1 && self.poses.len() > SHORT;
+        cheap && !self.options.is_rough() && plan.method() == Method::Spline
     }
 
     /// Whether another spline takes long: poses are far apart.

@@ -192,3 +192,21 @@ fn a_turn_on_the_spot_at_the_end() {
     let twice: Vec<_> = way.iter().flat_map(|pose| [*pose; 2]).collect();
     check(&twice, 5e-4);
 }
+
+/// A rough curve is one of many that a move may try: it is planned once, where another one as cheap is planned again
+/// within half of the tolerance.
+#[test]
+fn a_rough_curve_is_planned_once() {
+    let poses = circle(0.05, 24);
+    let usual = SmoothOptions::new(1e-3, limits()).finite();
+    for (gap, again) in [(usual.gap, true), (1.0, false)] {
+        let options = SmoothOptions {
+            gap,
+            ..usual.clone()
+        };
+        let list = List::new(&poses, &poses, &options);
+        let form = NormalForm::new(&poses, &options).unwrap();
+        let found = list.by_windows(&form, &form.options).unwrap();
+        assert_eq!(list.is_planned_again(&found.plan), again, "gap {gap}");
+    }
+}

@@ -20,10 +20,11 @@ impl Coordinates {
         let last = control.last().copied().unwrap_or([0.0; D]);
         let mut values = vec![0.0; D * length];
         for (d, values) in values.chunks_exact_mut(length).enumerate() {
-            let all = control.iter().chain(std::iter::repeat(&last));
-            for (value, control) in values.iter_mut().zip(all) {
+            let (own, more) = values.split_at_mut(control.len());
+            for (value, control) in own.iter_mut().zip(control) {
                 *value = control[d];
             }
+            more.fill(last[d]);
         }
         Self { values, length }
     }

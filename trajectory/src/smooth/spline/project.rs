@@ -1,7 +1,6 @@
 //! Passing times: the closest approach to each ball, in order. Also how much an iterate exceeds its
 //! bounds.
 
-use super::basis::{FIRST, SECOND, THIRD};
 use super::problem::{Point, Problem, Room, part, square};
 
 /// Iterates are held this far inside the widened bounds.
@@ -185,6 +184,11 @@ pub(crate) fn ratios<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> 
     [0, 1].map(|g| [0, 1, 2].map(|k| all[g][k][0].max(all[g][k][1])))
 }
 
+/// The difference of two vectors.
+fn less(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
 /// Control points that the start fixes.
 const PINNED: usize = 4;
 
@@ -200,14 +204,19 @@ fn ratios_of<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> [[[f64; 
             let slot = &mut worst[order - 1][usize::from(!fixed)];
             *slot = slot.max(value);
         };
-        for k in 0..count - 1 {
-            raise(1, k, square(&point.sum(k, &FIRST, g)));
-            if k + 2 < count {
-                raise(2, k, square(&point.sum(k, &SECOND, g)));
+        // The differences before the next one.
+        let (mut slope, mut bend) = ([0.0; 3], [0.0; 3]);
+        for (k, pair) in point.control.windows(2).enumerate() {
+            let step = less(&part(&pair[1], g), &part(&pair[0], g));
+            let turn = less(&step, &slope);
+            raise(1, k, square(&step));
+            if k > 0 {
+                raise(2, k - 1, square(&turn));
             }
-            if k + 3 < count {
-                raise(3, k, square(&point.sum(k, &THIRD, g)));
+            if k > 1 {
+                raise(3, k - 2, square(&less(&turn, &bend)));
             }
+            (slope, bend) = (step, turn);
         }
         for (k, both) in worst.iter_mut().enumerate() {
             let bound = problem.groups[g].caps[k] * h.powi(k as i32 + 1);
