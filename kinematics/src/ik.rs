@@ -32,9 +32,11 @@ use numeric::{Descent, SolverResult, Stop};
 
 /// Restarts before a goal is reported as not reached.
 const RESTARTS: u32 = 1500;
-/// The same for six joints with an exact closed form, which has found nothing: the search finds what
-/// stands in the way.
+/// The same for an exact closed form that has found nothing: the search finds what stands in the way.
 const EXPLAINING: u32 = 100;
+/// How many values of the free parameter of seven joints are tried, the finer grid where the first finds
+/// nothing.
+const SWEEPS: [u32; 2] = [360, 1440];
 /// Restarts after which the search ends if the position alone is out of reach.
 const PATIENCE: u32 = 40;
 /// Restarts of the search for all solutions.
@@ -161,12 +163,18 @@ impl<const N: usize> Solver<N> {
                     }
                 }
             }
-            if let Some(solution) = self.sweep(closed, pose, seed) {
-                return Ok(solution);
+            let grids = if closed.exact() {
+                &SWEEPS[..]
+            } else {
+                &SWEEPS[..1]
+            };
+            for values in grids {
+                if let Some(solution) = self.sweep(closed, pose, seed, *values) {
+                    return Ok(solution);
+                }
             }
         }
-        let known = closed.exact() && !closed.is_redundant();
-        let restarts = if known { EXPLAINING } else { RESTARTS };
+        let restarts = if closed.exact() { EXPLAINING } else { RESTARTS };
         self.reach_within(&Goal::Pose(*pose), seed, restarts)
     }
 

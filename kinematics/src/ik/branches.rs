@@ -7,9 +7,6 @@ use nalgebra::{Isometry3, SVector};
 use super::closed::{self, Branching, Closed, Raw};
 use super::{Branches, Solution, Solver, numeric, turns};
 
-/// Values of the free parameter that are tried before a closed form gives up.
-const SWEEP: u32 = 360;
-
 impl<const N: usize> Solver<N> {
     /// The free parameter (rad) at a fraction of its range.
     pub(super) fn parameter_at(&self, closed: &Closed, fraction: f64) -> f64 {
@@ -18,18 +15,19 @@ impl<const N: usize> Solver<N> {
         low + (high - low) * fraction
     }
 
-    /// The nearest solution over the whole range of the free parameter, on a fine grid: near the
-    /// edge of the reach only few values have a solution.
+    /// The nearest solution over the whole range of the free parameter, on a grid of so many values: near
+    /// the edge of the reach only few of them have a solution.
     #[cold]
     pub(super) fn sweep(
         &self,
         closed: &Closed,
         pose: &Isometry3<f64>,
         seed: &SVector<f64, N>,
+        values: u32,
     ) -> Option<Solution<N>> {
         let mut best: Option<(f64, Solution<N>)> = None;
-        for i in 0..SWEEP {
-            let parameter = self.parameter_at(closed, (f64::from(i) + 0.5) / f64::from(SWEEP));
+        for i in 0..values {
+            let parameter = self.parameter_at(closed, (f64::from(i) + 0.5) / f64::from(values));
             let Some(solution) = self.nearest_at(closed, pose, seed, parameter) else {
                 continue;
             };
