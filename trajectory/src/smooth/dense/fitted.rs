@@ -21,12 +21,12 @@ use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
 
 /// Radius of the balls of the fit, as a share of the tolerance, and the largest share that the check
 /// of the curve accepts: the rest is for what follows the curve.
-const AIM: f64 = 0.97;
+const AIM: f64 = 0.96;
 const KEPT: f64 = 0.98;
 /// Rounds of a fit that only says about how long the curve takes.
-const ROUGH: usize = 8;
+const ROUGH: usize = 14;
 /// Rounds of the fit over that time: more of them change it too little to be worth their time.
-const GOOD: usize = 11;
+const GOOD: usize = 14;
 /// Parts of a knot interval in which the distance from the legs is bounded.
 const PARTS: f64 = 8.0;
 
