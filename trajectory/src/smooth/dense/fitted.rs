@@ -281,12 +281,8 @@ fn off_legs<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> f64 {
 
 /// The parameter of each pose between the ends of a list, of which `list` has those that differ from
 /// the one before and more between them.
-fn passes(
-    poses: &[Isometry3<f64>],
-    list: &Cow<'_, [Isometry3<f64>]>,
-    mut parameters: Vec<f64>,
-) -> Vec<f64> {
-    if let Cow::Borrowed(_) = list {
+fn passes(poses: &[Isometry3<f64>], list: &[Isometry3<f64>], mut parameters: Vec<f64>) -> Vec<f64> {
+    if list == poses {
         parameters.remove(0);
         parameters.pop();
         return parameters;

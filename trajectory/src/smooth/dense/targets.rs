@@ -177,7 +177,7 @@ impl<const D: usize> Op for Miss<'_, D> {
                 };
                 let mut sum = F4::splat(simd, 0.0);
                 for i in 0..basis::ORDER {
-                    sum = sum + from(i);
+                    sum += from(i);
                 }
                 let own = |d: usize| target.point.get(first + d).copied().unwrap_or_default();
                 let off = sum - F4::new(simd, [own(0), own(1), own(2), own(3)]);

@@ -135,81 +135,194 @@ pub(crate) fn solve<const D: usize, const B: usize>(
     effort: Effort,
     aims: Option<Aims<'_, D>>,
 ) -> Option<usize> {
-    let pace = Pace::new(problem, effort);
     let mut system = System::<D, B>::new(point);
-    begin(problem, point, effort);
-    let mut room = Room::new(problem, point);
-    let parameter = problem.parameter(point);
-    let mut weight = parameter / (2.0 * point.z);
-    let (mut tight, mut since) = (room.tighten(problem, point), 0);
-    let mut slow = Slow::default();
-    let mut known = Known::nothing(&room);
-    let more = usize::from(problem.anchor.is_some()) * ANCHORED;
-    for count in 0..pace.steps + more {
-        since += 1;
-        if tight || since > PATIENCE {
-            tight = room.tighten(problem, point);
-            since = 0;
-        }
-        if tight && is_let_go(problem, point) {
-            known.seen = None;
-            if problem.finish.is_some() {
-                weight = parameter / (2.0 * point.z);
-            }
-        }
-        let done = tight && problem.anchor.is_none();
+    let mut iteration = Iteration::begin(problem, point, effort);
+    let more = usize::from(iteration.problem.anchor.is_some()) * ANCHORED;
+    let most = iteration.pace.steps + more;
+    for count in 0..most {
+        iteration.narrow();
         // An iterate that is inside goes on until it is as fast as its start.
-        if !tight && count >= effort.search {
+        if !iteration.bounds.tight && count >= effort.search {
             return None;
         }
-        let Some(step) = system.step(problem, point, &room, weight) else {
+        let done = iteration.is_done();
+        let room = &iteration.bounds.room;
+        let step = system.step(iteration.problem, iteration.point, room, iteration.weight);
+        let Some(step) = step else {
             return done.then_some(count);
         };
-        let barrier = &pace.barrier(problem, &room, weight);
-        let share = known.search(barrier, point, &step, pace.rounds);
-        let moved = share > 0.0;
-        if slow.is_new(tight && share < SHORT && step.decrement < pace.low) {
-            weight = weight.min(parameter / (2.0 * point.z));
-        }
-        let centred = step.decrement < if done { pace.centre } else { ROUGHLY };
+        let moved = iteration.take(&step);
+        let centre = if done { iteration.pace.centre } else { ROUGHLY };
+        let centred = step.decrement < centre;
         let looks = done && (!moved || centred || (count + 1).is_multiple_of(AIMING));
-        let missed = aim(problem, point, (&room, &mut known), aims.filter(|_| looks));
+        let missed = iteration.aim(aims.filter(|_| looks));
         if moved && !centred {
             continue;
         }
-        let least = (point.z - parameter / weight).max(0.0);
-        if done && point.spans() as f64 * problem.spacing(least) > effort.most {
+        if done && iteration.is_too_slow() {
             return None;
         }
-        if tight && parameter / weight <= effort.gap * point.z {
-            if moved && missed > AIMED {
-                continue;
-            }
-            if !done && effort.onward && is_held_by_ends(problem, point) {
-                weight = parameter / (2.0 * point.z);
-                known = Known::nothing(&room);
-                // Where it keeps the bounds as it is they need not be widened.
-                if pace
-                    .barrier(problem, &room, weight)
-                    .look(point, &[])
-                    .is_none()
-                {
-                    room = Room::new(problem, point);
-                    (tight, since) = (room.tighten(problem, point), 0);
-                }
+        if iteration.is_at_its_end() {
+            let turned = moved && missed > AIMED;
+            if turned || !done && iteration.goes_on_past_ends() {
                 continue;
             }
             return done.then_some(count);
         }
-        if tight {
-            weight = (weight * pace.growth).min(1.01 * parameter / (effort.gap * point.z));
-        } else if since == 0 && !moved {
-            return None; // Stuck.
-        } else if step.decrement < pace.near || !moved {
-            since = PATIENCE;
+        if !iteration.begin_next_centre(moved, step.decrement) {
+            return None;
         }
     }
-    (tight && problem.anchor.is_none()).then_some(pace.steps + more)
+    iteration.is_done().then_some(most)
+}
+
+/// An iterate on its way to the optimum.
+struct Iteration<'a, const D: usize> {
+    problem: &'a mut Problem<D>,
+    point: &'a mut Point<D>,
+    effort: Effort,
+    pace: Pace,
+    bounds: Bounds,
+    known: Known,
+    slow: Slow,
+    /// Parameter of the barrier.
+    parameter: f64,
+    /// Weight on `z`.
+    weight: f64,
+}
+
+impl<'a, const D: usize> Iteration<'a, D> {
+    fn begin(problem: &'a mut Problem<D>, point: &'a mut Point<D>, effort: Effort) -> Self {
+        let pace = Pace::new(problem, effort);
+        begin(problem, point, effort);
+        let bounds = Bounds::around(problem, point);
+        let parameter = problem.parameter(point);
+        Self {
+            weight: parameter / (2.0 * point.z),
+            known: Known::nothing(&bounds.room),
+            slow: Slow::default(),
+            problem,
+            point,
+            effort,
+            pace,
+            bounds,
+            parameter,
+        }
+    }
+
+    /// The weight with which an iterate begins.
+    fn first_weight(&self) -> f64 {
+        self.parameter / (2.0 * self.point.z)
+    }
+
+    /// Whether the iterate is a valid motion.
+    fn is_done(&self) -> bool {
+        self.bounds.tight && self.problem.anchor.is_none()
+    }
+
+    /// Narrows the bounds where it is time for that, and lets go an iterate that is as fast as its start.
+    fn narrow(&mut self) {
+        self.bounds.narrow(self.problem, self.point);
+        if self.bounds.tight && is_let_go(self.problem, self.point) {
+            self.known.seen = None;
+            if self.problem.finish.is_some() {
+                self.weight = self.first_weight();
+            }
+        }
+    }
+
+    /// Goes along a step as far as it helps; false where it does not.
+    fn take(&mut self, step: &Step) -> bool {
+        let barrier = &self
+            .pace
+            .barrier(self.problem, &self.bounds.room, self.weight);
+        let share = self
+            .known
+            .search(barrier, self.point, step, self.pace.rounds);
+        let short = self.bounds.tight && share < SHORT && step.decrement < self.pace.low;
+        if self.slow.is_new(short) {
+            self.weight = self.weight.min(self.first_weight());
+        }
+        share > 0.0
+    }
+
+    /// [`aim`].
+    fn aim(&mut self, aims: Option<Aims<'_, D>>) -> f64 {
+        let seen = (&self.bounds.room, &mut self.known);
+        aim(self.problem, self.point, seen, aims)
+    }
+
+    /// Whether the optimum is above the longest useful time.
+    fn is_too_slow(&self) -> bool {
+        let least = (self.point.z - self.parameter / self.weight).max(0.0);
+        self.point.spans() as f64 * self.problem.spacing(least) > self.effort.most
+    }
+
+    /// Whether the iterate is so near to its optimum as is wanted.
+    fn is_at_its_end(&self) -> bool {
+        self.bounds.tight && self.parameter / self.weight <= self.effort.gap * self.point.z
+    }
+
+    /// Lets go an iterate that only its ends hold, where that is wanted.
+    fn goes_on_past_ends(&mut self) -> bool {
+        if !self.effort.onward || !is_held_by_ends(self.problem, self.point) {
+            return false;
+        }
+        self.weight = self.first_weight();
+        self.known = Known::nothing(&self.bounds.room);
+        // Where it keeps the bounds as it is they need not be widened.
+        let barrier = self
+            .pace
+            .barrier(self.problem, &self.bounds.room, self.weight);
+        if barrier.look(self.point, &[]).is_none() {
+            self.bounds = Bounds::around(self.problem, self.point);
+        }
+        true
+    }
+
+    /// Raises the weight, or has widened bounds narrowed next; false where the iterate is stuck.
+    fn begin_next_centre(&mut self, moved: bool, decrement: f64) -> bool {
+        if self.bounds.tight {
+            let last = 1.01 * self.parameter / (self.effort.gap * self.point.z);
+            self.weight = (self.weight * self.pace.growth).min(last);
+        } else if self.bounds.since == 0 && !moved {
+            return false;
+        } else if decrement < self.pace.near || !moved {
+            self.bounds.since = PATIENCE;
+        }
+        true
+    }
+}
+
+/// The bounds of an iterate: widened to contain it, and narrowed as it moves inwards.
+struct Bounds {
+    room: Room,
+    /// Whether they are the true bounds.
+    tight: bool,
+    /// Steps since they were narrowed last.
+    since: usize,
+}
+
+impl Bounds {
+    /// The narrowest bounds that contain an iterate.
+    fn around<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Self {
+        let mut room = Room::new(problem, point);
+        let tight = room.tighten(problem, point);
+        Self {
+            room,
+            tight,
+            since: 0,
+        }
+    }
+
+    /// Narrows them where it is time for that.
+    fn narrow<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>) {
+        self.since += 1;
+        if self.tight || self.since > PATIENCE {
+            self.tight = self.room.tighten(problem, point);
+            self.since = 0;
+        }
+    }
 }
 
 /// Where the motion of an iterate sees the inner poses.
