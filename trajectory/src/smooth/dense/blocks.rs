@@ -9,7 +9,7 @@ use nalgebra::SVector;
 
 use super::basis::ORDER;
 use super::fit::{Fit, Orientation};
-use super::fitting::{Part, ROUNDS};
+use super::fitting::Part;
 
 /// Knot intervals of a block, at least, and those that it has beyond its ends.
 const BLOCK: usize = 400;
@@ -19,11 +19,10 @@ const BLEND: f64 = 6.0;
 
 impl<const D: usize> Fit<D> {
     /// The curve through balls of one radius around `points`, as that of [`Fit::new`]; `None` where some
-    /// ball cannot be kept. A block that cannot be fitted after so many rounds has as many as any other fit.
+    /// ball cannot be kept.
     pub(super) fn in_blocks(
         (points, parameters): (&[SVector<f64, D>], &[f64]),
         (radius, orientation): (f64, Orientation),
-        rounds: usize,
     ) -> Option<Self> {
         let spans = parameters.last()?.round().max(1.0) as usize;
         let count = (spans / BLOCK).max(1);
@@ -43,16 +42,9 @@ impl<const D: usize> Fit<D> {
             let part = Part {
                 spans: block.to - block.from,
                 ends: [block.from == 0, block.to == spans],
-                rounds,
             };
             let list = (&points[first..last], &own[..], &vec![radius; own.len()][..]);
-            let more = Part {
-                rounds: ROUNDS,
-                ..part
-            };
-            let fit = Self::of(part, list, orientation)
-                .or_else(|_| Self::of(more, list, orientation))
-                .ok()?;
+            let fit = Self::of(part, list, orientation).ok()?;
             for (j, c) in fit.control.iter().enumerate() {
                 // Control point j is in the middle of its spans at j - 2.
                 let j = block.from + j;
@@ -124,7 +116,7 @@ mod tests {
         let radii = vec![0.96; points.len()];
         let orientation = Orientation::Along;
         let list = (&points[..], &parameters[..]);
-        let blocks = Fit::in_blocks(list, (0.96, orientation), ROUNDS).unwrap();
+        let blocks = Fit::in_blocks(list, (0.96, orientation)).unwrap();
         let balls = Balls { radii, orientation };
         let one = Fit::new(&points, &parameters, &balls).unwrap();
         assert_eq!(blocks.spans(), one.spans());

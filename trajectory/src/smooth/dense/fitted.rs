@@ -8,7 +8,6 @@ use nalgebra::{Isometry3, SVector, Vector3};
 use super::chords::Chords;
 use super::curve::Curve;
 use super::fit::{Fit, Orientation};
-use super::fitting::ROUNDS;
 use super::places::Units;
 use super::profile::Profile;
 use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
@@ -23,10 +22,6 @@ use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
 /// of the curve accepts: the rest is for what follows the curve.
 const AIM: f64 = 0.96;
 const KEPT: f64 = 0.98;
-/// Rounds of a fit that only says about how long the curve takes.
-const ROUGH: usize = 14;
-/// Rounds of the fit over that time: more of them change it too little to be worth their time.
-const GOOD: usize = 14;
 /// Parts of a knot interval in which the distance from the legs is bounded.
 const PARTS: f64 = 8.0;
 
@@ -185,22 +180,18 @@ struct Laying<const D: usize> {
 }
 
 impl<const D: usize> Laying<D> {
-    /// A curve with so many times the knots: over the time that a rough one takes, or else that a good
-    /// one takes, or else that one.
+    /// A curve with so many times the knots: over the time that a first one takes, or else that one.
     fn laid(&self, density: f64, way: Orientation) -> Option<Laid<D>> {
-        let rough = self.along_chords(density, way, ROUGH);
-        if let Some(laid) = rough.and_then(|fit| self.over_time(fit, density, way)) {
-            return Some(laid);
-        }
-        let first = self.along_chords(density, way, ROUNDS)?;
-        let good = self.checked(first.clone())?;
-        self.over_time(first, density, way).or(Some(good))
+        let first = self.along_chords(density, way)?;
+        // The first one is not held beside the other: it is seldom wanted again.
+        self.over_time(first, density, way)
+            .or_else(|| self.checked(self.along_chords(density, way)?))
     }
 
     /// A fit over the chords.
-    fn along_chords(&self, density: f64, way: Orientation, rounds: usize) -> Option<Fit<D>> {
+    fn along_chords(&self, density: f64, way: Orientation) -> Option<Fit<D>> {
         let parameters = scaled(&self.parameters, density);
-        Fit::in_blocks((&self.points, &parameters), (AIM, way), rounds)
+        Fit::in_blocks((&self.points, &parameters), (AIM, way))
     }
 
     /// A curve over the time that another one takes bends less where it is fast.
@@ -213,7 +204,7 @@ impl<const D: usize> Laying<D> {
         let ramp = limits.acceleration / limits.jerk;
         TimeParameter::new(&curve, timed, ramp, density * FIT_KNOTS).change(&mut parameters);
         drop((curve, profile));
-        let fit = Fit::in_blocks((&self.points, &parameters), (AIM, way), GOOD)?;
+        let fit = Fit::in_blocks((&self.points, &parameters), (AIM, way))?;
         self.checked(fit)
     }
 

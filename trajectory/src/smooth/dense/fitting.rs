@@ -27,7 +27,7 @@ const FIRST: f64 = -7.0;
 /// Weight of both ends.
 const ENDS: f64 = 1e8;
 /// Rounds in which weights rise and fall, and rounds in which they only rise until all balls hold.
-pub(super) const ROUNDS: usize = 14;
+const ROUNDS: usize = 14;
 const MORE: usize = 40;
 /// Largest change of the logarithm of a weight in one round, down and up, and the power of the
 /// error by which it changes.
@@ -57,7 +57,6 @@ impl<const D: usize> Fit<D> {
         let part = Part {
             spans: end.round().max(1.0) as usize,
             ends: [true, true],
-            rounds: ROUNDS,
         };
         Self::of(part, (points, parameters, &balls.radii), balls.orientation)
     }
@@ -99,15 +98,13 @@ impl<const D: usize> Fit<D> {
     }
 }
 
-/// What is fitted of a list, and how well.
+/// What is fitted of a list.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     /// Knot intervals.
     pub(super) spans: usize,
     /// Whether it begins and ends with the list: then the curve meets that point exactly.
     pub(super) ends: [bool; 2],
-    /// Rounds in which weights rise and fall.
-    pub(super) rounds: usize,
 }
 
 /// A fit under way.
@@ -132,20 +129,19 @@ struct Fitting<const D: usize> {
 impl<const D: usize> Fitting<D> {
     /// Fits until every ball holds; else the target that is missed most.
     fn run(&mut self) -> Result<(), usize> {
-        let rounds = self.part.rounds;
         let mut missed = self.targets.len() / 2;
         self.look();
-        for round in 0..rounds + MORE {
+        for round in 0..ROUNDS + MORE {
             if !self.solve() {
                 return Err(missed);
             }
-            let again = round >= rounds && self.orientation == Orientation::AtPoses;
-            if (round % MOVED == MOVED - 1 && round < rounds) || again {
+            let again = round >= ROUNDS && self.orientation == Orientation::AtPoses;
+            if (round % MOVED == MOVED - 1 && round < ROUNDS) || again {
                 self.reproject();
                 self.look();
             }
-            let (worst, target) = self.reweigh(round < rounds);
-            if round >= rounds && worst <= 1.0 {
+            let (worst, target) = self.reweigh(round < ROUNDS);
+            if round >= ROUNDS && worst <= 1.0 {
                 self.meet_ends();
                 return Ok(());
             }
