@@ -19,6 +19,7 @@ mod choose;
 mod crossing;
 mod dense;
 mod exact_stop;
+mod fade;
 mod found;
 mod list;
 mod lower_bound;

@@ -4,8 +4,10 @@
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::crossing::RESOLUTION;
+use super::fade::Fade;
 use super::motion::Motion;
 use super::options::SmoothOptions;
+use super::span::Turn;
 use crate::line::body_turn;
 
 /// Coordinates are multiples of this, in units of the list, and so are the four numbers of an
@@ -37,8 +39,9 @@ pub(super) struct NormalForm {
     pub(super) backwards: bool,
     /// Unit of length, m.
     unit: f64,
-    /// From the goal of the form to the goal that was given, in its units.
-    missing: Vector3<f64>,
+    /// From the goal of the form to the goal that was given: the way in units of the form, and the turn as a rotation
+    /// vector (rad).
+    missing: [Vector3<f64>; 2],
 }
 
 impl NormalForm {
@@ -83,16 +86,7 @@ impl NormalForm {
             *pose = Isometry3::from_parts(place.into(), UnitQuaternion::new_normalize(turn));
         }
         let goal = if backwards { given[0] } else { given[last] };
-        let goal = frame.inv_mul(&goal).translation.vector / unit;
-        // A list that closes has the same place at both ends, but for rounding.
-        let mut missing = Vector3::zeros();
-        let mut end = Vector3::zeros();
-        if goal.norm() > ROUNDED {
-            let grid = finer(grid, NEAR * goal.norm());
-            end = goal.map(|x| on_grid(x, grid));
-            missing = goal - end;
-        }
-        poses[last].translation.vector = end;
+        let missing = round_goal(&mut poses, &frame.inv_mul(&goal), unit, [grid, turns]);
         Self {
             poses,
             options: in_units(options, unit, [2.0 * grid, 2.0 * turns]),
@@ -105,17 +99,10 @@ impl NormalForm {
 
     /// A motion through the form as one through the list that was given.
     pub(super) fn place(&self, mut motion: Motion) -> Motion {
-        let goal = self.poses[self.poses.len() - 1].translation.vector;
-        let square = goal.norm_squared();
-        // A map that moves the goal to where it was given, and nothing else by more.
-        let along = if square > 0.0 {
-            goal / square
-        } else {
-            Vector3::zeros()
-        };
+        self.meet_goal(&mut motion);
         for span in &mut motion.spans {
             for c in &mut span.point {
-                *c = (*c + self.missing * along.dot(c)) * self.unit;
+                *c *= self.unit;
             }
             span.place(&self.frame);
         }
@@ -125,6 +112,60 @@ impl NormalForm {
             motion
         }
     }
+
+    /// Moves the goal of a motion to where it was given, and nothing else by more.
+    fn meet_goal(&self, motion: &mut Motion) {
+        let [way, turn] = self.missing;
+        let goal = self.poses[self.poses.len() - 1].translation.vector;
+        let far = way.norm() <= NEAR * goal.norm();
+        let along = if far {
+            goal / goal.norm_squared().max(f64::MIN_POSITIVE)
+        } else {
+            Vector3::zeros()
+        };
+        let fade = Fade::over(motion.duration());
+        for span in &mut motion.spans {
+            let angle = fade.since(span.start);
+            for (c, share) in span.point.iter_mut().zip(angle) {
+                // A map in space leaves the motion at rest at its ends; one over time does but for rounding.
+                *c += way * if far { along.dot(c) } else { share };
+            }
+            if turn != Vector3::zeros() {
+                span.turns.push(Turn { axis: turn, angle });
+            }
+        }
+    }
+}
+
+/// Puts the goal of a form on a grid as fine as it needs; what it then misses of the `goal` that was given, in m and rad from
+/// the frame: the way in units of the form, and the turn as a rotation vector (rad).
+fn round_goal(
+    poses: &mut [Isometry3<f64>],
+    goal: &Isometry3<f64>,
+    unit: f64,
+    [grid, turns]: [f64; 2],
+) -> [Vector3<f64>; 2] {
+    let last = poses.len() - 1;
+    let place = goal.translation.vector / unit;
+    // A list that closes has the same place at both ends, but for rounding.
+    let far = place.norm() > ROUNDED;
+    let grid = finer(grid, NEAR * place.norm());
+    let end = if far {
+        place.map(|x| on_grid(x, grid))
+    } else {
+        Vector3::zeros()
+    };
+    let way = if far { place - end } else { Vector3::zeros() };
+    poses[last].translation.vector = end;
+    // A list that does not turn ends in the orientation of its start, but for what an arm is off there.
+    let identity = UnitQuaternion::identity();
+    let still = poses[..last].iter().all(|pose| pose.rotation == identity);
+    let turn = goal.rotation.scaled_axis();
+    let slight = still && turn.norm() <= turns;
+    if slight {
+        poses[last].rotation = identity;
+    }
+    [way, if slight { turn } else { Vector3::zeros() }]
 }
 
 /// The unit of length, m: the way in a second at the first of the limits that there is.

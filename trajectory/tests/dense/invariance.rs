@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use trajectory::ToolLimits;
 use trajectory::smooth::{SmoothOptions, angular_tolerance, plan};
 
@@ -152,6 +152,16 @@ fn noisy(list: &List, random: &mut Random) -> List {
     noisy
 }
 
+/// With the first pose off by as little as an arm is off where it rests: a list that closes is off at one end.
+fn off_at_its_start(list: &List, random: &mut Random) -> List {
+    let mut off = list.clone();
+    let size = 10.0_f64.powf(random.between(-14.0, -10.0));
+    let turn = UnitQuaternion::from_scaled_axis(random.vector(size));
+    off.poses[0].translation.vector += random.vector(size);
+    off.poses[0].rotation *= turn;
+    off
+}
+
 /// What may change of a time: any difference of a share, or only a longer one.
 #[derive(Clone, Copy, Debug)]
 enum Bound {
@@ -241,6 +251,20 @@ fn rigid_motion_changes_nothing() {
 #[test]
 fn reversal_changes_nothing() {
     assert_eq!(broken(all(), reversed, SAME), [""; 0]);
+}
+
+/// Before, a clover that closes took 2.55 in place of 1.51 s where its start was off by 1e-13 m, after 8 s of planning.
+#[test]
+fn a_start_that_is_off_changes_little() {
+    let turning = |list| List {
+        limits: lists::turning_limits(),
+        ..list
+    };
+    assert_eq!(
+        broken(dense().map(turning), off_at_its_start, SAME),
+        [""; 0]
+    );
+    assert_eq!(broken(all(), off_at_its_start, NOISY), [""; 0]);
 }
 
 #[test]

@@ -4,6 +4,8 @@ use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 
 use super::fit::Fit;
 use super::places::Units;
+use crate::smooth::fade::Fade;
+use crate::smooth::poly;
 use crate::{JointPoint, Path, PathPoint, ToolPoint};
 
 /// Knot intervals of the fit from one knot that the time law sees to the next.
@@ -17,6 +19,8 @@ pub(super) struct Curve<const D: usize> {
     units: Units,
     origin: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
+    /// Rotation vector (rad, axes of the start) by which a curve of places is turned from its start to its end.
+    turn: Vector3<f64>,
     knots: Vec<f64>,
 }
 
@@ -31,8 +35,28 @@ impl<const D: usize> Curve<D> {
             units,
             origin: start.translation.vector,
             rotation: start.rotation,
+            turn: Vector3::zeros(),
             knots,
         }
+    }
+
+    /// A curve of places that turns by so little that it changes nothing else: by a rotation vector (rad) in axes of
+    /// the start.
+    pub(super) fn turned(mut self, turn: Vector3<f64>) -> Self {
+        self.turn = turn;
+        self
+    }
+
+    /// Orientation of a curve of places, and its angular velocity to the parameter with two derivatives.
+    fn slight_turn(&self, u: f64) -> (UnitQuaternion<f64>, [Vector3<f64>; 3]) {
+        if self.turn == Vector3::zeros() {
+            return (self.rotation, [Vector3::zeros(); 3]);
+        }
+        let share = Fade::over(self.end()).since(0.0);
+        let [share, rate, rate2, rate3] = poly::quartic(&share, u);
+        let axis = self.rotation * self.turn;
+        let turned = self.rotation * UnitQuaternion::from_scaled_axis(self.turn * share);
+        (turned, [axis * rate, axis * rate2, axis * rate3])
     }
 
     /// Pose at a parameter.
@@ -42,7 +66,7 @@ impl<const D: usize> Curve<D> {
         let turn = if D > 3 {
             self.units.rotation(&point)
         } else {
-            self.rotation
+            self.slight_turn(at).0
         };
         Isometry3::from_parts(place.into(), turn)
     }
@@ -100,7 +124,7 @@ impl<const D: usize> Path<1> for Curve<D> {
         let (turn, angular) = if D > 3 {
             (self.units.rotation(&d[0]), self.angular(&d))
         } else {
-            (self.rotation, [Vector3::zeros(); 3])
+            self.slight_turn(u)
         };
         ToolPoint {
             pose: Isometry3::from_parts(place.into(), turn),

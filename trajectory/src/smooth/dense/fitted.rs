@@ -13,7 +13,7 @@ use super::profile::Profile;
 use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
 use super::time_parameter::TimeParameter;
 use super::{TURNING, are_dense, is_limited, moved};
-use crate::line::Line;
+use crate::line::{Line, body_turn};
 use crate::smooth::exact_stop;
 use crate::smooth::options::SmoothOptions;
 use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
@@ -22,6 +22,10 @@ use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
 /// of the curve accepts: the rest is for what follows the curve.
 const AIM: f64 = 0.96;
 const KEPT: f64 = 0.98;
+/// An angle (rad) by which an arm may be off where it rests, and the share of the angular tolerance that this may be: a list
+/// that turns by no more is fitted as one that does not turn.
+const OFF: f64 = 1e-9;
+const OFF_SHARE: f64 = 0.01;
 /// Parts of a knot interval in which the distance from the legs is bounded.
 const PARTS: f64 = 8.0;
 
@@ -78,14 +82,17 @@ impl FittedCurve {
             *list.last_mut()? = poses[poses.len() - 1];
         }
         let units = Units::new(options);
-        let (kind, parameters, corridor_ratio) = if list.windows(2).any(TURNING) {
+        let slight = slight_turn(&list, options);
+        let turning = slight.is_none() && list.windows(2).any(TURNING);
+        let (kind, parameters, corridor_ratio) = if turning {
             let mut laid = Laid::<7>::new(&list, units, &options.limits)?;
             let parameters = std::mem::take(&mut laid.curve.fit.parameters);
             (Kind::Turns(laid.curve), parameters, laid.far)
         } else {
             let mut laid = Laid::<3>::new(&list, units, &options.limits)?;
             let parameters = std::mem::take(&mut laid.curve.fit.parameters);
-            (Kind::Places(laid.curve), parameters, laid.far)
+            let curve = laid.curve.turned(slight.unwrap_or_default());
+            (Kind::Places(curve), parameters, laid.far)
         };
         Some(Self {
             kind,
@@ -268,6 +275,15 @@ fn off_legs<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> f64 {
         }
     }
     if most.is_nan() { f64::INFINITY } else { most }
+}
+
+/// The turn (rotation vector, rad, axes of the first pose) from the first pose to the last of a list in which no pose is
+/// turned from the first by more than an arm may be off there.
+fn slight_turn(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Vector3<f64>> {
+    let most = OFF.min(OFF_SHARE * options.angular_tolerance());
+    let turn = |pose: &Isometry3<f64>| body_turn(&poses[0].rotation, &pose.rotation);
+    let still = poses.iter().all(|pose| turn(pose).norm() <= most);
+    still.then(|| poses.last().map_or(Vector3::zeros(), turn))
 }
 
 /// The parameter of each pose between the ends of a list, of which `list` has those that differ from
