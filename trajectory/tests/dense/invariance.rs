@@ -7,9 +7,9 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use trajectory::ToolLimits;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use trajectory::smooth::{SmoothOptions, angular_tolerance, plan};
+use trajectory::{ToolCurve, ToolLimits};
 
 use crate::lists::{self, Random, suite};
 use crate::sparse;
@@ -265,6 +265,40 @@ fn a_start_that_is_off_changes_little() {
         [""; 0]
     );
     assert_eq!(broken(all(), off_at_its_start, NOISY), [""; 0]);
+}
+
+/// A list that closes, but for what its start is off, begins and ends where it was given, to the last digits.
+#[test]
+fn ends_that_are_off_are_met() {
+    let lists: Vec<_> = dense().filter(|list| list.name == "circle360").collect();
+    for size in [1e-14, 1e-13, 1e-11, 1e-9, 1e-7] {
+        let mut poses = lists[0].poses.clone();
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.5, 0.7, -0.5) * size);
+        poses[0].translation.vector += Vector3::new(-0.6, 0.8, 0.2) * size;
+        poses[0].rotation *= turn;
+        let plan = plan(&poses, &SmoothOptions::new(1e-4, lists::turning_limits())).unwrap();
+        assert!(plan.certificate().holds(), "{size}");
+        let ends = [
+            (0.0, poses[0]),
+            (plan.duration() * (1.0 - 1e-15), poses[poses.len() - 1]),
+        ];
+        for (time, pose) in ends {
+            let there = plan.at(time);
+            let off = (there.pose.translation.vector - pose.translation.vector).norm();
+            let turned = (there.pose.rotation.inverse() * pose.rotation)
+                .scaled_axis()
+                .norm();
+            assert!(
+                off < 1e-15 && turned < 1e-13,
+                "{size}: {off} m, {turned} rad"
+            );
+            let [velocity, acceleration, _] = there.linear;
+            assert!(
+                velocity.norm() < 1e-12 && acceleration.norm() < 1e-10,
+                "{size}: {there:?}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -308,3 +308,47 @@ fn passes(poses: &[Isometry3<f64>], list: &[Isometry3<f64>], mut parameters: Vec
     }
     passes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// A list that turns by no more than an arm is off at its start is fitted as one that does not turn, and its curve
+    /// meets both ends.
+    #[test]
+    fn a_start_that_is_off_is_met() {
+        let at = |i: i32| 0.002 * f64::from(i);
+        let mut poses: Vec<_> = (0..500)
+            .map(|i| Isometry3::translation(0.1 * at(i).cos(), 0.1 * at(i).sin(), 0.0))
+            .collect();
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 2.0,
+            angular_acceleration: 20.0,
+            angular_jerk: 400.0,
+        };
+        let options = SmoothOptions::new(1e-4, limits);
+        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::new(3e-10, 0.0, -1e-10));
+        let curve = FittedCurve::new(&poses, &options).unwrap();
+        assert!(matches!(curve.kind, Kind::Places(_)));
+        for (u, pose) in [(0.0, poses[0]), (curve.end(), poses[499])] {
+            let turned = (curve.at(u).pose.rotation.inverse() * pose.rotation).scaled_axis();
+            assert!(turned.norm() < 1e-15, "{turned}");
+        }
+        let (u, d) = (0.3 * curve.end(), 1e-3 * curve.end());
+        let [before, here, after] = [u - d, u, u + d].map(|u| curve.at(u));
+        let rate = (before.pose.rotation.inverse() * after.pose.rotation).scaled_axis() / (2.0 * d);
+        let off = (rate - here.angular[0]).norm();
+        assert!(
+            off < 1e-5 * here.angular[0].norm(),
+            "{rate} {}",
+            here.angular[0]
+        );
+        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * 1e-4);
+        let curve = FittedCurve::new(&poses, &options).unwrap();
+        assert!(matches!(curve.kind, Kind::Turns(_)));
+    }
+}
