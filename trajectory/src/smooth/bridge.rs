@@ -73,7 +73,8 @@ struct Bridges<'a> {
     rests: Vec<Rest>,
     /// Times of the passes, s.
     passes: Vec<f64>,
-    /// Whether a part was found only at a further attempt.
+    /// What is known of how it was found: see [`Motion`].
+    eased: bool,
     retried: bool,
     search: Search,
 }
@@ -100,6 +101,7 @@ pub(super) fn bridged(
             .flat_map(|(method, count)| std::iter::repeat_n(*method, *count))
             .collect(),
         spans,
+        eased: motion.eased,
         retried: motion.retried,
         search,
         rests: motion
@@ -367,7 +369,7 @@ impl Bridges<'_> {
             spans: self.spans,
             parts,
             rests: self.rests,
-            eased: true,
+            eased: self.eased,
             retried: self.retried,
         }
     }

@@ -117,7 +117,10 @@ impl<'a> List<'a> {
         let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
         let fitted = if dense { self.fitted(form) } else { None };
         let enough = fitted.as_ref().is_some_and(Found::suffices);
-        if enough && dense::suffices(&form.poses, &form.options) {
+        let alone = fitted
+            .as_ref()
+            .is_some_and(|fitted| self.is_fitted_alone(fitted));
+        if alone || enough && dense::suffices(&form.poses, &form.options) {
             return fitted;
         }
         let spline = self.by_spline(form);
@@ -144,6 +147,19 @@ impl<'a> List<'a> {
         self.poses.len() > windows::MOST_POSES
     }
 
+    /// Whether a motion is a fit that is compared with no splines: where these need three windows or more, they take seconds,
+    /// and are rarely faster than a fit as it should be that rests nowhere.
+    fn is_fitted_alone(&self, found: &Found) -> bool {
+        let fitted = found
+            .motion
+            .parts
+            .iter()
+            .any(|(method, _)| *method == Method::Fit);
+        let near = found.plan.duration() <= FITTED[1] * self.least;
+        let good = found.plan.rests().is_empty() && (near || !found.motion.eased);
+        self.poses.len() > 2 * windows::MOST_POSES && fitted && good
+    }
+
     /// Whether another search may find a faster motion.
     fn is_doubtful(&self, found: &Found) -> bool {
         let over = found.plan.duration() / self.least;
@@ -162,11 +178,15 @@ impl<'a> List<'a> {
     /// bound, of those within less of the tolerance.
     fn compared(&self, form: &NormalForm, first: Found) -> Option<Found> {
         let (hard, mut best) = (first.is_hard(), first);
-        if best.is_divided() {
+        if best.is_divided() && !self.is_fitted_alone(&best) {
             let turned = form.turned(self.poses, self.options);
             best = Found::faster(Some(best), self.by_windows(&turned, &turned.options))?;
         }
         best = self.refined(form, best);
+        // A long list that was divided at seams only is as fast within less.
+        if best.is_divided() && self.is_fitted_alone(&best) {
+            return Some(best);
+        }
         let far = best.plan.duration() > FAR * self.least;
         if hard || far || best.is_hard() || self.is_long() {
             let before = best.plan.duration();
@@ -184,7 +204,8 @@ impl<'a> List<'a> {
         let fit = self.may_be_fitted(form);
         let fitted = best.plan.method() == Method::Fit;
         let cheap = best.motion.retried || !self.is_costly(&best.plan);
-        let spline = best.is_divided() || (!fitted && cheap);
+        let alone = self.is_fitted_alone(&best);
+        let spline = !alone && (best.is_divided() || (!fitted && cheap));
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
@@ -271,7 +292,10 @@ impl<'a> List<'a> {
     /// slower than it might be.
     fn fitted(&self, form: &NormalForm) -> Option<Found> {
         let first = self.fit(form, &form.options);
-        if first.as_ref().is_some_and(Found::suffices) {
+        if first
+            .as_ref()
+            .is_some_and(|first| first.suffices() || self.is_fitted_alone(first))
+        {
             return first;
         }
         let turned = form.turned(self.poses, self.options);

@@ -9,6 +9,7 @@ mod random;
 mod sparse;
 
 use lists::suite;
+use nalgebra::Isometry3;
 use trajectory::smooth::{Method, SmoothOptions, plan};
 
 /// On each list of the suite the motion is certified, without a fallback, and about as fast as the
@@ -25,6 +26,21 @@ fn the_suite_is_as_fast_as_the_exact_curves() {
         assert!(ratio < 1.02, "{} {ratio}", case.name);
         assert!(plan.duration() >= plan.certificate().lower_bound);
     }
+}
+
+/// A long leg down to a dense curve and one up from it, at right angles: each corner is passed in motion, and takes little
+/// more time than the curve and the legs by themselves. One curve fitted through all took 2.65 s.
+#[test]
+fn a_corner_before_a_dense_curve_is_a_seam() {
+    let cases = suite();
+    let helix = cases.iter().find(|case| case.name == "helix1500").unwrap();
+    let above = |pose: &Isometry3<f64>| Isometry3::translation(0.0, 0.0, 0.05) * pose;
+    let ends = [&helix.poses[0], &helix.poses[1500]].map(above);
+    let list = [&ends[..1], &helix.poses, &ends[1..]].concat();
+    let options = SmoothOptions::new(helix.tolerance, lists::limits());
+    let plan = plan(&list, &options).unwrap();
+    assert!(plan.certificate().holds() && plan.rests().is_empty());
+    assert!(plan.duration() < 2.31, "{}", plan.duration());
 }
 
 /// A long straight, a dense bend, a long straight: faster than with a rest at both seams.

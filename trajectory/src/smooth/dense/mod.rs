@@ -25,7 +25,7 @@ mod time_parameter;
 
 use std::borrow::Cow;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 
 use super::crossing::RESOLUTION;
 use super::motion::Motion;
@@ -51,6 +51,9 @@ const PLACE: f64 = 0.1;
 const MOST_RAMPS: f64 = 4.0;
 /// Straight legs with so many poses on each, in the mean, are dense and not split.
 const SPLIT: usize = 4;
+/// Way (balls) over which a corner is seen between a long leg and dense poses, and the cosine of its turn at most.
+const SEEN: f64 = 8.0;
+const CORNER: f64 = 0.85;
 /// Dense lists up to this length are planned in both ways.
 const BOTH: usize = 64;
 
@@ -166,17 +169,53 @@ fn parts(turn: &Vector3<f64>) -> usize {
     (turn.norm() / TURN).ceil().max(1.0) as usize
 }
 
-/// The motion through all sections between places where the way turns back.
+/// The motion through all sections between places where the way turns back, and between seams.
 fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
     let units = Units::new(options);
     let points = units.points::<D>(poses);
     let turning = Chords::new(&points).turning_points(&points);
+    let seams = seams(poses, &points, options);
+    let mut ends: Vec<_> = turning.iter().chain(&seams).copied().collect();
+    ends.push(poses.len() - 1);
+    ends.sort_unstable();
+    ends.dedup();
     let mut motion = Motion::default();
     let mut from = 0;
-    for to in turning.into_iter().chain([poses.len() - 1]) {
+    for to in ends {
+        let cause = if seams.contains(&from) {
+            RestCause::Division
+        } else {
+            RestCause::TurnsBack
+        };
         let section = Section::<D>::new(&poses[from..=to], options, units);
-        motion.append(section.motion()?, RestCause::TurnsBack);
+        motion.append(section.motion()?, cause);
         from = to;
     }
     Some(motion)
+}
+
+/// Where a long leg and dense poses meet at a corner that the tolerance shows. One curve through both would bend far beyond
+/// the corner.
+fn seams<const D: usize>(
+    poses: &[Isometry3<f64>],
+    points: &[SVector<f64, D>],
+    options: &SmoothOptions,
+) -> Vec<usize> {
+    let long = |leg: usize| self::leg(&poses[leg..leg + 2], options) > LONGEST * LEG;
+    let place = |i: usize| Vector3::new(points[i][0], points[i][1], points[i][2]);
+    let is_seam = |i: &usize| {
+        let i = *i;
+        let [before, after] = [long(i - 1), long(i)];
+        if before == after {
+            return false;
+        }
+        let far = |k: &usize| (place(*k) - place(i)).norm() >= SEEN;
+        let back = (0..i).rev().find(far);
+        let on = (i + 1..poses.len()).find(far);
+        back.zip(on).is_some_and(|(back, on)| {
+            let (come, go) = (place(i) - place(back), place(on) - place(i));
+            come.normalize().dot(&go.normalize()) < CORNER
+        })
+    };
+    (1..poses.len() - 1).filter(is_seam).collect()
 }
