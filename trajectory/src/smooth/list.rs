@@ -16,7 +16,7 @@ use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::rest::RestCause;
 use super::windows::{self, Windows};
-use super::{bridge, dense, exact_stop, missed};
+use super::{bridge, dense, exact_stop, missed, retimed};
 
 /// Plans a motion from the first pose to the last that passes those between in
 /// order, each within tolerance: the fastest motion that is certified.
@@ -240,12 +240,24 @@ impl<'a> List<'a> {
         let dear = !(found.plan.method() == Method::Fit && found.suffices());
         for _ in 0..ROUNDS {
             let before = found.plan.duration();
-            let motion = windows::refined(&form.poses, &form.options, &found.motion, 1.0, dear);
+            let known = found.motion.clone();
+            let faster = retimed::motion(&known, &form.poses, &form.options, 1.0 - GAIN);
+            let sooner = faster.clone().and_then(|motion| self.certified(form, motion));
+            let start = faster.as_ref().unwrap_or(&known);
+            let motion = windows::refined(&form.poses, &form.options, start, before / start.duration(), dear);
+            let motion = motion.or_else(|| {
+                faster.as_ref()?;
+                windows::refined(&form.poses, &form.options, &known, 1.0, dear)
+            });
             let refined = motion.and_then(|motion| self.certified(form, motion));
-            let Some(refined) = refined.filter(|refined| refined.plan.duration() < before) else {
-                break;
-            };
-            found = refined;
+            if std::env::var("DBG").is_ok() {
+                eprintln!("REFINE known {before} retimed {:?} certified {:?} refined {:?}", faster.as_ref().map(Motion::duration), sooner.as_ref().map(|f| f.plan.duration()), refined.as_ref().map(|f| f.plan.duration()));
+            }
+            for other in [sooner, refined].into_iter().flatten() {
+                if other.plan.duration() < found.plan.duration() {
+                    found = other;
+                }
+            }
             if found.plan.duration() > GAIN * before {
                 break;
             }
@@ -423,7 +435,7 @@ const REPAIRS: usize = 3;
 const WORSE: f64 = 1.05;
 
 /// Most searches from a motion, each from the one that the search before ended with.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 8;
 
 /// Most rests that are bridged once more: each costs up to a second.
 const FEW_RESTS: usize = 3;

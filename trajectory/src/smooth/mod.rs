@@ -31,6 +31,7 @@ mod normal_form;
 mod options;
 mod overlap;
 mod plan;
+mod retimed;
 mod ramp;
 mod rest;
 mod span;

@@ -36,6 +36,7 @@ use chords::Chords;
 pub use fitted::FittedCurve;
 use places::Units;
 use section::Section;
+pub(super) use spans::spans_along;
 
 /// Longest turn from one pose to the next that a straight line of quaternions stands for, rad.
 const TURN: f64 = 0.1;
@@ -81,7 +82,7 @@ const TURNING: fn(&[Isometry3<f64>]) -> bool =
     |pair| body_turn(&pair[0].rotation, &pair[1].rotation).norm() > RESOLUTION;
 
 /// Whether a time law has limits, and a fit some room.
-fn is_limited(options: &SmoothOptions) -> bool {
+pub(super) fn is_limited(options: &SmoothOptions) -> bool {
     let limits = &options.limits;
     let limited = limits.speed < 1e6 && limits.acceleration < 1e8 && limits.jerk < 1e10;
     limited && options.tolerance > RESOLUTION && options.corridor() > RESOLUTION

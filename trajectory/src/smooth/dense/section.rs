@@ -6,7 +6,7 @@ use super::chords::Chords;
 use super::curve::Curve;
 use super::fit::{Balls, Fit, Orientation};
 use super::places::Units;
-use super::spans;
+use super::spans::spans_along;
 use super::time_parameter::TimeParameter;
 use crate::smooth::certificate::{Certificate, certify};
 use crate::smooth::choose::{Then, corners, from_rest, stretch};
@@ -27,11 +27,6 @@ const GAIN: f64 = 1e-3;
 const ATTEMPTS: usize = 8;
 /// Knots of a fit in a ramp of the acceleration.
 pub(super) const FIT_KNOTS: f64 = 6.0;
-/// Share of the tolerance that the spans may cut off corners.
-const CUT: f64 = 0.1;
-/// Least number of knots of the spans in a ramp of the acceleration, most of a section.
-const KNOTS_PER_RAMP: f64 = 20.0;
-const MOST_KNOTS: f64 = 1e5;
 /// Sections of so few poses that cannot be fitted are left to the time-optimal spline.
 const FEW: usize = 12;
 /// Times that a section is divided.
@@ -262,13 +257,11 @@ impl<'a, const D: usize> Section<'a, D> {
 
     /// Spans of the motion along a curve.
     fn spans(&self, best: &TimedCurve<D>) -> Vec<Span> {
-        let limits = &self.options.limits;
-        let ramp = limits.acceleration / limits.jerk;
-        let cut = (CUT * self.units.length * 4.8 / limits.acceleration).sqrt();
-        let least = best.timed.certificate.duration / MOST_KNOTS;
+        let law = &best.timed.law;
+        let pose = |time: f64| best.curve.pose(law.sample(time).position[0]);
         let ends = [&self.poses[0], &self.poses[self.poses.len() - 1]];
-        let spacing = cut.min(ramp / KNOTS_PER_RAMP).max(least);
-        spans::spans(&best.curve, &best.timed.law, ends, spacing)
+        let near = (self.units.length, &self.options.limits);
+        spans_along(&pose, law.duration(), ends, near)
     }
 
     /// Makes the balls smaller where a motion missed them or left the corridor; the pose that is

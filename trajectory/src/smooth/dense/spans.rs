@@ -11,8 +11,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::curve::Curve;
-use crate::Trajectory;
+use crate::ToolLimits;
 use crate::line::body_turn;
 use crate::smooth::span::Span;
 use crate::smooth::spline::{START, power, turns};
@@ -26,20 +25,39 @@ const JERK: f64 = 0.76;
 /// jerk by more than 0.3 %.
 const EASED: [f64; 2] = [0.991_76, 0.999_36];
 
-/// The motion along `curve` by `law`, from rest in `ends[0]` to rest in `ends[1]`, with knots about
-/// `spacing` apart, s.
-pub(super) fn spans<const D: usize>(
-    curve: &Curve<D>,
-    law: &Trajectory<1>,
+/// Share of the tolerance that the spans may cut off corners.
+const CUT: f64 = 0.1;
+/// Least number of knots of the spans in a ramp of the acceleration, most of a motion.
+const KNOTS_PER_RAMP: f64 = 20.0;
+const MOST_KNOTS: f64 = 1e5;
+
+/// Spans of a motion that has a `pose` at each time up to a `duration` (s), from rest in `ends[0]` to rest in `ends[1]`.
+/// They are within a share of the distance `near` (m) of it.
+pub(in crate::smooth) fn spans_along(
+    pose: &dyn Fn(f64) -> Isometry3<f64>,
+    duration: f64,
+    ends: [&Isometry3<f64>; 2],
+    (near, limits): (f64, &ToolLimits),
+) -> Vec<Span> {
+    let ramp = limits.acceleration / limits.jerk;
+    let cut = (CUT * near * 4.8 / limits.acceleration).sqrt();
+    let least = duration / MOST_KNOTS;
+    spans(pose, duration, ends, cut.min(ramp / KNOTS_PER_RAMP).max(least))
+}
+
+/// The same with knots about `spacing` apart, s.
+fn spans(
+    pose: &dyn Fn(f64) -> Isometry3<f64>,
+    duration: f64,
     ends: [&Isometry3<f64>; 2],
     spacing: f64,
 ) -> Vec<Span> {
     // Control point k stands for the time (k - 1.5) h.
-    let steps = (law.duration() / spacing).ceil().max(8.0);
-    let h = law.duration() / (steps - 2.0 * LAG);
+    let steps = (duration / spacing).ceil().max(8.0);
+    let h = duration / (steps - 2.0 * LAG);
     let inner = (4..steps as usize).map(|k| {
         let time = (k as f64 - 1.5 - LAG) * h;
-        curve.pose(law.sample(time).position[0])
+        pose(time)
     });
     let mut control = vec![*ends[0]; 4];
     control.extend(inner);

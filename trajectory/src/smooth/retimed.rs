@@ -1,0 +1,125 @@
+//! A motion along the way of another one, as fast as the limits allow.
+//!
+//! A search of a spline changes way and time law together. Where the tolerance shows corners a change of the time alone
+//! moves control points around them, which their corridor hardly allows, so a search may end far from the fastest law
+//! along its own way. The path timing finds that law whatever the corners are.
+
+use nalgebra::{Isometry3, SVector};
+
+use super::certificate::certify;
+use super::choose::stretch;
+use super::dense;
+use super::method::Method;
+use super::motion::Motion;
+use super::options::SmoothOptions;
+use super::span::Span;
+use crate::{
+    Boundary, JointLimits, JointPoint, Path, PathPoint, TimingOptions, ToolLimits, ToolPoint,
+    time_path,
+};
+
+/// Greatest rate of the law, in the time of the motion that is known.
+const FASTEST: f64 = 8.0;
+/// A motion whose bounds are above the limits by no more than this is stretched in time.
+const STRETCH: f64 = 1.15;
+
+/// The fastest motion that is found along the way of one that rests only at its ends; perhaps not certified. `None` where
+/// a limit is missing, or if it saves less than a share of the time.
+pub(super) fn motion(
+    known: &Motion,
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    gain: f64,
+) -> Option<Motion> {
+    if !known.rests.is_empty() || known.spans.is_empty() || !dense::is_limited(options) {
+        return None;
+    }
+    let way = Way::new(&known.spans);
+    let timing = TimingOptions {
+        start: Boundary::Free,
+        end: Boundary::Free,
+        rate_cap: Some(FASTEST),
+        ..TimingOptions::default()
+    };
+    let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let limits = angular(options.limits, &known.spans);
+    let law = time_path(&way, &free, &limits, &timing).ok()?.law;
+    let most = known.duration() * (1.0 - gain);
+    if law.duration() > most {
+        return None;
+    }
+    let pose = |time: f64| way.tool(law.sample(time).position[0]).pose;
+    let ends = [&poses[0], &poses[poses.len() - 1]];
+    let near = options.tolerance.min(options.corridor());
+    let mut spans = dense::spans_along(&pose, law.duration(), ends, (near, &options.limits));
+    let over = certify(&spans, poses, options).0;
+    if over.worst_limit() > 1.0 && over.worst_limit() < STRETCH {
+        stretch(&mut spans, over.stretch() * (1.0 + 1e-12));
+    }
+    let motion = Motion {
+        eased: known.eased,
+        retried: known.retried,
+        ..Motion::new(spans, Method::Spline)
+    };
+    (motion.duration() <= most).then_some(motion)
+}
+
+/// The limits, without those of the rotation where nothing turns.
+fn angular(limits: ToolLimits, spans: &[Span]) -> ToolLimits {
+    if spans.iter().any(|span| !span.turns.is_empty()) {
+        return limits;
+    }
+    ToolLimits {
+        angular_speed: f64::INFINITY,
+        angular_acceleration: f64::INFINITY,
+        angular_jerk: f64::INFINITY,
+        ..limits
+    }
+}
+
+/// The way of a motion. Its only joint is the time of that motion, which nothing limits.
+struct Way<'a> {
+    spans: &'a [Span],
+    knots: Vec<f64>,
+}
+
+impl<'a> Way<'a> {
+    fn new(spans: &'a [Span]) -> Self {
+        let mut knots: Vec<f64> = spans.iter().map(|span| span.start).collect();
+        knots.extend(spans.last().map(Span::end));
+        Self { spans, knots }
+    }
+
+    fn tool(&self, u: f64) -> ToolPoint {
+        let next = self.spans.partition_point(|span| span.start <= u);
+        let span = &self.spans[next.saturating_sub(1)];
+        span.at((u - span.start).clamp(0.0, span.duration))
+    }
+}
+
+impl Path<1> for Way<'_> {
+    fn end(&self) -> f64 {
+        self.spans.last().map_or(0.0, Span::end)
+    }
+
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, u: f64) -> PathPoint<1> {
+        PathPoint {
+            joint: self.joint_at(u),
+            tool: self.tool_at(u),
+        }
+    }
+
+    fn joint_at(&self, u: f64) -> JointPoint<1> {
+        JointPoint {
+            q: [u, 1.0, 0.0, 0.0].map(SVector::<f64, 1>::new),
+        }
+    }
+
+    fn tool_at(&self, u: f64) -> ToolPoint {
+        self.tool(u)
+    }
+}
