@@ -237,23 +237,11 @@ impl<'a> List<'a> {
             (found.backwards != form.backwards).then(|| form.turned(self.poses, self.options));
         let form = other.as_ref().unwrap_or(form);
         // A search with orientations is dear, and finds little that a good fit has not.
-        let dear = !(found.plan.method() == Method::Fit && found.suffices());
+        let good = found.plan.method() == Method::Fit && found.suffices();
         for _ in 0..ROUNDS {
             let before = found.plan.duration();
-            let known = found.motion.clone();
-            let faster = retimed::motion(&known, &form.poses, &form.options, 1.0 - GAIN);
-            let sooner = faster.clone().and_then(|motion| self.certified(form, motion));
-            let start = faster.as_ref().unwrap_or(&known);
-            let motion = windows::refined(&form.poses, &form.options, start, before / start.duration(), dear);
-            let motion = motion.or_else(|| {
-                faster.as_ref()?;
-                windows::refined(&form.poses, &form.options, &known, 1.0, dear)
-            });
-            let refined = motion.and_then(|motion| self.certified(form, motion));
-            if std::env::var("DBG").is_ok() {
-                eprintln!("REFINE known {before} retimed {:?} certified {:?} refined {:?}", faster.as_ref().map(Motion::duration), sooner.as_ref().map(|f| f.plan.duration()), refined.as_ref().map(|f| f.plan.duration()));
-            }
-            for other in [sooner, refined].into_iter().flatten() {
+            let others = self.improved(form, &found.motion, !good);
+            for other in others.into_iter().flatten() {
                 if other.plan.duration() < found.plan.duration() {
                     found = other;
                 }
@@ -263,6 +251,22 @@ impl<'a> List<'a> {
             }
         }
         found
+    }
+
+    /// The motion along the way of a known one as fast as the limits allow, and that with which a search ends which starts
+    /// there, or else from the known one.
+    fn improved(&self, form: &NormalForm, known: &Motion, dear: bool) -> [Option<Found>; 2] {
+        let (poses, options) = (&form.poses, &form.options);
+        let search = |from: &Motion| {
+            let times = known.duration() / from.duration();
+            let motion = windows::refined(poses, options, from, times, dear)?;
+            self.certified(form, motion)
+        };
+        let Some(sooner) = retimed::motion(known, (poses, options), GAIN) else {
+            return [None, search(known)];
+        };
+        let searched = search(&sooner).or_else(|| search(known));
+        [self.certified(form, sooner), searched]
     }
 
     /// The motion without those of its rests past which a faster way is found: with the whole tolerance, as it may have

@@ -24,18 +24,17 @@ const FASTEST: f64 = 8.0;
 const STRETCH: f64 = 1.15;
 
 /// The fastest motion that is found along the way of one that rests only at its ends; perhaps not certified. `None` where
-/// a limit is missing, or if it saves less than a share of the time.
+/// a limit is missing, or if it takes more than a share `most` of the time.
 pub(super) fn motion(
     known: &Motion,
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
-    gain: f64,
+    (poses, options): (&[Isometry3<f64>], &SmoothOptions),
+    most: f64,
 ) -> Option<Motion> {
     if !known.rests.is_empty() || known.spans.is_empty() || !dense::is_limited(options) {
         return None;
     }
     let way = Way::new(&known.spans);
-    let timing = TimingOptions {
+    let resting = TimingOptions {
         start: Boundary::Free,
         end: Boundary::Free,
         rate_cap: Some(FASTEST),
@@ -43,8 +42,8 @@ pub(super) fn motion(
     };
     let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let limits = angular(options.limits, &known.spans);
-    let law = time_path(&way, &free, &limits, &timing).ok()?.law;
-    let most = known.duration() * (1.0 - gain);
+    let most = most * known.duration();
+    let law = time_path(&way, &free, &limits, &resting).ok()?.law;
     if law.duration() > most {
         return None;
     }

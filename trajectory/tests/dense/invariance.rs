@@ -338,10 +338,11 @@ fn little_noise_costs_little() {
 }
 
 /// Lists whose tolerance shows each corner took 1.38 to 1.68 times as long: their searches ended after too few steps with
-/// knots too far apart, or missed poses by the angle only (list 306). Times (s) that they may take.
+/// knots too far apart, or missed poses by the angle only (list 306). Ended where they were, not going on from the fastest
+/// law along their way, lists 2006, 2022 and 402 took 2.37, 1.40 and 2.81 s. Times (s) that they may take.
 #[test]
 fn a_search_from_a_motion_finds_a_faster_one() {
-    for (seed, most) in [(2006, 2.5), (2022, 1.5), (306, 1.65)] {
+    for (seed, most) in [(2006, 1.95), (2022, 1.35), (306, 1.65), (402, 2.1)] {
         let list = random(seed..seed + 1, 400.0).next().unwrap();
         let time = list.time();
         assert!(time < most, "{seed}: {time} s");

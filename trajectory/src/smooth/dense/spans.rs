@@ -42,7 +42,12 @@ pub(in crate::smooth) fn spans_along(
     let ramp = limits.acceleration / limits.jerk;
     let cut = (CUT * near * 4.8 / limits.acceleration).sqrt();
     let least = duration / MOST_KNOTS;
-    spans(pose, duration, ends, cut.min(ramp / KNOTS_PER_RAMP).max(least))
+    spans(
+        pose,
+        duration,
+        ends,
+        cut.min(ramp / KNOTS_PER_RAMP).max(least),
+    )
 }
 
 /// The same with knots about `spacing` apart, s.

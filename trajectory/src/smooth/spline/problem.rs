@@ -68,6 +68,8 @@ pub(crate) struct Room {
     pub(crate) widths: [Vec<f64>; 2],
     /// Leg of each corridor sample (index of its far vertex).
     pub(crate) legs: Vec<usize>,
+    /// Factor on what the iterate has of a quantity, for a widened bound.
+    pub(crate) widen: f64,
 }
 
 impl<const D: usize> Problem<D> {

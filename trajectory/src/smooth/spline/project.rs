@@ -6,6 +6,12 @@ use super::problem::{Point, Problem, Room, part, square};
 /// Iterates are held this far inside the widened bounds.
 const WIDEN: f64 = 1.03;
 
+/// A bound that is narrowed by less than this share stays as it is; the iterate is then held closer to it, by so much of
+/// the distance before, and at last so close.
+const STAYS: f64 = 0.999;
+const CLOSER: f64 = 0.3;
+const CLOSEST: f64 = 1.0005;
+
 /// Fraction of a bound up to which it need not be widened.
 const CLEAR: f64 = 0.99;
 
@@ -35,11 +41,11 @@ const EASE: f64 = 1.02;
 
 /// Bound for a present value: the true one if the value is well inside it, otherwise one widened to
 /// contain the value, but never wider than before.
-fn narrowed(before: f64, value: f64, bound: f64, clear: f64) -> f64 {
+fn narrowed(before: f64, value: f64, [bound, widen]: [f64; 2], clear: f64) -> f64 {
     if value <= clear * bound {
         bound
     } else {
-        before.min((WIDEN * value).max(bound))
+        before.min((widen * value).max(bound))
     }
 }
 
@@ -234,9 +240,39 @@ impl Room {
             balls: [0, 1].map(|_| vec![f64::INFINITY; point.crossings.len()]),
             widths: [0, 1].map(|_| vec![f64::INFINITY; point.samples()]),
             legs: vec![0; point.samples()],
+            widen: WIDEN,
         };
         room.tighten(problem, point);
         room
+    }
+
+    /// Narrows every widened bound, and next time closer to the iterate where that changed little: else an iterate at its
+    /// centre just inside of a widened bound would stay there.
+    pub(crate) fn narrow<const D: usize>(
+        &mut self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+    ) -> bool {
+        let before = self.clone();
+        let tight = self.tighten(problem, point);
+        if !tight && self.widen > CLOSEST && self.is_near(&before) {
+            self.widen = 1.0 + CLOSER * (self.widen - 1.0);
+        }
+        tight
+    }
+
+    /// Whether no bound is narrower than it was by more than a little.
+    fn is_near(&self, before: &Self) -> bool {
+        let all = |room: &Self| -> Vec<f64> {
+            let caps = room.caps.iter().flatten().copied();
+            let balls = room.balls.iter().flatten().copied();
+            let widths = room.widths.iter().flatten().copied();
+            caps.chain(balls).chain(widths).collect()
+        };
+        let (now, before) = (all(self), all(before));
+        now.iter()
+            .zip(&before)
+            .all(|(now, before)| *now >= STAYS * before)
     }
 
     /// Narrows every widened bound to what the iterate needs, and assigns the corridor samples to
@@ -259,7 +295,7 @@ impl Room {
                 self.balls[g][i] = narrowed(
                     self.balls[g][i],
                     far,
-                    radius,
+                    [radius, self.widen],
                     clear(problem, point, point.crossings[i]),
                 );
                 tight &= self.balls[g][i] <= radius;
@@ -281,7 +317,7 @@ impl Room {
             } else {
                 fixed.max(*free)
             };
-            *cap = narrowed(*cap, value, 1.0, NEAR_CAP);
+            *cap = narrowed(*cap, value, [1.0, self.widen], NEAR_CAP);
             tight &= *cap <= 1.0;
         }
         tight
@@ -318,8 +354,12 @@ impl Room {
                     1.0
                 };
                 let width = eased * problem.groups[g].width;
-                self.widths[g][k] =
-                    narrowed(self.widths[g][k], far, width, clear(problem, point, time));
+                self.widths[g][k] = narrowed(
+                    self.widths[g][k],
+                    far,
+                    [width, self.widen],
+                    clear(problem, point, time),
+                );
                 tight &= self.widths[g][k] <= width;
             }
         }

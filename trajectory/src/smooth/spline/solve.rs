@@ -319,7 +319,7 @@ impl Bounds {
     fn narrow<const D: usize>(&mut self, problem: &Problem<D>, point: &Point<D>) {
         self.since += 1;
         if self.tight || self.since > PATIENCE {
-            self.tight = self.room.tighten(problem, point);
+            self.tight = self.room.narrow(problem, point);
             self.since = 0;
         }
     }
