@@ -7,6 +7,7 @@
 //! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
 //! for example near a singular pose, where joints turn fast over a short distance.
 
+mod connected;
 mod differential;
 mod error;
 mod linear;

@@ -310,9 +310,18 @@ impl<const N: usize> Solver<N> {
         goal: &Goal,
         q: &SVector<f64, N>,
     ) -> (PoseError, SMatrix<f64, 6, N>) {
+        self.pose_error_of(&goal.target(), q)
+    }
+
+    /// The same for a goal that is prepared.
+    pub(crate) fn pose_error_of(
+        &self,
+        target: &Target,
+        q: &SVector<f64, N>,
+    ) -> (PoseError, SMatrix<f64, 6, N>) {
         let (tool, jacobian) = self.chain.jacobian(q);
         let tool = Frame::from_isometry(&tool);
-        (goal.target().pose_error(simd::Plain, &tool), jacobian)
+        (target.pose_error(simd::Plain, &tool), jacobian)
     }
 
     fn descend(&self, target: &Target, seed: &SVector<f64, N>, stop: Stop) -> SolverResult<N> {

@@ -70,7 +70,8 @@ pub(super) fn derivatives<const N: usize>(
     null_space: &NullSpace<N>,
     prior: &[SVector<f64, N>; 3],
 ) -> [SVector<f64, N>; 3] {
-    let system = System::<N>::new(&task_rows(jacobian, null_space));
+    let rows = task_rows(jacobian, null_space);
+    let system = System::<N>::new(&rows);
     let u_rows = null_space.rates();
     let solve = |goal: &Screw, order: usize| -> SVector<f64, N> {
         let mut b = [0.0; 8];

@@ -1,5 +1,7 @@
 //! Small linear systems on the stack: task rows times joint motion equals a task motion.
 
+use simd::{Build, F4, Four, Op};
+
 /// Rows of a task: six of the tool, then one for each spare joint.
 pub(super) type Rows = [[f64; 8]; 8];
 
@@ -9,30 +11,35 @@ const SMALLEST_PIVOT: f64 = 1e-7;
 const PRIOR: f64 = 1e-12;
 
 /// Task rows, ready to be solved for several task motions.
-pub(super) struct System<const N: usize> {
-    rows: Rows,
+pub(super) struct System<'a, const N: usize> {
+    rows: &'a Rows,
     /// Factors of the rows, unless elimination is not trusted.
     factors: Option<Factors<N>>,
 }
 
-impl<const N: usize> System<N> {
+impl<'a, const N: usize> System<'a, N> {
     /// Factors the rows.
-    pub(super) fn new(rows: &Rows) -> Self {
+    #[inline]
+    pub(super) fn new(rows: &'a Rows) -> Self {
         let factors = if N >= 6 { Factors::new(rows) } else { None };
-        Self {
-            rows: *rows,
-            factors,
-        }
+        Self { rows, factors }
     }
 
     /// Solves `rows * x = b` for `N` unknowns.
     ///
     /// Where the rows do not settle `x` (singular, or fewer joints than six), the
     /// least-squares solution nearest to `prior`.
+    #[inline]
     pub(super) fn solve(&self, b: &[f64; 8], prior: &[f64; 8]) -> [f64; 8] {
         if let Some(factors) = &self.factors {
             return factors.solve(b);
         }
+        self.nearest(b, prior)
+    }
+
+    /// The least-squares solution nearest to `prior`.
+    #[cold]
+    fn nearest(&self, b: &[f64; 8], prior: &[f64; 8]) -> [f64; 8] {
         let count = N.max(6);
         let mut x = *prior;
         // The second pass takes out what the first left by rounding.
@@ -43,7 +50,7 @@ impl<const N: usize> System<N> {
                     rest[r] -= row[j] * x[j];
                 }
             }
-            let y = normal::<N>(&self.rows, &rest, count);
+            let y = normal::<N>(self.rows, &rest, count);
             for j in 0..N {
                 x[j] += y[j];
             }
@@ -103,6 +110,101 @@ impl<const N: usize> Factors<N> {
     }
 }
 
+/// Solves `rows * x = b` for the `N` unknowns as [`System::solve`] does with the prior zero, with fewer numbers to
+/// move: `b` is one more column of the rows.
+pub(super) fn solve_once<const N: usize>(build: Build, rows: &Rows, b: &[f64; 8]) -> [f64; 8] {
+    if (N == 6 || N == 7)
+        && let Some(x) = build.run(Eliminate::<N> { rows, b })
+    {
+        return x;
+    }
+    System::<N>::new(rows).solve(b, &[0.0; 8])
+}
+
+/// Gaussian elimination with row exchange of `N` rows and the column `b` beside them; `None` where a pivot is too
+/// small. Each number comes from the same sums as in [`Factors`].
+struct Eliminate<'a, const N: usize> {
+    rows: &'a Rows,
+    b: &'a [f64; 8],
+}
+
+impl<const N: usize> Op for Eliminate<'_, N> {
+    type Output = Option<[f64; 8]>;
+
+    // Loops over indices: iterators would be calls.
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> Option<[f64; 8]> {
+        let mut m = [[0.0; 8]; 8];
+        for i in 0..N {
+            m[i] = self.rows[i];
+            m[i][N & 7] = self.b[i];
+        }
+        let mut largest = 0.0;
+        for k in 0..N {
+            let (pivot, size) = pivot::<N>(&m, k);
+            let top = halves(simd, &m[pivot]);
+            let below = halves(simd, &m[k]);
+            put(below, &mut m[pivot]);
+            put(top, &mut m[k]);
+            if size > largest {
+                largest = size;
+            }
+            // Written so that NaN is refused too.
+            let trusted = size > SMALLEST_PIVOT * largest;
+            if !trusted {
+                return None;
+            }
+            let first = m[k][k];
+            for i in k + 1..N {
+                let factor = F4::splat(simd, m[i][k] / first);
+                // Whole rows; what becomes of the columns before is of no use.
+                let row = halves(simd, &m[i]);
+                put(
+                    [row[0] - top[0] * factor, row[1] - top[1] * factor],
+                    &mut m[i],
+                );
+            }
+        }
+        let mut x = [0.0; 8];
+        for k in (0..N).rev() {
+            let mut sum = m[k][N & 7];
+            for j in k + 1..N {
+                sum -= m[k][j] * x[j];
+            }
+            x[k] = sum / m[k][k];
+        }
+        Some(x)
+    }
+}
+
+/// The row from `k` on whose number in column `k` is largest, the last of equal ones, and its size.
+#[inline(always)]
+fn pivot<const N: usize>(m: &Rows, k: usize) -> (usize, f64) {
+    let size = |x: f64| if x < 0.0 { -x } else { x };
+    let (mut at, mut most) = (k, size(m[k][k]));
+    for i in k + 1..N {
+        let size = size(m[i][k]);
+        if size >= most {
+            (at, most) = (i, size);
+        }
+    }
+    (at, most)
+}
+
+/// A row in registers.
+#[inline(always)]
+fn halves<S: Four>(simd: S, row: &[f64; 8]) -> [F4<S>; 2] {
+    let [a, b, c, d, e, f, g, h] = *row;
+    [F4::new(simd, [a, b, c, d]), F4::new(simd, [e, f, g, h])]
+}
+
+/// Writes a row to memory.
+#[inline(always)]
+fn put<S: Four>(halves: [F4<S>; 2], row: &mut [f64; 8]) {
+    let ([a, b, c, d], [e, f, g, h]) = (halves[0].array(), halves[1].array());
+    *row = [a, b, c, d, e, f, g, h];
+}
+
 /// `(A^T A + PRIOR) y = A^T b`.
 fn normal<const N: usize>(rows: &Rows, b: &[f64; 8], count: usize) -> [f64; 8] {
     let mut m: Rows = [[0.0; 8]; 8];
@@ -138,6 +240,25 @@ fn normal<const N: usize>(rows: &Rows, b: &[f64; 8], count: usize) -> [f64; 8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One column more gives the same bits as factors, in both builds.
+    #[test]
+    fn one_column_more_gives_the_same() {
+        for turn in 0..200 {
+            let number = |i: usize, j: usize| (1.3 * (9 * turn + 8 * i + j) as f64).sin();
+            let rows: Rows = std::array::from_fn(|i| {
+                std::array::from_fn(|j| if j < 7 { number(i, j) } else { 0.0 })
+            });
+            let b: [f64; 8] = std::array::from_fn(|i| number(i, 9));
+            let wanted = System::<7>::new(&rows).solve(&b, &[0.0; 8]);
+            for build in [Build::detect(), Build::Plain] {
+                assert_eq!(solve_once::<7>(build, &rows, &b), wanted);
+            }
+        }
+        let rows: Rows = [[1.0; 8]; 8];
+        let x = solve_once::<6>(Build::Plain, &rows, &[1.0; 8]);
+        assert!((x.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{x:?}");
+    }
 
     /// A regular system is solved; a singular one gives the solution nearest to the prior.
     #[test]

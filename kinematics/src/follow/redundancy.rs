@@ -1,5 +1,6 @@
 //! The null-space motion of arms with more than six joints: chosen over the whole path.
 
+use super::connected;
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
@@ -22,7 +23,8 @@ type Attempt<const N: usize> = (f64, Result<Resolved<N>, FollowError>);
 /// Follows without null-space motion if the quality is good, otherwise along the polynomial that a
 /// search over the whole path finds. The null-space motion is measured along the direction in which
 /// the arm can move at the start. Where that direction becomes one that moves the tool, the path
-/// seems singular though the arm is not; then single joints are tried as the measure.
+/// seems singular though the arm is not; then single joints are tried as the measure. Where the closed
+/// form shows that no joints follow the path, they are not.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -30,7 +32,7 @@ pub(super) fn resolve<const N: usize>(
     let (_, jacobian) = task.solver.chain().jacobian(start);
     let directions = null_space(&jacobian);
     let (mut best, mut answer) = along(task, start, &directions);
-    if answer.is_ok() || is_beyond(&answer) {
+    if answer.is_ok() || is_beyond(&answer) || connected::is_cut(task, start) {
         return answer;
     }
     for joint in measures(&directions[0]) {

@@ -2,7 +2,7 @@
 
 use super::differential::{derivatives, task_rows};
 use super::error::{FollowCause, FollowError};
-use super::linear::System;
+use super::linear::solve_once;
 use super::null_space::NullSpace;
 use super::{FollowOptions, FollowPoint, TwistPoint};
 use crate::ik::{Goal, Solver};
@@ -228,11 +228,11 @@ impl<const N: usize> Task<'_, N> {
         null_space: &NullSpace<N>,
         at: &[f64; 2],
     ) -> Option<SVector<f64, N>> {
-        let target = Goal::Pose(*pose);
+        let target = Goal::Pose(*pose).target();
         let mut q = *guess.q;
         let mut reached = f64::INFINITY;
         for _ in 0..12 {
-            let (pose_error, jacobian) = self.solver.pose_error_at(&target, &q);
+            let (pose_error, jacobian) = self.solver.pose_error_of(&target, &q);
             let rows = task_rows(&jacobian, null_space);
             let mut b = [0.0; 8];
             b[..6].copy_from_slice(&pose_error.rows);
@@ -247,7 +247,7 @@ impl<const N: usize> Task<'_, N> {
                 return None;
             }
             reached = error;
-            let x = System::<N>::new(&rows).solve(&b, &[0.0; 8]);
+            let x = solve_once::<N>(self.solver.chain().build(), &rows, &b);
             let step = SVector::from_fn(|i, _| x[i]);
             q += step;
             if (q - *guess.q).amax() > guess.within {

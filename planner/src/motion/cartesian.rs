@@ -6,9 +6,9 @@ use kinematics::follow::{
 use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
+use trajectory::timing::PathTiming;
 use trajectory::{
     Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
-    time_path,
 };
 
 use super::{BlockedCause, Draft, MotionError, Planner};
@@ -20,6 +20,9 @@ const STEP_M: f64 = 4e-3;
 const STEP_RAD: f64 = 0.02;
 /// Largest deviation of the fitted joint path between solved points, m and rad.
 const FIT: f64 = 5e-7;
+/// Relative gap of the time law: so small that hardly any motion is slower than with a search that begins far
+/// from the limits and ends at the usual gap.
+const GAP: f64 = 5e-4;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -52,10 +55,12 @@ impl<const N: usize> Planner<N> {
         let options = TimingOptions {
             start: Boundary::Rest,
             end: Boundary::Rest,
+            gap: GAP,
             ..Default::default()
         };
         let path = joint_path(curve, &points)?;
-        let timed = time_path(&path, &self.limits, &motion.limits, &options)?;
+        let timing = PathTiming::new(&path, &self.limits, &motion.limits, &options)?;
+        let timed = timing.near().solve()?;
         let trajectory = self.finite(timed.trajectory, &points, &|_| 1)?;
         let draft = Draft {
             // The joints of a seven-joint arm may take another path along the same line.

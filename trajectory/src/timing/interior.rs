@@ -35,6 +35,9 @@ const SURE: f64 = 2.0;
 /// Largest share of the first error in these equations with which the estimate is used.
 const SETTLED: f64 = 0.05;
 
+/// Share of the largest square of the rate that the limits allow, where every row has much slack.
+pub(super) const FAR: f64 = 0.75;
+
 /// An iterate of the law with the multipliers of its rows. It can solve all problems over one grid,
 /// one after the other.
 #[derive(Clone, Debug)]
@@ -100,11 +103,16 @@ impl Interior {
     /// Starts from the law as it is, slowed down so that every row has a slack. A law with a moving
     /// start cannot be slowed down and has to be feasible already.
     pub(super) fn slow_down(&mut self, problem: &Problem) {
+        self.slow_down_to(problem, FAR);
+    }
+
+    /// The same with the square of the rate at this share of what the limits allow.
+    pub(super) fn slow_down_to(&mut self, problem: &Problem, share: f64) {
         self.evaluate(problem);
         let Worth { flat, steep, time } = self.worth;
         let worst = flat.sqrt().max(steep.cbrt());
         if !problem.moving && time.is_finite() && worst.is_finite() && worst > 0.0 {
-            let factor = 0.75 / worst;
+            let factor = share / worst;
             self.x.iter_mut().for_each(|x| *x *= factor);
             self.evaluate(problem);
         }

@@ -95,6 +95,7 @@ pub fn time_path<const N: usize>(
 pub struct PathTiming<'a, const N: usize> {
     bounded: Bounded<'a, N>,
     reachability: ReachabilityPass,
+    manner: search::Manner,
 }
 
 impl<'a, const N: usize> PathTiming<'a, N> {
@@ -122,7 +123,18 @@ impl<'a, const N: usize> PathTiming<'a, N> {
         Ok(Self {
             bounded,
             reachability,
+            manner: search::FAR,
         })
+    }
+
+    /// The same with a search that begins near the limits: fewer steps for the same gap, and another law
+    /// within it. For paths that are timed once; a search over many paths may depend on the last bits.
+    #[must_use]
+    pub fn near(self) -> Self {
+        Self {
+            manner: search::NEAR,
+            ..self
+        }
     }
 
     /// No motion along this path within these limits is shorter (s): see
@@ -153,7 +165,7 @@ impl<'a, const N: usize> PathTiming<'a, N> {
     /// # Errors
     /// As [`time_path`].
     pub fn solve_below(&self, limit: f64) -> Result<Option<Timed<N>>, TimingError> {
-        let draft = draft(self.bounded, &self.reachability, limit)?;
+        let draft = draft(self.bounded, &self.reachability, (limit, &self.manner))?;
         Ok(draft.map(|draft| self.finished(draft)))
     }
 
@@ -198,7 +210,7 @@ impl<'a, const N: usize> PathTiming<'a, N> {
 fn draft<const N: usize>(
     bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
-    limit: f64,
+    goal: (f64, &search::Manner),
 ) -> Result<Option<tighten::Draft<N>>, TimingError> {
     let mut options = *bounded.options;
     let mut refused = None;
@@ -209,7 +221,7 @@ fn draft<const N: usize>(
             bounded.path.end(),
             &options,
         );
-        match search::best(bounded, &Gridpoints::new(bounded, &grid), limit) {
+        match search::best(bounded, &Gridpoints::new(bounded, &grid), goal) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }
