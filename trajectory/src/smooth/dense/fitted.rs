@@ -223,7 +223,8 @@ impl<'a> Trials<'a> {
             if !timed {
                 return Ok(parameters);
             }
-            let fit = Fit::in_blocks((&points, &parameters), (AIM, way)).ok_or(Unfit::Fit)?;
+            let rough = (AIM, way, true);
+            let fit = Fit::in_blocks((&points, &parameters), rough).ok_or(Unfit::Fit)?;
             drop((points, parameters));
             Ok(self.over_time(fit, &poses[0], density))
         };
