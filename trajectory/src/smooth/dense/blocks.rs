@@ -18,11 +18,11 @@ const OVERLAP: usize = 32;
 const BLEND: f64 = 6.0;
 
 impl<const D: usize> Fit<D> {
-    /// The curve through balls of one radius around `points`, as that of [`Fit::new`], or one that is only near them;
-    /// `None` where some ball cannot be kept.
+    /// The curve through balls of one radius around `points`, as that of [`Fit::new`]; `None` where some
+    /// ball cannot be kept.
     pub(super) fn in_blocks(
         (points, parameters): (&[SVector<f64, D>], &[f64]),
-        (radius, orientation, rough): (f64, Orientation, bool),
+        (radius, orientation): (f64, Orientation),
     ) -> Option<Self> {
         let spans = parameters.last()?.round().max(1.0) as usize;
         let count = Block::count(spans);
@@ -39,10 +39,7 @@ impl<const D: usize> Fit<D> {
             }
             let shift = block.from as f64;
             let own: Vec<f64> = parameters[first..last].iter().map(|u| u - shift).collect();
-            let part = Part {
-                rough,
-                ..block.part()
-            };
+            let part = block.part();
             let list = (&points[first..last], &own[..], &vec![radius; own.len()][..]);
             let fit = Self::of(part, list, orientation).ok()?;
             for (j, c) in fit.control.iter().enumerate() {
@@ -91,7 +88,6 @@ impl Block {
         Part {
             spans: self.to - self.from,
             ends: self.ends.map(|end| end.is_none()),
-            rough: false,
         }
     }
 
@@ -136,7 +132,7 @@ mod tests {
         let radii = vec![0.96; points.len()];
         let orientation = Orientation::Along;
         let list = (&points[..], &parameters[..]);
-        let blocks = Fit::in_blocks(list, (0.96, orientation, false)).unwrap();
+        let blocks = Fit::in_blocks(list, (0.96, orientation)).unwrap();
         let balls = Balls { radii, orientation };
         let one = Fit::new(&points, &parameters, &balls).unwrap();
         assert_eq!(blocks.spans(), one.spans());

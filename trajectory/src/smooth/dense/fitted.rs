@@ -223,8 +223,7 @@ impl<'a> Trials<'a> {
             if !timed {
                 return Ok(parameters);
             }
-            let rough = (AIM, way, true);
-            let fit = Fit::in_blocks((&points, &parameters), rough).ok_or(Unfit::Fit)?;
+            let fit = Fit::in_blocks((&points, &parameters), (AIM, way)).ok_or(Unfit::Fit)?;
             drop((points, parameters));
             Ok(self.over_time(fit, &poses[0], density))
         };

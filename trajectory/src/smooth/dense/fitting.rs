@@ -29,8 +29,6 @@ const ENDS: f64 = 1e8;
 /// Rounds in which weights rise and fall, and rounds in which they only rise until all balls hold.
 const ROUNDS: usize = 14;
 const MORE: usize = 40;
-/// Rounds of a fit that only says how long its curve takes.
-const ROUGH: usize = 8;
 /// Largest change of the logarithm of a weight in one round, down and up, and the power of the
 /// error by which it changes.
 const CHANGE: [f64; 2] = [-2.0, 2.0];
@@ -59,7 +57,6 @@ impl<const D: usize> Fit<D> {
         let part = Part {
             spans: end.round().max(1.0) as usize,
             ends: [true, true],
-            rough: false,
         };
         Self::of(part, (points, parameters, &balls.radii), balls.orientation)
     }
@@ -108,8 +105,6 @@ pub(super) struct Part {
     pub(super) spans: usize,
     /// Whether it begins and ends with the list: then the curve meets that point exactly.
     pub(super) ends: [bool; 2],
-    /// Whether it is only to be near the balls.
-    pub(super) rough: bool,
 }
 
 /// A fit under way.
@@ -146,8 +141,7 @@ impl<const D: usize> Fitting<D> {
                 self.look();
             }
             let (worst, target) = self.reweigh(round < ROUNDS);
-            let rough = self.part.rough && round + 1 >= ROUGH;
-            if rough || (round >= ROUNDS && worst <= 1.0) {
+            if round >= ROUNDS && worst <= 1.0 {
                 self.meet_ends();
                 return Ok(());
             }
