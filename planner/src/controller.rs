@@ -219,7 +219,7 @@ impl<const N: usize> Controller<N> {
     /// Begins a long smooth move whose whole way can be checked before its time law is planned: see
     /// [`Planner::windows`]. The joints are then where it ends. `None` for every other command, and
     /// for one with guards: [`Self::step`] plans it; the controller is then unchanged.
-    pub fn begin(&mut self, command: &crcl::Command) -> Option<WindowedMove<N>> {
+    pub fn begin(&mut self, command: &crcl::Command) -> Option<WindowedMove<'static, N>> {
         use crcl::Command::{MoveSmoothlyTo, MoveThroughTo};
         if !matches!(command, MoveSmoothlyTo { .. } | MoveThroughTo { .. }) {
             return None;
@@ -246,7 +246,7 @@ impl<const N: usize> Controller<N> {
     /// window ended.
     pub fn next_window(
         &self,
-        windowed: &mut WindowedMove<N>,
+        windowed: &mut WindowedMove<'_, N>,
     ) -> Result<MoveWindow<N>, CommandError> {
         self.planner.window_of(windowed).map_err(refused)
     }

@@ -41,8 +41,9 @@ pub(super) struct Kernel<const N: usize> {
     pub moving: fn(&Planner<N>, &Move, &Sample<N>) -> Planned<N>,
     pub timed: Timed<N>,
     pub postures: Postures<N>,
-    pub windows: fn(&Planner<N>, Cow<'_, Move>, &SVector<f64, N>) -> Option<WindowedMove<N>>,
-    pub window_of: fn(&Planner<N>, &mut WindowedMove<N>) -> Result<MoveWindow<N>, MotionError>,
+    pub windows:
+        for<'a> fn(&Planner<N>, Cow<'a, Move>, &SVector<f64, N>) -> Option<WindowedMove<'a, N>>,
+    pub window_of: fn(&Planner<N>, &mut WindowedMove<'_, N>) -> Result<MoveWindow<N>, MotionError>,
 }
 
 impl<const N: usize> std::fmt::Debug for Kernel<N> {

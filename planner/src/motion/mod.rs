@@ -227,13 +227,13 @@ impl<const N: usize> Planner<N> {
 
     /// Checks the whole way of a long smooth move from `start`, at rest, and times its first window; see
     /// [`WindowedMove`]. All windows of [`Self::window_of`] together are the motion of [`Self::plan`].
-    /// `None` for a move that is planned as a whole. A move that is owned is not copied.
+    /// `None` for a move that is planned as a whole. The poses are not copied.
     #[must_use]
-    pub fn windows(
+    pub fn windows<'a>(
         &self,
-        motion: Cow<'_, Move>,
+        motion: Cow<'a, Move>,
         start: &SVector<f64, N>,
-    ) -> Option<WindowedMove<N>> {
+    ) -> Option<WindowedMove<'a, N>> {
         (self.kernel.windows)(self, motion, start)
     }
 
@@ -243,7 +243,10 @@ impl<const N: usize> Planner<N> {
     /// # Errors
     /// [`MotionError::OnTheWay`] when no motion begins where the window before it rests; the arm is
     /// then at rest on the way, within the tolerance.
-    pub fn window_of(&self, windowed: &mut WindowedMove<N>) -> Result<MoveWindow<N>, MotionError> {
+    pub fn window_of(
+        &self,
+        windowed: &mut WindowedMove<'_, N>,
+    ) -> Result<MoveWindow<N>, MotionError> {
         (self.kernel.window_of)(self, windowed)
     }
 

@@ -43,7 +43,7 @@ use crate::poly;
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use crossing::{Crossing, RESOLUTION};
-pub use dense::FittedCurve;
+pub use dense::{FittedCurve, FittedPart};
 pub use list::plan;
 pub use lower_bound::{least_time, least_turning_time};
 pub use method::Method;

@@ -11,13 +11,13 @@ use crate::queue::Given;
 #[derive(Debug)]
 pub(super) struct Streaming<const N: usize> {
     id: u32,
-    windowed: WindowedMove<N>,
+    windowed: WindowedMove<'static, N>,
 }
 
 impl<const N: usize> Worker<'_, N> {
     /// The way of a long smooth move that was not planned before, checked, if its windows can be
     /// planned while it moves.
-    pub(super) fn begin(&mut self, given: &Given) -> Option<WindowedMove<N>> {
+    pub(super) fn begin(&mut self, given: &Given) -> Option<WindowedMove<'static, N>> {
         match given {
             Given::Command {
                 located,
@@ -28,7 +28,7 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     /// Begins a move whose whole way was checked.
-    pub(super) fn stream(&mut self, flight: &mut InFlight<N>, windowed: WindowedMove<N>) {
+    pub(super) fn stream(&mut self, flight: &mut InFlight<N>, windowed: WindowedMove<'static, N>) {
         flight.planned_s = windowed.duration();
         let id = flight.id;
         self.streaming = Some(Streaming { id, windowed });

@@ -1,10 +1,10 @@
 //! The part of the way that is being timed: the joints along it, and those a window further on.
 
 use trajectory::HermitePath;
-use trajectory::smooth::FittedCurve;
+use trajectory::smooth::{FittedCurve, FittedPart};
 
 use super::super::Planner;
-use super::joints::{JointsAlong, Stretch};
+use super::joints::{Checked, JointsAlong, Stretch, grid};
 use crate::task::Move;
 
 /// Most points of the joint path in a window.
@@ -14,6 +14,8 @@ const MOST_POINTS: usize = 1500;
 #[derive(Clone, Debug)]
 pub(super) struct Ahead<const N: usize> {
     pub curve: FittedCurve,
+    /// The part of the curve that was made again.
+    pub part: FittedPart,
     joints: JointsAlong<N>,
     /// The points that were followed again, those before the window at the front.
     open: Stretch<N>,
@@ -22,10 +24,11 @@ pub(super) struct Ahead<const N: usize> {
 }
 
 impl<const N: usize> Ahead<N> {
-    pub(super) fn new(curve: FittedCurve, joints: JointsAlong<N>) -> Self {
+    pub(super) fn new(curve: FittedCurve, checked: Checked<N>) -> Self {
         Self {
             curve,
-            joints,
+            part: checked.first,
+            joints: checked.joints,
             open: Stretch::default(),
             next: 0,
         }
@@ -36,8 +39,9 @@ impl<const N: usize> Ahead<N> {
         self.joints.end().0
     }
 
-    /// Frees the joints before a parameter.
-    fn forget(&mut self, u: f64) {
+    /// Frees the joints and the curve before a parameter at which so many poses are passed.
+    fn forget(&mut self, (u, poses): (f64, usize)) {
+        self.part.forget(&self.curve, (u, poses));
         let passed = self.open.points.partition_point(|(at, _)| *at <= u);
         let before = passed.saturating_sub(1);
         self.open.points.drain(..before);
@@ -61,19 +65,19 @@ impl<const N: usize> Ahead<N> {
     }
 
     /// The joint path of the points that are open.
-    pub(super) fn path(&self) -> Option<HermitePath<N, &FittedCurve>> {
-        HermitePath::new(self.open.points.clone(), &self.curve)
+    pub(super) fn path(&self) -> Option<HermitePath<N, &FittedPart>> {
+        HermitePath::new(self.open.points.clone(), &self.part)
     }
 }
 
 impl<const N: usize> Planner<N> {
-    /// Follows the way again so far that a window from `from` can take this time at full speed (s); the
-    /// parameter at which it ends. `None` where the way cannot be followed.
+    /// Follows the way again so far that a window from `from`, where so many poses are passed, can take this time
+    /// at full speed (s); the parameter at which it ends. `None` where the way cannot be followed.
     pub(super) fn look_ahead(
         &self,
         ahead: &mut Ahead<N>,
         motion: &Move,
-        (from, time): (f64, f64),
+        ((from, passed), time): ((f64, usize), f64),
     ) -> Option<f64> {
         loop {
             let to = ahead.horizon(from, time);
@@ -81,14 +85,25 @@ impl<const N: usize> Planner<N> {
             if let Some(to) = to.filter(|to| *to <= reached) {
                 return Some(to);
             }
-            let stretch = self.stretch(&ahead.curve, &ahead.joints, ahead.next, motion)?;
+            let Ahead {
+                curve,
+                part,
+                joints,
+                next,
+                ..
+            } = &mut *ahead;
+            let end = *grid(curve, *next).last()?;
+            if !part.cover(curve, &motion.poses, end) {
+                return None;
+            }
+            let stretch = self.stretch((curve, part), joints, *next, motion)?;
             ahead.next += 1;
             // The first point of a stretch is the last of the one before it.
             ahead.open.points.pop();
             ahead.open.least.pop();
             ahead.open.points.extend(stretch.points);
             ahead.open.least.extend(stretch.least);
-            ahead.forget(from);
+            ahead.forget((from, passed));
         }
     }
 }

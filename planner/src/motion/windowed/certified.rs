@@ -8,6 +8,7 @@ use super::super::smooth_joints::moment;
 use super::super::{
     Draft, Fault, MotionError, MoveCertificate, Planner, ROUNDING, certificate, check,
 };
+use super::ahead::Ahead;
 use super::part::{Part, cut, lowered};
 use super::{FROM_REST, MOVING, WindowedMove};
 use crate::task::Move;
@@ -76,7 +77,10 @@ impl<const N: usize> Divided<N> {
 
 impl<const N: usize> Planner<N> {
     /// The next window.
-    pub(super) fn window(&self, windowed: &mut WindowedMove<N>) -> Result<Window<N>, MotionError> {
+    pub(super) fn window(
+        &self,
+        windowed: &mut WindowedMove<'_, N>,
+    ) -> Result<Window<N>, MotionError> {
         let shares = match windowed.boundary {
             Boundary::Moving { .. } => &MOVING[..],
             _ => &FROM_REST[..],
@@ -94,7 +98,7 @@ impl<const N: usize> Planner<N> {
     /// The same under a share of the limits.
     fn window_within(
         &self,
-        windowed: &mut WindowedMove<N>,
+        windowed: &mut WindowedMove<'_, N>,
         share: f64,
     ) -> Result<Window<N>, MotionError> {
         let WindowedMove {
@@ -102,14 +106,15 @@ impl<const N: usize> Planner<N> {
             ahead,
             from,
             boundary,
+            passed,
             ..
         } = &mut *windowed;
-        let (limits, from, boundary) = (motion.limits, *from, *boundary);
+        let (limits, from, boundary, passed) = (motion.limits, *from, *boundary, *passed);
         let brake = limits.speed / limits.acceleration + limits.acceleration / limits.jerk;
         let mut time = HORIZON.max(BRAKES * brake);
         for _ in 0..=DOUBLINGS {
             let to = self
-                .look_ahead(ahead, motion, (from, time))
+                .look_ahead(ahead, motion, ((from, passed), time))
                 .ok_or(MotionError::NoWay)?;
             let path = ahead.path().ok_or(MotionError::NoWay)?;
             let part = Part::new(&path, from, to);
@@ -146,7 +151,7 @@ impl<const N: usize> Planner<N> {
     /// that; one that begins in motion cannot be.
     fn certified(
         &self,
-        windowed: &WindowedMove<N>,
+        windowed: &WindowedMove<'_, N>,
         mut divided: Divided<N>,
     ) -> Result<Window<N>, MotionError> {
         let motion = &windowed.motion;
@@ -160,8 +165,8 @@ impl<const N: usize> Planner<N> {
         }
         let [head, tail] = bounds;
         let (at, boundary) = divided.at_cut();
-        let passes = windowed.ahead.curve.passes();
-        let ahead = &passes[windowed.passed..];
+        let Ahead { curve, part, .. } = &windowed.ahead;
+        let ahead = part.passes(curve, windowed.passed);
         let count = ahead.partition_point(|u| *u <= at);
         let times = |range: &[f64], since: f64| -> Vec<Crossing> {
             let pass = |u: &f64| Crossing {
@@ -195,7 +200,7 @@ impl<const N: usize> Planner<N> {
     /// The certificate of a part, from the pose passed last before it to the parameter `to`.
     fn proved_part(
         &self,
-        windowed: &WindowedMove<N>,
+        windowed: &WindowedMove<'_, N>,
         (draft, bounds): (Draft<N>, MotionBounds<N>),
         (passed, to): (usize, f64),
     ) -> Result<Certified<N>, MotionError> {

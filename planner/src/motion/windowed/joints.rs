@@ -4,13 +4,15 @@
 //! again when it is timed. A stretch follows from its first point alone, so what is followed again is
 //! what was checked, to the last bit.
 
+use std::ops::RangeInclusive;
+
 use kinematics::follow::{
-    FollowOptions, FollowPoint, NullMotion, TwistPoint, follow_choosing, refine,
+    FollowError, FollowOptions, FollowPoint, NullMotion, TwistPoint, follow_choosing, refine,
 };
 use kinematics::measure::dexterity;
 use nalgebra::SVector;
-use trajectory::smooth::FittedCurve;
-use trajectory::{JointPoint, ToolCurve};
+use trajectory::JointPoint;
+use trajectory::smooth::{FittedCurve, FittedPart};
 
 use super::super::Planner;
 use crate::task::Move;
@@ -37,6 +39,14 @@ pub(super) struct JointsAlong<const N: usize> {
     end: (FollowPoint<N>, f64),
 }
 
+/// What the check of a whole way gives.
+pub(super) struct Checked<const N: usize> {
+    pub joints: JointsAlong<N>,
+    /// The begin of the curve.
+    pub first: FittedPart,
+    pub corridor_ratio: f64,
+}
+
 /// Points of the joint path, and about the least time from the start to each (s).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stretch<const N: usize> {
@@ -61,66 +71,101 @@ impl<const N: usize> JointsAlong<N> {
     }
 }
 
+/// Why the joints do not follow a curve.
+pub(super) enum NoWay {
+    /// The curve cannot be made, or misses a pose.
+    Curve,
+    /// The arm cannot follow it.
+    Joints,
+}
+
+impl From<FollowError> for NoWay {
+    fn from(_: FollowError) -> Self {
+        Self::Joints
+    }
+}
+
 impl<const N: usize> Planner<N> {
     /// The joints along the whole curve, on one branch, inside their ranges, away from singular places,
-    /// if the way is regular; `None` otherwise.
+    /// if the way is regular. The curve is made for that, stretch by stretch, and is checked all along.
     pub(super) fn joints_along(
         &self,
         curve: &FittedCurve,
         start: &SVector<f64, N>,
         motion: &Move,
-    ) -> Option<JointsAlong<N>> {
-        let knots = curve.knots();
-        let tool = |u: f64| twist(curve, u);
+    ) -> Result<Checked<N>, NoWay> {
+        let mut part = curve.begin(&motion.poses).ok_or(NoWay::Curve)?;
+        let covered = |part: &mut FittedPart, to: f64| {
+            let good = part.cover(curve, &motion.poses, to) && part.check();
+            good.then_some(()).ok_or(NoWay::Curve)
+        };
         // Without a null space there is nothing to choose, so one leg is enough to begin.
-        let known = if N > 6 { knots.len() } else { 2 };
-        let (points, chosen) =
-            follow_choosing(&self.solver, &tool, (&knots[..known], start), &options()).ok()?;
-        let mut begin = (*points.first()?, 0.0);
+        let known = knots(curve, 0..=if N > 6 { curve.last_knot() } else { 1 });
+        covered(&mut part, known[known.len() - 1])?;
+        let tool = |u: f64| twist(&part, u);
+        let (points, chosen) = follow_choosing(&self.solver, &tool, (&known, start), &options())?;
+        let mut begin = (*points.first().ok_or(NoWay::Joints)?, 0.0);
+        drop((points, known));
         let (mut begins, mut count, mut slowest) = (Vec::new(), 0, f64::INFINITY);
-        for grid in grids(&knots) {
-            let points =
-                refine(&self.solver, &tool, (grid, &[begin.0]), &options(), &chosen).ok()?;
+        let first = part.clone();
+        for index in 0..curve.last_knot().div_ceil(STRETCH) {
+            let grid = grid(curve, index);
+            covered(&mut part, grid[grid.len() - 1])?;
+            let tool = |u: f64| twist(&part, u);
+            let points = refine(
+                &self.solver,
+                &tool,
+                (&grid, &[begin.0]),
+                &options(),
+                &chosen,
+            )?;
             let far =
                 |point: &FollowPoint<N>| dexterity(self.chain(), &point.q[0]).smallest >= SINGULAR;
             let inside = points.windows(2).all(|pair| self.stays_inside(pair));
             count += points.len();
             if !inside || !points.iter().all(far) || count > MOST_POINTS {
-                return None;
+                return Err(NoWay::Joints);
             }
-            let least = self.least_times(curve, (&points, begin.1), motion);
+            let least = self.least_times(&part, (&points, begin.1), motion);
             for (times, pair) in least.windows(2).zip(points.windows(2)) {
                 let rate = (times[1] - times[0]) / (pair[1].u - pair[0].u);
                 slowest = if rate >= slowest { slowest } else { rate };
             }
             begins.push(begin);
-            begin = (*points.last()?, *least.last()?);
+            begin = last_of(&points, &least).ok_or(NoWay::Joints)?;
+            part.forget_checked(begin.0.u);
         }
-        let along = JointsAlong {
+        covered(&mut part, curve.end())?;
+        let joints = JointsAlong {
             motion: chosen,
             begins,
             end: begin,
         };
-        let (end, time) = along.end();
+        let (end, time) = joints.end();
         // Nothing on the way may rest although its parameter moves.
-        (slowest * end >= REGULAR * time).then_some(along)
+        let regular = slowest * end >= REGULAR * time;
+        let checked = Checked {
+            joints,
+            first,
+            corridor_ratio: part.corridor_ratio(),
+        };
+        regular.then_some(checked).ok_or(NoWay::Joints)
     }
 
-    /// A stretch, followed again from its first point.
+    /// A stretch, followed again from its first point. The part covers it.
     pub(super) fn stretch(
         &self,
-        curve: &FittedCurve,
+        (curve, part): (&FittedCurve, &FittedPart),
         along: &JointsAlong<N>,
         index: usize,
         motion: &Move,
     ) -> Option<Stretch<N>> {
-        let knots = curve.knots();
         let (first, time) = along.begins.get(index)?;
-        let tool = |u: f64| twist(curve, u);
-        let grid = grids(&knots).nth(index)?;
-        let known = (grid, std::slice::from_ref(first));
+        let tool = |u: f64| twist(part, u);
+        let grid = grid(curve, index);
+        let known = (&grid[..], std::slice::from_ref(first));
         let points = refine(&self.solver, &tool, known, &options(), &along.motion).ok()?;
-        let least = self.least_times(curve, (&points, *time), motion);
+        let least = self.least_times(part, (&points, *time), motion);
         let points = points
             .into_iter()
             .map(|point| (point.u, JointPoint { q: point.q }))
@@ -150,13 +195,13 @@ impl<const N: usize> Planner<N> {
     /// About the least time from the start to each point at the largest speeds, from that to the first.
     fn least_times(
         &self,
-        curve: &FittedCurve,
+        curve: &FittedPart,
         (points, first): (&[FollowPoint<N>], f64),
         motion: &Move,
     ) -> Vec<f64> {
         let (tool, joints) = (&motion.limits, &self.limits);
         let slowness = |point: &FollowPoint<N>| {
-            let seen = curve.at(point.u);
+            let seen = curve.tool(point.u);
             let place = seen.linear[0].norm() / tool.speed;
             let turn = seen.angular[0].norm() / tool.angular_speed;
             let joint = |j: usize| point.q[1][j].abs() / joints.velocity[j];
@@ -176,12 +221,22 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// The knots of each stretch: its last one is the first of the next.
-fn grids(knots: &[f64]) -> impl Iterator<Item = &[f64]> {
-    let last = knots.len() - 1;
-    (0..last)
-        .step_by(STRETCH)
-        .map(move |first| &knots[first..=(first + STRETCH).min(last)])
+/// The last point of a stretch, and the least time to it.
+fn last_of<const N: usize>(
+    points: &[FollowPoint<N>],
+    least: &[f64],
+) -> Option<(FollowPoint<N>, f64)> {
+    Some((*points.last()?, *least.last()?))
+}
+
+/// The knots of a stretch: its last one is the first of the next.
+pub(super) fn grid(curve: &FittedCurve, index: usize) -> Vec<f64> {
+    let first = index * STRETCH;
+    knots(curve, first..=(first + STRETCH).min(curve.last_knot()))
+}
+
+fn knots(curve: &FittedCurve, range: RangeInclusive<usize>) -> Vec<f64> {
+    range.map(|index| curve.knot(index)).collect()
 }
 
 fn options() -> FollowOptions {
@@ -192,8 +247,8 @@ fn options() -> FollowOptions {
 }
 
 /// The tool at a parameter of the curve.
-fn twist(curve: &FittedCurve, u: f64) -> TwistPoint {
-    let seen = curve.at(u);
+fn twist(curve: &FittedPart, u: f64) -> TwistPoint {
+    let seen = curve.tool(u);
     TwistPoint {
         pose: seen.pose,
         linear: seen.linear,
@@ -232,11 +287,20 @@ mod tests {
             limits: robot.motion_limits(),
         };
         let options = SmoothOptions::new(motion.tolerance, motion.limits);
-        let curve = FittedCurve::new(&poses, &options).unwrap();
-        let along = planner.joints_along(&curve, &home, &motion).unwrap();
+        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
+            .next()
+            .unwrap();
+        let checked = planner.joints_along(&curve, &home, &motion);
+        let Ok(Checked { joints: along, .. }) = checked else {
+            panic!("the arm does not follow");
+        };
+        let mut part = curve.begin(&motion.poses).unwrap();
         assert!(along.count() >= 3, "{}", along.count());
         for index in 0..along.count() {
-            let stretch = planner.stretch(&curve, &along, index, &motion).unwrap();
+            let to = *grid(&curve, index).last().unwrap();
+            assert!(part.cover(&curve, &motion.poses, to));
+            let stretch = planner.stretch((&curve, &part), &along, index, &motion);
+            let stretch = stretch.unwrap();
             let (point, least) = along.begins.get(index + 1).unwrap_or(&along.end);
             let last = stretch.points.last().unwrap();
             assert_eq!((last.0, last.1.q), (point.u, point.q));

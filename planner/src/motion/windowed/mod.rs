@@ -12,6 +12,8 @@ mod joints;
 mod part;
 mod way;
 
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, SVector};
 use realtime::Piece;
 use trajectory::smooth::{RestCause, SmoothOptions, least_time};
@@ -27,19 +29,24 @@ use certified::Certified;
 const FROM_REST: [f64; 3] = [0.999, 0.98, 0.9];
 const MOVING: [f64; 3] = [0.998, 0.993, 1.0];
 
+/// Most poses from which the least time of a move is bounded.
+const BOUND: usize = 8192;
+
 /// A smooth move whose whole way was checked, and that is timed and certified window by window.
 ///
 /// A curve passes every pose in order within its tolerances and stays in the corridor, and the joints
 /// follow all of it on one branch, inside their ranges and away from singular places. Such a way can be
 /// travelled from rest to rest, from any place on it to any other.
 #[derive(Clone, Debug)]
-pub struct WindowedMove<const N: usize> {
-    motion: Move,
+pub struct WindowedMove<'a, const N: usize> {
+    motion: Cow<'a, Move>,
     start: SVector<f64, N>,
     /// Pose of the controlled point at the start.
     origin: Isometry3<f64>,
     /// The checked way.
     ahead: Ahead<N>,
+    /// Bound of the distance from the legs over the corridor's half width.
+    corridor_ratio: f64,
     end: SVector<f64, N>,
     /// Where the next window begins, and how.
     from: f64,
@@ -64,7 +71,7 @@ pub struct MoveWindow<const N: usize> {
     pub last: bool,
 }
 
-impl<const N: usize> WindowedMove<N> {
+impl<const N: usize> WindowedMove<'_, N> {
     /// Joints at the end of the last window, at rest (rad, m).
     #[must_use]
     pub fn end(&self) -> &SVector<f64, N> {
@@ -147,7 +154,7 @@ impl<const N: usize> Planner<N> {
     /// on, the next window is a stop on the way.
     pub(super) fn next_window(
         &self,
-        windowed: &mut WindowedMove<N>,
+        windowed: &mut WindowedMove<'_, N>,
     ) -> Result<MoveWindow<N>, MotionError> {
         if let Some(first) = windowed.first.take() {
             return Ok(first);
@@ -176,13 +183,16 @@ impl<const N: usize> Planner<N> {
     }
 
     /// Completes the certificate of the whole move.
-    fn conclude(&self, windowed: &mut WindowedMove<N>) {
-        let motion = &mut windowed.motion;
+    fn conclude(&self, windowed: &mut WindowedMove<'_, N>) {
+        let motion = &windowed.motion;
         let options = SmoothOptions::new(motion.tolerance, motion.limits);
-        motion.poses.reserve_exact(1);
-        motion.poses.insert(0, windowed.origin);
-        let tool = least_time(&motion.poses, &options).unwrap_or(0.0);
-        motion.poses.remove(0);
+        // What bounds the way through some of the poses bounds that through all.
+        let step = motion.poses.len().div_ceil(BOUND);
+        let mut some = Vec::with_capacity(motion.poses.len().div_ceil(step) + 1);
+        some.extend(motion.poses.iter().rev().step_by(step));
+        some.push(windowed.origin);
+        some.reverse();
+        let tool = least_time(&some, &options).unwrap_or(0.0);
         let joints = self.least_of_joints(&windowed.start, &windowed.end);
         if let Some(certificate) = &mut windowed.certificate {
             certificate.lower_bound_s = tool.max(joints).min(certificate.duration_s);
@@ -192,7 +202,7 @@ impl<const N: usize> Planner<N> {
     /// All windows of a move as one motion.
     pub(super) fn all_windows(
         &self,
-        mut windowed: WindowedMove<N>,
+        mut windowed: WindowedMove<'_, N>,
     ) -> Result<PlannedMove<N>, MotionError> {
         let mut pieces = Vec::new();
         loop {
@@ -207,7 +217,7 @@ impl<const N: usize> Planner<N> {
         let blend = Blend {
             tolerance: windowed.motion.tolerance,
             exact_stop: curve.exact_stop(),
-            corridor_ratio: curve.corridor_ratio(),
+            corridor_ratio: windowed.corridor_ratio,
             jerk_ratio: certificate
                 .peaks
                 .tool_jerk
@@ -225,8 +235,6 @@ impl<const N: usize> Planner<N> {
 
 #[cfg(test)]
 mod tests {
-    use std::borrow::Cow;
-
     use super::*;
     use crate::controller::Controller;
     use crate::robot::load;
@@ -234,7 +242,7 @@ mod tests {
     use nalgebra::Vector3;
 
     /// A long arc at a low speed, with its first window.
-    fn begun() -> (Planner<6>, WindowedMove<6>, Vec<Piece<6>>) {
+    fn begun() -> (Planner<6>, WindowedMove<'static, 6>, Vec<Piece<6>>) {
         let robot = load("ur5e").unwrap();
         let controller = Controller::<6>::new(&robot, 1000.0, crcl::LengthUnit::default()).unwrap();
         let planner = controller.planner().clone();
@@ -253,7 +261,7 @@ mod tests {
             tolerance: 1e-4,
             limits,
         };
-        let mut windowed = planner.windows(Cow::Borrowed(&motion), &home).unwrap();
+        let mut windowed = planner.windows(Cow::Owned(motion), &home).unwrap();
         let first = planner.window_of(&mut windowed).unwrap();
         assert!(!first.last);
         (planner, windowed, first.pieces)
@@ -301,7 +309,7 @@ mod tests {
     #[test]
     fn a_move_that_cannot_go_on_names_the_pose() {
         let (planner, mut windowed, _) = begun();
-        windowed.motion.limits.speed = -1.0;
+        windowed.motion.to_mut().limits.speed = -1.0;
         let stop = planner.window_of(&mut windowed).unwrap();
         let end = stop.pieces[stop.pieces.len() - 1];
         assert!(end.sample(end.duration).velocity.amax() < 1e-6);

@@ -1,6 +1,6 @@
 //! A part of a path, its time law, and where that law is cut.
 
-use trajectory::smooth::FittedCurve;
+use trajectory::smooth::FittedPart;
 use trajectory::timing::Timed;
 use trajectory::{
     HermitePath, JointLimits, JointPoint, Path, PathPoint, ToolCurve, ToolLimits, ToolPoint,
@@ -11,14 +11,14 @@ const BRAKES: f64 = 1.6;
 
 /// A path from one parameter to another, which is the end at most.
 pub(super) struct Part<'a, const N: usize> {
-    path: &'a HermitePath<N, &'a FittedCurve>,
+    path: &'a HermitePath<N, &'a FittedPart>,
     pub from: f64,
     pub to: f64,
     knots: Vec<f64>,
 }
 
 impl<'a, const N: usize> Part<'a, N> {
-    pub(super) fn new(path: &'a HermitePath<N, &'a FittedCurve>, from: f64, to: f64) -> Self {
+    pub(super) fn new(path: &'a HermitePath<N, &'a FittedPart>, from: f64, to: f64) -> Self {
         let all = path.knots();
         let first = all.partition_point(|u| *u <= from + NEAR);
         let last = all.partition_point(|u| *u < to - NEAR);

@@ -2,13 +2,14 @@
 
 use std::borrow::Cow;
 
-use nalgebra::SVector;
+use nalgebra::{Isometry3, SVector};
 use trajectory::Boundary;
 use trajectory::smooth::{FittedCurve, SmoothOptions};
 
 use super::super::Planner;
 use super::WindowedMove;
 use super::ahead::Ahead;
+use super::joints::{Checked, NoWay};
 use crate::task::{Move, Shape};
 
 /// Fewest poses of a move that is planned in windows.
@@ -22,32 +23,24 @@ impl<const N: usize> Planner<N> {
     /// ranges, away from singular places, from its first point to its last. The first window is planned
     /// too. `None` if that cannot be done in this way: then the move is planned as a whole.
     ///
-    /// A list may be long, so one that is owned is not copied.
-    pub(in super::super) fn begin_windows(
+    /// A list may be long, so it is not copied.
+    pub(in super::super) fn begin_windows<'a>(
         &self,
-        mut motion: Cow<'_, Move>,
+        motion: Cow<'a, Move>,
         start: &SVector<f64, N>,
-    ) -> Option<WindowedMove<N>> {
+    ) -> Option<WindowedMove<'a, N>> {
         let long = motion.shape == Shape::Smooth && motion.poses.len() >= LONG;
         if !long || motion.tolerance < LEAST_TOLERANCE || self.efforts.is_some() {
             return None;
         }
         self.check_reach(&motion, start).ok()?;
         let origin = self.chain().forward(start);
-        let options = SmoothOptions::new(motion.tolerance, motion.limits);
-        let curve = {
-            let poses = &mut motion.to_mut().poses;
-            poses.reserve_exact(1);
-            poses.insert(0, origin);
-            let curve = FittedCurve::new(poses, &options);
-            poses.remove(0);
-            curve?
-        };
-        let joints = self.joints_along(&curve, start, &motion)?;
+        let (curve, checked) = self.checked_way(&motion, &origin, start)?;
         let mut windowed = WindowedMove {
-            end: *joints.last(),
-            ahead: Ahead::new(curve, joints),
-            motion: motion.into_owned(),
+            end: *checked.joints.last(),
+            corridor_ratio: checked.corridor_ratio,
+            ahead: Ahead::new(curve, checked),
+            motion,
             start: *start,
             origin,
             from: 0.0,
@@ -60,5 +53,23 @@ impl<const N: usize> Planner<N> {
         };
         windowed.first = Some(self.next_window(&mut windowed).ok()?);
         Some(windowed)
+    }
+
+    /// The first curve that is good all along, if the arm follows it.
+    fn checked_way(
+        &self,
+        motion: &Move,
+        origin: &Isometry3<f64>,
+        start: &SVector<f64, N>,
+    ) -> Option<(FittedCurve, Checked<N>)> {
+        let options = SmoothOptions::new(motion.tolerance, motion.limits);
+        for curve in FittedCurve::all(origin, &motion.poses, &options) {
+            match self.joints_along(&curve, start, motion) {
+                Ok(checked) => return Some((curve, checked)),
+                Err(NoWay::Curve) => {}
+                Err(NoWay::Joints) => return None,
+            }
+        }
+        None
     }
 }

@@ -25,7 +25,7 @@ impl<const D: usize> Fit<D> {
         (radius, orientation): (f64, Orientation),
     ) -> Option<Self> {
         let spans = parameters.last()?.round().max(1.0) as usize;
-        let count = (spans / BLOCK).max(1);
+        let count = Block::count(spans);
         let mut whole = Self {
             control: vec![SVector::zeros(); spans + ORDER - 1],
             parameters: vec![0.0; points.len()],
@@ -39,10 +39,7 @@ impl<const D: usize> Fit<D> {
             }
             let shift = block.from as f64;
             let own: Vec<f64> = parameters[first..last].iter().map(|u| u - shift).collect();
-            let part = Part {
-                spans: block.to - block.from,
-                ends: [block.from == 0, block.to == spans],
-            };
+            let part = block.part();
             let list = (&points[first..last], &own[..], &vec![radius; own.len()][..]);
             let fit = Self::of(part, list, orientation).ok()?;
             for (j, c) in fit.control.iter().enumerate() {
@@ -59,15 +56,21 @@ impl<const D: usize> Fit<D> {
 }
 
 /// A block, with what it has beyond its ends.
-struct Block {
-    from: usize,
-    to: usize,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    pub(super) from: usize,
+    pub(super) to: usize,
     /// Where it takes over from the one before, and where the next one takes over.
     ends: [Option<f64>; 2],
 }
 
 impl Block {
-    fn new(index: usize, count: usize, spans: usize) -> Self {
+    /// How many blocks a fit with so many knot intervals has.
+    pub(super) fn count(spans: usize) -> usize {
+        (spans / BLOCK).max(1)
+    }
+
+    pub(super) fn new(index: usize, count: usize, spans: usize) -> Self {
         let edge = |i: usize| i * spans / count;
         let (first, last) = (index == 0, index + 1 == count);
         Self {
@@ -80,10 +83,23 @@ impl Block {
         }
     }
 
+    /// What is fitted.
+    pub(super) fn part(&self) -> Part {
+        Part {
+            spans: self.to - self.from,
+            ends: self.ends.map(|end| end.is_none()),
+        }
+    }
+
     /// The share that the block has of the result at a parameter.
-    fn share(&self, u: f64) -> f64 {
+    pub(super) fn share(&self, u: f64) -> f64 {
         let [before, after] = self.ends.map(|end| end.map(|end| taken_over(u - end)));
         before.unwrap_or(1.0) - after.unwrap_or(0.0)
+    }
+
+    /// The parameter up to which no later block has a share; none after the last block.
+    pub(super) fn alone_to(&self) -> Option<f64> {
+        self.ends[1].map(|end| end - BLEND)
     }
 }
 

@@ -46,34 +46,18 @@ impl Chords {
 
     /// The longest chords from which no pose is farther away than `near`.
     fn within<const D: usize>(points: &[SVector<f64, D>], near: f64) -> Self {
-        let last = points.len() - 1;
-        let (mut corners, mut from) = (vec![0], 0);
-        while from < last {
-            // Doubling finds a chord that is too long, halving the longest below it.
-            let (mut good, mut step) = (from + 1, 2);
-            let mut bad = last + 1;
-            while good < last {
-                let to = (from + step).min(last);
-                if spans(points, from..to, near) {
-                    good = to;
-                    step *= 2;
-                } else {
-                    bad = to;
-                    break;
-                }
-            }
-            while good + 1 < bad {
-                let middle = good.midpoint(bad);
-                if spans(points, from..middle, near) {
-                    good = middle;
-                } else {
-                    bad = middle;
-                }
-            }
-            corners.push(good);
-            from = good;
-        }
+        let point = |i: usize| points[i];
+        let mut corners = vec![0];
+        corners.extend(ends(&point, points.len() - 1, near));
         Self { corners }
+    }
+
+    /// The end of each leg of [`Self::legs`], one after the other: nothing is kept of them.
+    pub(super) fn leg_ends<const D: usize>(
+        point: &impl Fn(usize) -> SVector<f64, D>,
+        last: usize,
+    ) -> impl Iterator<Item = usize> {
+        ends(point, last, STRAIGHT)
     }
 
     /// How many there are.
@@ -84,7 +68,12 @@ impl Chords {
     /// Whether the tolerance shows the corners of a list that does not turn: its curve is not nearly
     /// known. Orientations are better fitted all the same.
     pub(super) fn shows_corners<const D: usize>(&self, points: &[SVector<f64, D>]) -> bool {
-        D == 3 && Self::legs(points).count() < LEGS_PER_CHORD * self.count()
+        D == 3 && Self::show_corners(Self::legs(points).count(), self.count())
+    }
+
+    /// The same of so many legs and chords.
+    pub(super) fn show_corners(legs: usize, chords: usize) -> bool {
+        legs < LEGS_PER_CHORD * chords
     }
 
     /// The point at which the way turns back, if it does: the fit of one curve ends there.
@@ -200,18 +189,53 @@ impl Ramp {
     }
 }
 
+/// The end of each longest chord from which no point is farther away than `near`.
+fn ends<const D: usize>(
+    point: &impl Fn(usize) -> SVector<f64, D>,
+    last: usize,
+    near: f64,
+) -> impl Iterator<Item = usize> {
+    let next = move |from: usize| {
+        // Doubling finds a chord that is too long, halving the longest below it.
+        let (mut good, mut step) = (from + 1, 2);
+        let mut bad = last + 1;
+        while good < last {
+            let to = (from + step).min(last);
+            if spans(point, from..to, near) {
+                good = to;
+                step *= 2;
+            } else {
+                bad = to;
+                break;
+            }
+        }
+        while good + 1 < bad {
+            let middle = good.midpoint(bad);
+            if spans(point, from..middle, near) {
+                good = middle;
+            } else {
+                bad = middle;
+            }
+        }
+        good
+    };
+    let ends = std::iter::successors(Some(0), move |from| (*from < last).then(|| next(*from)));
+    ends.skip(1)
+}
+
 /// Whether all points between two are near the chord from one to the other, in order.
-fn spans<const D: usize>(points: &[SVector<f64, D>], range: Range<usize>, near: f64) -> bool {
-    let Range {
-        start: from,
-        end: to,
-    } = range;
-    let chord = points[to] - points[from];
+fn spans<const D: usize>(
+    point: &impl Fn(usize) -> SVector<f64, D>,
+    range: Range<usize>,
+    near: f64,
+) -> bool {
+    let from = point(range.start);
+    let chord = point(range.end) - from;
     let length = chord.norm();
     let unit = if length > 0.0 { chord / length } else { chord };
     let mut most = 0.0_f64;
-    points[from + 1..to].iter().all(|point| {
-        let off = point - points[from];
+    (range.start + 1..range.end).all(|i| {
+        let off = point(i) - from;
         let along = off.dot(&unit);
         let away = off - unit * along.clamp(0.0, length);
         let ordered = along >= most - near;

@@ -9,7 +9,7 @@ use crate::smooth::poly;
 use crate::{JointPoint, Path, PathPoint, ToolPoint};
 
 /// Knot intervals of the fit from one knot that the time law sees to the next.
-const SEEN: usize = 4;
+pub(super) const SEEN: usize = 4;
 
 /// A fitted curve of the tool. Its only joint is its parameter, which nothing limits: the time law
 /// follows from the limits of the tool.
@@ -22,6 +22,9 @@ pub(super) struct Curve<const D: usize> {
     /// Rotation vector (rad, axes of the start) by which a curve of places is turned from its start to its end.
     turn: Vector3<f64>,
     knots: Vec<f64>,
+    /// Parameter at which the fit begins, and at which the curve ends that it is a part of.
+    pub(super) from: f64,
+    end: f64,
 }
 
 impl<const D: usize> Curve<D> {
@@ -31,12 +34,22 @@ impl<const D: usize> Curve<D> {
         let mut knots: Vec<f64> = (0..spans).step_by(SEEN).map(|k| k as f64).collect();
         knots.push(spans as f64);
         Self {
+            knots,
+            ..Self::part((fit, spans as f64), units, start)
+        }
+    }
+
+    /// The same where the fit is a part of a curve, for now its beginning, and the curve ends at `end`.
+    pub(super) fn part((fit, end): (Fit<D>, f64), units: Units, start: &Isometry3<f64>) -> Self {
+        Self {
             fit,
             units,
             origin: start.translation.vector,
             rotation: start.rotation,
             turn: Vector3::zeros(),
-            knots,
+            knots: Vec::new(),
+            from: 0.0,
+            end,
         }
     }
 
@@ -52,7 +65,7 @@ impl<const D: usize> Curve<D> {
         if self.turn == Vector3::zeros() {
             return (self.rotation, [Vector3::zeros(); 3]);
         }
-        let share = Fade::over(self.end()).since(0.0);
+        let share = Fade::over(self.end).since(0.0);
         let [share, rate, rate2, rate3] = poly::quartic(&share, u);
         let axis = self.rotation * self.turn;
         let turned = self.rotation * UnitQuaternion::from_scaled_axis(self.turn * share);
@@ -61,7 +74,7 @@ impl<const D: usize> Curve<D> {
 
     /// Pose at a parameter.
     pub(super) fn pose(&self, at: f64) -> Isometry3<f64> {
-        let point = self.fit.point(at);
+        let point = self.fit.point(at - self.from);
         let place = self.origin + self.units.place(&point);
         let turn = if D > 3 {
             self.units.rotation(&point)
@@ -98,7 +111,7 @@ impl<const D: usize> Curve<D> {
 
 impl<const D: usize> Path<1> for Curve<D> {
     fn end(&self) -> f64 {
-        self.fit.spans() as f64
+        self.end
     }
 
     fn knots(&self) -> &[f64] {
@@ -119,7 +132,7 @@ impl<const D: usize> Path<1> for Curve<D> {
     }
 
     fn tool_at(&self, u: f64) -> ToolPoint {
-        let d = self.fit.derivatives(u);
+        let d = self.fit.derivatives(u - self.from);
         let place = self.origin + self.units.place(&d[0]);
         let (turn, angular) = if D > 3 {
             (self.units.rotation(&d[0]), self.angular(&d))

@@ -1,117 +1,102 @@
 //! A curve fitted through a long dense list, for callers that make its time law themselves, part by
 //! part.
 
-use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::chords::Chords;
-use super::curve::Curve;
+use super::curve::{Curve, SEEN};
 use super::fit::{Fit, Orientation};
+use super::list::List;
+use super::marks::Marks;
+use super::moved::Moved;
+use super::open::{AIM, Recipe};
+use super::part::FittedPart;
 use super::places::Units;
 use super::profile::Profile;
 use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
 use super::time_parameter::TimeParameter;
-use super::{TURNING, are_dense, is_limited, moved};
-use crate::line::{Line, body_turn};
-use crate::smooth::exact_stop;
+use super::{TURNING, are_dense, is_limited};
+use crate::line::body_turn;
 use crate::smooth::options::SmoothOptions;
-use crate::{Path, ToolCurve, ToolLimits, ToolPoint};
 
-/// Radius of the balls of the fit, as a share of the tolerance, and the largest share that the check
-/// of the curve accepts: the rest is for what follows the curve.
-const AIM: f64 = 0.96;
-const KEPT: f64 = 0.98;
 /// An angle (rad) by which an arm may be off where it rests, and the share of the angular tolerance that this may be: a list
 /// that turns by no more is fitted as one that does not turn.
 const OFF: f64 = 1e-9;
 const OFF_SHARE: f64 = 0.01;
-/// Parts of a knot interval in which the distance from the legs is bounded.
-const PARTS: f64 = 8.0;
 
 /// A smooth curve from the first pose of a long dense list to the last, without times: it passes all
 /// poses between them in order within 0.98 of the tolerances, and stays within 0.98 of the corridor.
-/// That is known of the whole curve before anything moves along it.
 ///
-/// As a [`ToolCurve`] its parameter is of no meaning; its derivatives are continuous up to the
-/// fourth.
+/// The curve is not kept, as a list may be long: four bytes for each pose say how it is made. A [`FittedPart`]
+/// makes it, part by part, from the poses, to the last bit the same each time, and checks it.
 #[derive(Clone, Debug)]
 pub struct FittedCurve {
-    kind: Kind,
-    /// Parameter at which each pose between the ends is passed.
-    passes: Vec<f64>,
-    corridor_ratio: f64,
+    pub(super) start: Isometry3<f64>,
+    /// The poses without repeats, where the list has some.
+    pub(super) moved: Option<Arc<Moved>>,
+    pub(super) recipe: Recipe,
+    pub(super) turning: bool,
+    /// Half width of the corridor, in balls.
+    pub(super) corridor: f64,
     exact_stop: f64,
 }
 
-/// A curve of places, or of places and orientations.
-#[derive(Clone, Debug)]
-enum Kind {
-    Places(Curve<3>),
-    Turns(Curve<7>),
-}
-
 impl FittedCurve {
-    /// The curve through a list, the first pose of which is the start. `None` where another way of
-    /// planning may be better or is needed: a list that is short or not dense all along, a way that
-    /// turns back, a tolerance that shows each corner, a fit that fails.
+    /// The curves from `start` through a list that are worth a try, one after the other: each may turn out to miss
+    /// a pose where it is made ([`FittedPart::check`]), then the next is one with more knots. None where another
+    /// way of planning may be better or is needed: a list that is short or not dense all along, a way that
+    /// turns back, a tolerance that shows each corner.
     ///
     /// ```
     /// use nalgebra::Isometry3;
-    /// use trajectory::{ToolCurve, ToolLimits, smooth::{FittedCurve, SmoothOptions}};
+    /// use trajectory::{ToolLimits, smooth::{FittedCurve, SmoothOptions}};
     /// let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
     /// let at = |i: i32| 0.002 * f64::from(i);
     /// let poses: Vec<_> = (0..500)
     ///     .map(|i| Isometry3::translation(0.1 * at(i).cos(), 0.1 * at(i).sin(), 0.0))
     ///     .collect();
-    /// let curve = FittedCurve::new(&poses, &SmoothOptions::new(1e-4, limits)).unwrap();
-    /// let passed = curve.at(curve.passes()[99]).pose;
+    /// let options = SmoothOptions::new(1e-4, limits);
+    /// let curve = FittedCurve::all(&poses[0], &poses[1..], &options).next().unwrap();
+    /// let mut part = curve.begin(&poses[1..]).unwrap();
+    /// assert!(part.cover(&curve, &poses[1..], curve.end()) && part.check());
+    /// let passed = part.tool(part.passes(&curve, 99)[0]).pose;
     /// let missed = passed.translation.vector - poses[100].translation.vector;
     /// assert!(missed.norm() < 1e-4);
     /// ```
-    #[must_use]
-    pub fn new(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Self> {
-        options.check(poses).ok()?;
-        let options = &options.finite();
-        let mut list = moved(poses);
-        if !is_limited(options) || !are_dense(&list, options) {
-            return None;
-        }
-        if let Cow::Owned(list) = &mut list {
-            // The last pose is met exactly, also if it repeats one before it by rounding.
-            *list.last_mut()? = poses[poses.len() - 1];
-        }
-        let units = Units::new(options);
-        let slight = slight_turn(&list, options);
-        let turning = slight.is_none() && list.windows(2).any(TURNING);
-        let (kind, parameters, corridor_ratio) = if turning {
-            let mut laid = Laid::<7>::new(&list, units, &options.limits)?;
-            let parameters = std::mem::take(&mut laid.curve.fit.parameters);
-            (Kind::Turns(laid.curve), parameters, laid.far)
-        } else {
-            let mut laid = Laid::<3>::new(&list, units, &options.limits)?;
-            let parameters = std::mem::take(&mut laid.curve.fit.parameters);
-            let curve = laid.curve.turned(slight.unwrap_or_default());
-            (Kind::Places(curve), parameters, laid.far)
-        };
-        Some(Self {
-            kind,
-            passes: passes(poses, &list, parameters),
-            corridor_ratio: corridor_ratio * units.length / options.corridor(),
-            exact_stop: exact_stop::duration(poses, &options.limits),
-        })
+    pub fn all<'a>(
+        start: &'a Isometry3<f64>,
+        poses: &'a [Isometry3<f64>],
+        options: &SmoothOptions,
+    ) -> impl Iterator<Item = Self> + use<'a> {
+        let mut trials = Trials::new(List::new(start, poses), options);
+        std::iter::from_fn(move || trials.as_mut()?.next())
     }
 
-    /// Parameter at which each pose between the first and the last is passed, in order.
+    /// The begin of the curve, made from the poses after the start; `None` where it cannot be fitted.
     #[must_use]
-    pub fn passes(&self) -> &[f64] {
-        &self.passes
+    pub fn begin(&self, poses: &[Isometry3<f64>]) -> Option<FittedPart> {
+        FittedPart::new(self, poses)
     }
 
-    /// Bound of the distance from the legs between the poses over the corridor's half width.
+    /// Last value of its parameter, which has no meaning.
     #[must_use]
-    pub fn corridor_ratio(&self) -> f64 {
-        self.corridor_ratio
+    pub fn end(&self) -> f64 {
+        self.recipe.marks.spans() as f64
+    }
+
+    /// Number of the last of the knots that a time law sees; the first is 0.
+    #[must_use]
+    pub fn last_knot(&self) -> usize {
+        self.recipe.marks.spans().div_ceil(SEEN)
+    }
+
+    /// Parameter at a knot.
+    #[must_use]
+    pub fn knot(&self, index: usize) -> f64 {
+        (index * SEEN).min(self.recipe.marks.spans()) as f64
     }
 
     /// Time the motion would take with a stop at each pose, s.
@@ -119,199 +104,168 @@ impl FittedCurve {
     pub fn exact_stop(&self) -> f64 {
         self.exact_stop
     }
-}
 
-impl ToolCurve for FittedCurve {
-    fn end(&self) -> f64 {
-        match &self.kind {
-            Kind::Places(curve) => curve.end(),
-            Kind::Turns(curve) => curve.end(),
-        }
-    }
-
-    fn knots(&self) -> Vec<f64> {
-        match &self.kind {
-            Kind::Places(curve) => curve.knots().to_vec(),
-            Kind::Turns(curve) => curve.knots().to_vec(),
-        }
-    }
-
-    fn at(&self, u: f64) -> ToolPoint {
-        match &self.kind {
-            Kind::Places(curve) => curve.tool_at(u),
-            Kind::Turns(curve) => curve.tool_at(u),
+    /// The poses that are fitted.
+    pub(super) fn list<'a>(&'a self, poses: &'a [Isometry3<f64>]) -> List<'a> {
+        match &self.moved {
+            Some(moved) => List::of(&moved.poses),
+            None => List::new(&self.start, poses),
         }
     }
 }
 
-/// The curve through a list that is checked at every place, and its greatest distance from the legs
-/// in balls.
-struct Laid<const D: usize> {
-    curve: Curve<D>,
-    far: f64,
+/// Why a curve cannot be made.
+enum Unfit {
+    /// A fit fails.
+    Fit,
+    /// The way is none for one curve.
+    Way,
 }
 
-impl<const D: usize> Laid<D> {
-    /// `None` if the list needs another way of planning.
-    fn new(poses: &[Isometry3<f64>], units: Units, limits: &ToolLimits) -> Option<Self> {
-        let points = units.points::<D>(poses);
-        let parameters = {
-            let chords = Chords::new(&points);
-            if !chords.turning_points(&points).is_empty() || chords.shows_corners(&points) {
-                return None;
-            }
-            chords.parameters(&points)
-        };
-        let laying = Laying {
-            points,
-            parameters,
-            units,
-            start: poses[0],
-            limits: *limits,
-        };
-        let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
-        let fitting = |(_, way): &(f64, Orientation)| D > 3 || *way == Orientation::Along;
-        let mut ways = ways.into_iter().flatten().filter(fitting);
-        ways.find_map(|(density, way)| laying.laid(density, way))
-    }
-}
-
-/// What a curve is laid through.
-struct Laying<const D: usize> {
-    points: Vec<SVector<f64, D>>,
-    /// Parameters along the chords.
-    parameters: Vec<f64>,
+/// The curves that are tried for a list.
+struct Trials<'a> {
+    given: List<'a>,
+    moved: Option<Arc<Moved>>,
+    options: SmoothOptions,
     units: Units,
-    start: Isometry3<f64>,
-    limits: ToolLimits,
+    turning: bool,
+    slight: Vector3<f64>,
+    /// Straight legs of the list.
+    legs: usize,
+    next: usize,
 }
 
-impl<const D: usize> Laying<D> {
-    /// A curve with so many times the knots: over the time that a first one takes, or else that one.
-    fn laid(&self, density: f64, way: Orientation) -> Option<Laid<D>> {
-        let first = self.along_chords(density, way)?;
-        // The first one is not held beside the other: it is seldom wanted again.
-        self.over_time(first, density, way)
-            .or_else(|| self.checked(self.along_chords(density, way)?))
+impl<'a> Trials<'a> {
+    fn new(given: List<'a>, options: &SmoothOptions) -> Option<Self> {
+        given.check(options).ok()?;
+        let options = options.finite();
+        if !is_limited(&options) {
+            return None;
+        }
+        let moved = Moved::new(&given).map(Arc::new);
+        let list = moved.as_ref().map_or(given, |moved| List::of(&moved.poses));
+        let legs = are_dense(&list, &options)?;
+        let slight = slight_turn(&list, &options);
+        let turning = slight.is_none() && list.legs().any(|leg| TURNING(&leg.map(|pose| *pose)));
+        Some(Self {
+            given,
+            units: Units::new(&options),
+            options,
+            turning,
+            slight: slight.unwrap_or_default(),
+            legs,
+            next: 0,
+            moved,
+        })
     }
 
-    /// A fit over the chords.
-    fn along_chords(&self, density: f64, way: Orientation) -> Option<Fit<D>> {
-        let parameters = scaled(&self.parameters, density);
-        Fit::in_blocks((&self.points, &parameters), (AIM, way))
+    fn next(&mut self) -> Option<FittedCurve> {
+        let ways = ORIENTATIONS.map(|way| DENSITIES.map(|density| (density, way)));
+        let ways = ways.as_flattened();
+        let ways = &ways[..if self.turning {
+            ways.len()
+        } else {
+            DENSITIES.len()
+        }];
+        while self.next < 2 * ways.len() {
+            let (way, timed) = (ways[self.next / 2], self.next.is_multiple_of(2));
+            self.next += 1;
+            let marks = if self.turning {
+                self.marks::<7>(way, timed)
+            } else {
+                self.marks::<3>(way, timed)
+            };
+            match marks {
+                Ok(marks) => return Some(self.curve(marks, way.1)),
+                Err(Unfit::Way) => self.next = 2 * ways.len(),
+                // Then no curve of so many knots.
+                Err(Unfit::Fit) => self.next += usize::from(timed),
+            }
+        }
+        None
     }
 
-    /// A curve over the time that another one takes bends less where it is fast.
-    fn over_time(&self, fit: Fit<D>, density: f64, way: Orientation) -> Option<Laid<D>> {
-        let mut curve = self.curve(fit);
+    fn curve(&self, marks: Marks, orientation: Orientation) -> FittedCurve {
+        FittedCurve {
+            start: *self.given.at(0),
+            moved: self.moved.clone(),
+            recipe: Recipe {
+                marks,
+                units: self.units,
+                orientation,
+                slight: self.slight,
+            },
+            turning: self.turning,
+            corridor: self.options.corridor() / self.units.length,
+            exact_stop: self.given.exact_stop(&self.options.limits),
+        }
+    }
+
+    /// Parameters with so many times the knots: over about the time of a first fit, or over its chords.
+    fn marks<const D: usize>(
+        &self,
+        (density, way): (f64, Orientation),
+        timed: bool,
+    ) -> Result<Marks, Unfit> {
+        let list = self
+            .moved
+            .as_ref()
+            .map_or(self.given, |moved| List::of(&moved.poses));
+        let mut count = 0;
+        let of = |poses: &[Isometry3<f64>], own: Range<usize>| {
+            let points = self.units.points::<D>(poses);
+            let chords = Chords::new(&points);
+            if !chords.turning_points(&points).is_empty() {
+                return Err(Unfit::Way);
+            }
+            count += chords.corners.iter().filter(|i| own.contains(i)).count();
+            let parameters = scaled(&chords.parameters(&points), density);
+            if !timed {
+                return Ok(parameters);
+            }
+            let fit = Fit::in_blocks((&points, &parameters), (AIM, way)).ok_or(Unfit::Fit)?;
+            drop((points, parameters));
+            Ok(self.over_time(fit, &poses[0], density))
+        };
+        let marks = Marks::new(&list, &self.options, of)?;
+        // The tolerance of a list that does not turn may show its corners.
+        if D == 3 && Chords::show_corners(self.legs, count) {
+            return Err(Unfit::Way);
+        }
+        Ok(marks)
+    }
+
+    /// Parameters over the time that a curve takes: one over these bends less where it is fast.
+    fn over_time<const D: usize>(
+        &self,
+        fit: Fit<D>,
+        start: &Isometry3<f64>,
+        density: f64,
+    ) -> Vec<f64> {
+        let mut curve = Curve::new(fit, self.units, start);
         let mut parameters = std::mem::take(&mut curve.fit.parameters);
-        let limits = &self.limits;
+        let limits = &self.options.limits;
         let profile = Profile::new(&curve, limits);
         let timed = (|time| profile.parameter(time), profile.duration());
         let ramp = limits.acceleration / limits.jerk;
         TimeParameter::new(&curve, timed, ramp, density * FIT_KNOTS).change(&mut parameters);
-        drop((curve, profile));
-        let fit = Fit::in_blocks((&self.points, &parameters), (AIM, way))?;
-        self.checked(fit)
+        parameters
     }
-
-    /// A curve that passes everywhere as it should.
-    fn checked(&self, fit: Fit<D>) -> Option<Laid<D>> {
-        let far = off_legs(&fit, &self.points);
-        let good = passes_all(&fit, &self.points) && far <= KEPT;
-        good.then(|| Laid {
-            curve: self.curve(fit),
-            far,
-        })
-    }
-
-    fn curve(&self, fit: Fit<D>) -> Curve<D> {
-        Curve::new(fit, self.units, &self.start)
-    }
-}
-
-/// Whether a fit passes all points in order within their balls.
-fn passes_all<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> bool {
-    let ordered = fit.parameters.windows(2).all(|pair| pair[0] <= pair[1]);
-    let near = |(at, point): (&f64, &SVector<f64, D>)| {
-        let off = fit.point(*at) - point;
-        super::places::size(&off) <= KEPT
-    };
-    ordered && fit.parameters.iter().zip(points).all(near)
-}
-
-/// A bound of the distance in place of a fit from the leg that it is on, everywhere.
-///
-/// Between two places the curve is no farther from the chord over them than an eighth of the square
-/// of their distance in the parameter times the largest second derivative, and a chord is no farther
-/// from a leg than its ends are. The second derivative is a cubic spline whose control points are the
-/// second differences of those of the curve, so none is larger than these.
-fn off_legs<const D: usize>(fit: &Fit<D>, points: &[SVector<f64, D>]) -> f64 {
-    let place = |point: &SVector<f64, D>| Vector3::new(point[0], point[1], point[2]);
-    let bends: Vec<f64> = fit
-        .control
-        .windows(3)
-        .map(|c| place(&(c[0] - c[1] * 2.0 + c[2])).norm())
-        .collect();
-    let bend = |span: usize| bends[span..span + 4].iter().copied().fold(0.0, f64::max);
-    let mut most = 0.0_f64;
-    for (leg, at) in points.windows(2).zip(fit.parameters.windows(2)) {
-        let (from, way) = (place(&leg[0]), place(&(leg[1] - leg[0])));
-        let square = way.norm_squared().max(1e-300);
-        let off = |u: f64| {
-            let gap = place(&fit.point(u)) - from;
-            (gap - way * (gap.dot(&way) / square).clamp(0.0, 1.0)).norm()
-        };
-        let mut start = at[0];
-        let mut before = off(start);
-        while start < at[1] {
-            // No part reaches over a knot.
-            let end = (((start * PARTS).floor() + 1.0) / PARTS).min(at[1]);
-            let span = (start as usize).min(fit.spans() - 1);
-            let step = end - start;
-            let after = off(end);
-            most = most.max(before.max(after) + step * step / 8.0 * bend(span));
-            (start, before) = (end, after);
-        }
-    }
-    if most.is_nan() { f64::INFINITY } else { most }
 }
 
 /// The turn (rotation vector, rad, axes of the first pose) from the first pose to the last of a list in which no pose is
 /// turned from the first by more than an arm may be off there.
-fn slight_turn(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Vector3<f64>> {
+fn slight_turn(list: &List<'_>, options: &SmoothOptions) -> Option<Vector3<f64>> {
     let most = OFF.min(OFF_SHARE * options.angular_tolerance());
-    let turn = |pose: &Isometry3<f64>| body_turn(&poses[0].rotation, &pose.rotation);
-    let still = poses.iter().all(|pose| turn(pose).norm() <= most);
-    still.then(|| poses.last().map_or(Vector3::zeros(), turn))
-}
-
-/// The parameter of each pose between the ends of a list, of which `list` has those that differ from
-/// the one before and more between them.
-fn passes(poses: &[Isometry3<f64>], list: &[Isometry3<f64>], mut parameters: Vec<f64>) -> Vec<f64> {
-    if list == poses {
-        parameters.remove(0);
-        parameters.pop();
-        return parameters;
-    }
-    let (mut kept, mut at) = (poses[0], 0);
-    let mut passes = Vec::with_capacity(poses.len());
-    for pose in &poses[1..poses.len().max(2) - 1] {
-        if !Line::new(kept, *pose).is_still() {
-            kept = *pose;
-            at += 1;
-            while at + 1 < list.len() && list[at] != kept {
-                at += 1;
-            }
-        }
-        passes.push(parameters[at]);
-    }
-    passes
+    let turn = |pose: &Isometry3<f64>| body_turn(&list.at(0).rotation, &pose.rotation);
+    let still = list.iter().all(|pose| turn(pose).norm() <= most);
+    still.then(|| turn(list.last()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ToolCurve, ToolLimits};
     use nalgebra::{UnitQuaternion, Vector3};
 
     /// A list that turns by no more than an arm is off at its start is fitted as one that does not turn, and its curve
@@ -332,13 +286,19 @@ mod tests {
         };
         let options = SmoothOptions::new(1e-4, limits);
         poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::new(3e-10, 0.0, -1e-10));
-        let curve = FittedCurve::new(&poses, &options).unwrap();
-        assert!(matches!(curve.kind, Kind::Places(_)));
-        for (u, pose) in [(0.0, poses[0]), (curve.end(), poses[499])] {
+        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
+            .next()
+            .unwrap();
+        assert!(!curve.turning);
+        let end = curve.end();
+        let mut part = curve.begin(&poses[1..]).unwrap();
+        assert!(part.cover(&curve, &poses[1..], end) && part.check());
+        let curve = part;
+        for (u, pose) in [(0.0, poses[0]), (end, poses[499])] {
             let turned = (curve.at(u).pose.rotation.inverse() * pose.rotation).scaled_axis();
             assert!(turned.norm() < 1e-15, "{turned}");
         }
-        let (u, d) = (0.3 * curve.end(), 1e-3 * curve.end());
+        let (u, d) = (0.3 * end, 1e-3 * end);
         let [before, here, after] = [u - d, u, u + d].map(|u| curve.at(u));
         let rate = (before.pose.rotation.inverse() * after.pose.rotation).scaled_axis() / (2.0 * d);
         let off = (rate - here.angular[0]).norm();
@@ -348,7 +308,9 @@ mod tests {
             here.angular[0]
         );
         poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * 1e-4);
-        let curve = FittedCurve::new(&poses, &options).unwrap();
-        assert!(matches!(curve.kind, Kind::Turns(_)));
+        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
+            .next()
+            .unwrap();
+        assert!(curve.turning);
     }
 }

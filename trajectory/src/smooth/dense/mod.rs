@@ -16,6 +16,11 @@ mod curve;
 mod fit;
 mod fitted;
 mod fitting;
+mod list;
+mod marks;
+mod moved;
+mod open;
+mod part;
 mod places;
 mod profile;
 mod section;
@@ -34,6 +39,8 @@ use super::rest::RestCause;
 use crate::line::{Line, body_turn};
 use chords::Chords;
 pub use fitted::FittedCurve;
+use list::List;
+pub use part::FittedPart;
 use places::Units;
 use section::Section;
 pub(super) use spans::spans_along;
@@ -98,19 +105,27 @@ pub(super) fn is_dense(given: &[Isometry3<f64>], options: &SmoothOptions) -> boo
 /// Whether a list needs no other way of planning: it is long, and dense all along. Straight legs with few
 /// poses on them count as one leg each.
 pub(super) fn suffices(given: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
-    are_dense(&moved(given), options)
+    are_dense(&List::of(&moved(given)), options).is_some()
 }
 
-/// The same of poses without repeats.
-fn are_dense(poses: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
-    let points = Units::new(options).points::<3>(poses);
-    let corners = Chords::legs(&points).corners;
-    let even = |pair: &[Isometry3<f64>]| leg(pair, options) <= LONGEST * LEG;
-    if poses.len() > SPLIT * corners.len() {
-        return poses.len() > BOTH && poses.windows(2).all(even);
-    }
-    let ends: Vec<_> = corners.iter().map(|i| poses[*i]).collect();
-    ends.len() > BOTH && ends.windows(2).all(even)
+/// The same of poses without repeats: the number of straight legs if so. Nothing is kept of them, as a list may be
+/// long.
+fn are_dense(poses: &List<'_>, options: &SmoothOptions) -> Option<usize> {
+    let (units, origin) = (Units::new(options), poses.at(0).translation.vector);
+    let point = |i: usize| {
+        SVector::<f64, 3>::from((poses.at(i).translation.vector - origin) / units.length)
+    };
+    let even = |a: usize, b: usize| leg(&[*poses.at(a), *poses.at(b)], options) <= LONGEST * LEG;
+    let last = poses.len() - 1;
+    let legs = Chords::leg_ends(&point, last).count();
+    let dense = if poses.len() > SPLIT * (legs + 1) {
+        poses.len() > BOTH && (0..last).all(|i| even(i, i + 1))
+    } else {
+        let mut from = 0;
+        let mut leg_ends = Chords::leg_ends(&point, last);
+        legs + 1 > BOTH && leg_ends.all(|to| even(std::mem::replace(&mut from, to), to))
+    };
+    dense.then_some(legs)
 }
 
 /// Whether a list that is not dense may be fitted: the place changes along most of the way, as a curve
@@ -138,15 +153,23 @@ fn leg(pair: &[Isometry3<f64>], options: &SmoothOptions) -> f64 {
 
 /// The poses without repeats, and with more of them where the tool turns far.
 fn moved(given: &[Isometry3<f64>]) -> Cow<'_, [Isometry3<f64>]> {
-    let stays = |pair: &[Isometry3<f64>]| {
-        let turn = body_turn(&pair[0].rotation, &pair[1].rotation);
-        Line::new(pair[0], pair[1]).is_still() || parts(&turn) > 1
-    };
-    if !given.windows(2).any(stays) {
-        return Cow::Borrowed(given);
+    match moved_list(&List::of(given)) {
+        Some(poses) => Cow::Owned(poses),
+        None => Cow::Borrowed(given),
     }
-    let mut poses = vec![given[0]];
-    for pose in &given[1..] {
+}
+
+/// The same of a list; `None` where nothing changes.
+fn moved_list(given: &List<'_>) -> Option<Vec<Isometry3<f64>>> {
+    let stays = |[from, to]: [&Isometry3<f64>; 2]| {
+        let turn = body_turn(&from.rotation, &to.rotation);
+        Line::new(*from, *to).is_still() || parts(&turn) > 1
+    };
+    if !given.legs().any(stays) {
+        return None;
+    }
+    let mut poses = vec![*given.at(0)];
+    for [_, pose] in given.legs() {
         let from = poses[poses.len() - 1];
         if Line::new(from, *pose).is_still() {
             continue;
@@ -162,7 +185,7 @@ fn moved(given: &[Isometry3<f64>]) -> Cow<'_, [Isometry3<f64>]> {
         }
         poses.push(*pose);
     }
-    Cow::Owned(poses)
+    Some(poses)
 }
 
 /// Straight lines of quaternions that stand for a turn.

@@ -31,8 +31,18 @@ impl Units {
 
     /// The points of the poses, each relative to the first position.
     pub(super) fn points<const D: usize>(&self, poses: &[Isometry3<f64>]) -> Vec<SVector<f64, D>> {
-        let origin = poses[0].translation.vector;
-        let mut before = poses[0].rotation.into_inner();
+        let first = &poses[0];
+        let since = (first.translation.vector, first.rotation.into_inner());
+        self.points_since(poses, since)
+    }
+
+    /// The points of poses in the middle of a list: relative to its first position, with the sign of the
+    /// quaternion before them.
+    pub(super) fn points_since<const D: usize>(
+        &self,
+        poses: &[Isometry3<f64>],
+        (origin, mut before): (Vector3<f64>, Quaternion<f64>),
+    ) -> Vec<SVector<f64, D>> {
         let mut points = Vec::with_capacity(poses.len());
         for pose in poses {
             let mut point = SVector::zeros();
