@@ -21,14 +21,14 @@ pub(super) struct Ball<const D: usize> {
     pub(super) slide: Option<[f64; D]>,
     /// Where the place alone says when it is passed.
     pub(super) lead: Option<Lead>,
+    /// Slope of the barrier along the passing time.
+    pub(super) slope: f64,
 }
 
 /// The passing time as a function of the place alone.
 pub(super) struct Lead {
     /// By how much it falls with each coordinate of each control point.
     pub(super) falls: [[f64; 3]; 5],
-    /// Slope of the barrier along it.
-    slope: f64,
     /// Weight of a passing time that is another one.
     pub(super) tie: f64,
 }
@@ -52,6 +52,7 @@ impl<const D: usize> Ball<D> {
             stiff: 0.0,
             slide: None,
             lead: None,
+            slope: 0.0,
         };
         let mut damping = 0.0;
         let heavy = at.problem.heavy(point);
@@ -69,6 +70,13 @@ impl<const D: usize> Ball<D> {
         ball.stiff = (0..D).map(|d| ball.bent[d] * v[d]).sum::<f64>() + damping;
         if at.problem.is_led(i) && ball.stiff > 0.0 {
             ball.lead(&[p, v, a], goal, &slopes);
+        }
+        if let Some(shifts) = at.shifts {
+            ball.gradient = ball.times(&shifts[i]).map(|x| -x);
+        }
+        // Elsewhere it is passed where the barrier does not depend on the time.
+        if ball.lead.is_some() || at.shifts.is_some() {
+            ball.slope = (0..D).map(|d| ball.gradient[d] * v[d]).sum();
         }
         if !at.slides.is_empty() {
             let mut slide = [0.0; D];
@@ -95,14 +103,8 @@ impl<const D: usize> Ball<D> {
             |i: usize| [0, 1, 2].map(|d| (self.weights[i] * v[d] + slopes[i] * y[d]) / curvature);
         self.lead = Some(Lead {
             falls: [0, 1, 2, 3, 4].map(fall),
-            slope: (0..D).map(|d| self.gradient[d] * v[d]).sum(),
             tie: TIE * self.stiff,
         });
-    }
-
-    /// The slope of the barrier along the passing time.
-    pub(super) fn slope(&self) -> f64 {
-        self.lead.as_ref().map_or(0.0, |lead| lead.slope)
     }
 
     /// By how much the passing time moves with a step of the free control points, in knots.
@@ -133,7 +135,7 @@ impl<const D: usize> Ball<D> {
                     .map(|(a, b)| a * b)
                     .sum::<f64>();
         }
-        -pull / self.stiff
+        -(pull + self.slope) / self.stiff
     }
 
     /// The Hessian times a vector.
@@ -144,6 +146,15 @@ impl<const D: usize> Ball<D> {
             row[0] * own[0] + row[1] * own[1] + row[2] * own[2]
         };
         std::array::from_fn(entry)
+    }
+
+    /// The gradient without the passing time.
+    pub(super) fn eliminated_gradient(&self) -> [f64; D] {
+        if self.stiff <= 0.0 {
+            return self.gradient;
+        }
+        let share = self.slope / self.stiff;
+        std::array::from_fn(|d| self.gradient[d] - share * self.bent[d])
     }
 
     /// The Hessian without the passing time: it couples all coordinates.

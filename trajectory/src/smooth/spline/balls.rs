@@ -88,7 +88,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         let tie = ball.lead.as_ref().map_or(0.0, |lead| lead.tie);
         let column = self
             .passes
-            .push(first, ball.stiff + tie, [drawn, ball.slope()]);
+            .push(first, ball.stiff + tie, [drawn, ball.slope]);
         for g in 0..Problem::<D>::GROUPS {
             for i in 0..5 {
                 let Some(k) = (ball.first + i).checked_sub(4).filter(|k| *k < free) else {
@@ -117,11 +117,12 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// Adds a ball whose passing time is eliminated.
     fn add_eliminated(&mut self, ball: &Ball<D>) {
         let hessian = ball.eliminated();
+        let gradient = ball.eliminated_gradient();
         let mut border = [0.0; D];
         if let Some(slide) = &ball.slide {
             for d in 0..D {
                 border[d] = dot(&hessian[d], slide);
-                self.gradient_z += ball.gradient[d] * slide[d];
+                self.gradient_z += gradient[d] * slide[d];
                 self.hessian_z += slide[d] * border[d];
             }
         }
@@ -133,7 +134,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         let points = self.sides[rows.clone()].chunks_exact_mut(D);
         for (sides, w) in points.zip(&w[from..to]) {
             for (d, side) in sides.iter_mut().enumerate() {
-                side[0] += w * ball.gradient[d];
+                side[0] += w * gradient[d];
                 side[1] += w * border[d];
             }
         }

@@ -11,9 +11,23 @@ pub(super) struct Iterate<'a, const D: usize> {
     pub(super) pinned: [[[f64; D]; 2]; 4],
     /// How each control point moves with `z` if the end is in motion; empty if it rests.
     pub(super) slides: Vec<[f64; D]>,
+    /// Where inner vertices are to move: by how much each. Then there are no slopes but those that pull the balls along.
+    pub(super) shifts: Option<&'a [[f64; D]]>,
 }
 
-impl<const D: usize> Iterate<'_, D> {
+impl<'a, const D: usize> Iterate<'a, D> {
+    /// An iterate in its bounds.
+    pub(super) fn new(problem: &'a Problem<D>, point: &'a Point<D>, room: &'a Room) -> Self {
+        Self {
+            problem,
+            point,
+            room,
+            pinned: problem.pinned(point.z),
+            slides: problem.slides(point),
+            shifts: None,
+        }
+    }
+
     /// How each control point moves with `z`; empty if none does.
     pub(super) fn moves(&self) -> Vec<[f64; D]> {
         let still = |pin: &[[f64; D]; 2]| pin[1].iter().all(|x| *x == 0.0);

@@ -78,31 +78,44 @@ impl<const D: usize, const B: usize> System<D, B> {
         room: &Room,
         t: f64,
     ) -> Option<Step> {
+        let at = Iterate::new(problem, point, room);
+        self.of(&at, t)
+    }
+
+    /// The step with which an iterate at a centre follows its inner vertices, to first order, when each moves by so much.
+    pub(crate) fn shift(
+        &mut self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        (room, shifts): (&Room, &[[f64; D]]),
+    ) -> Option<Step> {
+        let at = Iterate {
+            shifts: Some(shifts),
+            ..Iterate::new(problem, point, room)
+        };
+        self.of(&at, 0.0)
+    }
+
+    /// The step of an iterate.
+    fn of(&mut self, at: &Iterate<'_, D>, t: f64) -> Option<Step> {
         if Self::STRIDE > 3 {
             self.band.clear();
         }
         (self.gradient_z, self.hessian_z) = (t, 0.0);
-        let at = Iterate {
-            problem,
-            point,
-            room,
-            pinned: problem.pinned(point.z),
-            slides: problem.slides(point),
-        };
-        let coordinates = Coordinates::of(&point.control);
+        let coordinates = Coordinates::of(&at.point.control);
         let moves = at.moves();
         let moves = (!moves.is_empty()).then(|| Coordinates::of(&moves));
         for g in 0..Problem::<D>::GROUPS {
             Build::detect().run(Sum {
-                at: &at,
+                at,
                 coordinates: &coordinates,
                 moves: moves.as_ref(),
                 g,
                 norms: &mut self.norms,
             });
-            self.place(g);
+            self.place(g, at.shifts.is_none());
         }
-        self.balls(&at);
+        self.balls(at);
         self.solve(&at.slides)
     }
 
@@ -137,7 +150,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         }
         let times: Vec<f64> = self.around.iter().map(|ball| ball.time(&control)).collect();
         let passes = self.around.iter().zip(&times);
-        let passing: f64 = passes.map(|(ball, time)| ball.slope() * time).sum();
+        let passing: f64 = passes.map(|(ball, time)| ball.slope * time).sum();
         let slope = self.gradient_z * z + falls + passing;
         (slope < 0.0 && slope.is_finite()).then_some(Step {
             control,
@@ -147,15 +160,17 @@ impl<const D: usize, const B: usize> System<D, B> {
         })
     }
 
-    /// Writes the sums of limits and corridors of group `g` into the sides and the band.
-    fn place(&mut self, g: usize) {
+    /// Writes the sums of limits and corridors of group `g` into the sides and the band, with or without their slopes.
+    fn place(&mut self, g: usize, sloping: bool) {
         let free = self.sides.len() / D;
-        self.gradient_z += self.norms.along_z[0];
+        let steep = if sloping { 1.0 } else { 0.0 };
+        self.gradient_z += steep * self.norms.along_z[0];
         self.hessian_z += self.norms.along_z[1];
         for k in 0..free {
             let row = Self::row(free, k, g);
             for d in 0..3 {
-                self.sides[row + d] = self.norms.side(k + 4, d);
+                let [slope, border] = self.norms.side(k + 4, d);
+                self.sides[row + d] = [steep * slope, border];
             }
             let Some(columns) = self.band.columns[row..].first_chunk_mut::<3>() else {
                 continue;

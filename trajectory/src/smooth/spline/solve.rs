@@ -25,13 +25,23 @@ pub(crate) struct Effort {
     pub(crate) onward: bool,
 }
 
-/// Growth of the weight on `z` at each centre.
+/// Growth of the weight on `z` at each centre, and the square of the Newton decrement at one.
 const GROWTH: f64 = 8.0;
+const CENTRE: f64 = 3.0;
+
+/// The same where the orientation is a part of the search: thousands of bounds that are curved shorten a long step to a
+/// twentieth. With a small growth a step or two lead far enough, and what the decrement tells is a small share of the
+/// parameter of the barrier.
+const TURNING: f64 = 2.0;
+const LOOSELY: f64 = 3000.0;
 
 /// Steps shortened to this fraction, this many times in a row, mean that the iterate is stuck
 /// between constraints far from its centre: the weight is then lowered, once.
 const SHORT: f64 = 0.1;
 const STUCK: usize = 4;
+
+/// Rounds in which a trial looks for the passes.
+const ROUNDS: usize = 3;
 
 /// Square of the Newton decrement from which short steps are normal, because the weight has just
 /// been raised.
@@ -55,9 +65,10 @@ const ROUGH: f64 = 0.1;
 struct Pace {
     /// Most Newton steps.
     steps: usize,
-    /// Growth of the weight on `z` at each centre, and the square of the Newton decrement at one.
+    /// Growth of the weight on `z` at each centre, and the square of the Newton decrement at one and at the last.
     growth: f64,
     centre: f64,
+    last: f64,
     /// Square of the decrement from which short steps are normal.
     low: f64,
     /// Share of each slack that a step must leave.
@@ -73,11 +84,12 @@ impl Pace {
         if problem.finish.is_none() {
             return Self {
                 steps: effort.steps,
-                growth: GROWTH,
-                centre: 3.0,
+                growth: if D > 3 { TURNING } else { GROWTH },
+                centre: if D > 3 { LOOSELY } else { CENTRE },
+                last: if D > 3 { ROUGHLY } else { CENTRE },
                 low: LOW,
                 keep: KEEP,
-                rounds: 3,
+                rounds: ROUNDS,
                 near: if effort.gap > ROUGH { 3.0 } else { 0.1 },
             };
         }
@@ -88,6 +100,7 @@ impl Pace {
             steps: BETWEEN,
             growth: 1.2,
             centre: 1.0,
+            last: 1.0,
             low: 0.0,
             keep: 0.5,
             rounds: 12,
@@ -152,10 +165,9 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             return done.then_some(count);
         };
         let moved = iteration.take(&step);
-        let centre = if done { iteration.pace.centre } else { ROUGHLY };
-        let centred = step.decrement < centre;
+        let centred = step.decrement < iteration.centre(done);
         let looks = done && (!moved || centred || (count + 1).is_multiple_of(AIMING));
-        let missed = iteration.aim(aims.filter(|_| looks));
+        let missed = iteration.aim(&mut system, aims.filter(|_| looks));
         if moved && !centred {
             continue;
         }
@@ -231,6 +243,17 @@ impl<'a, const D: usize> Iteration<'a, D> {
         }
     }
 
+    /// Square of the Newton decrement that is near enough to a centre, for an iterate that is `done` or not.
+    fn centre(&self, done: bool) -> f64 {
+        if !done {
+            ROUGHLY
+        } else if self.is_at_its_end() {
+            self.pace.last
+        } else {
+            self.pace.centre
+        }
+    }
+
     /// Goes along a step as far as it helps; false where it does not.
     fn take(&mut self, step: &Step) -> bool {
         let barrier = &self
@@ -239,7 +262,9 @@ impl<'a, const D: usize> Iteration<'a, D> {
         let share = self
             .known
             .search(barrier, self.point, step, self.pace.rounds);
-        let short = self.bounds.tight && share < SHORT && step.decrement < self.pace.low;
+        // At the end there is nothing to come back to.
+        let ends = self.is_at_its_end() && step.decrement < self.pace.last;
+        let short = self.bounds.tight && share < SHORT && step.decrement < self.pace.low && !ends;
         if self.slow.is_new(short) {
             self.weight = self.weight.min(self.first_weight());
         }
@@ -247,8 +272,8 @@ impl<'a, const D: usize> Iteration<'a, D> {
     }
 
     /// [`aim`].
-    fn aim(&mut self, aims: Option<Aims<'_, D>>) -> f64 {
-        let seen = (&self.bounds.room, &mut self.known);
+    fn aim<const B: usize>(&mut self, system: &mut System<D, B>, aims: Option<Aims<'_, D>>) -> f64 {
+        let seen = (system, &self.bounds.room, &mut self.known);
         aim(self.problem, self.point, seen, aims)
     }
 
@@ -336,57 +361,83 @@ const AIMED: f64 = 1e-4;
 /// Share of each slack that moved vertices must leave.
 const LEAVE: f64 = 0.3;
 
-/// Moves the inner vertices to where the motion of the iterate sees them, as far as it stays well inside; by how
-/// much they are still off, in radii of their balls.
-fn aim<const D: usize>(
+/// Moves the inner vertices to where the motion of the iterate sees them: at once, if it stays well inside, else with the
+/// iterate, as far as it stays so. By how much they may still be off, in radii of their balls.
+fn aim<const D: usize, const B: usize>(
     problem: &mut Problem<D>,
-    point: &Point<D>,
-    (room, known): (&Room, &mut Known),
+    point: &mut Point<D>,
+    (system, room, known): (&mut System<D, B>, &Room, &mut Known),
     aims: Option<Aims<'_, D>>,
 ) -> f64 {
     let Some(aims) = aims.map(|aims| aims(problem, point)) else {
         return 0.0;
     };
-    let before = (problem.vertices.clone(), problem.ways.clone());
-    let look = |problem: &Problem<D>, slacks: &[f64]| {
-        let barrier = Barrier {
-            problem,
-            room,
-            weight: 0.0,
-            keep: LEAVE,
-        };
-        barrier.look(point, slacks)
+    let shift = |(aim, from): (&[f64; D], &[f64; D])| -> [f64; D] {
+        std::array::from_fn(|d| if d < D - 3 { 0.0 } else { aim[d] - from[d] })
     };
-    let Some(seen) = look(problem, &[]) else {
+    let shifts: Vec<[f64; D]> = aims.iter().zip(problem.inner()).map(shift).collect();
+    let radius = problem.groups[D / 3 - 1].radius;
+    let far = |shift: &[f64; D]| shift.iter().map(|x| x * x).sum::<f64>().sqrt() / radius;
+    let off = shifts.iter().map(far).fold(0.0, f64::max);
+    let Some(seen) = left(problem, room, point, &[]) else {
         return 0.0;
     };
-    let radius = problem.groups[D / 3 - 1].radius;
-    let off = aims.iter().zip(problem.inner()).map(|(aim, vertex)| {
-        let off: f64 = (D - 3..D).map(|d| (aim[d] - vertex[d]).powi(2)).sum();
-        off.sqrt() / radius
-    });
-    let off = off.fold(0.0, f64::max);
+    let before = problem.vertices.clone();
+    shifted(problem, &before, (&shifts, 1.0));
+    if let Some(seen) = left(problem, room, point, &seen.slacks) {
+        known.keep(room, seen);
+        return 0.0;
+    }
+    shifted(problem, &before, (&shifts, 0.0));
+    let Some(step) = system.shift(problem, point, (room, &shifts)) else {
+        return off;
+    };
     let mut share = 1.0;
     for _ in 0..5 {
-        for ((to, from), aim) in problem.vertices[1..]
-            .iter_mut()
-            .zip(&before.0[1..])
-            .zip(&aims)
-        {
-            for d in D - 3..D {
-                to[d] = from[d] + share * (aim[d] - from[d]);
-            }
-        }
-        problem.ways = ways(&problem.vertices);
-        if let Some(seen) = look(problem, &seen.slacks) {
-            known.room = room.clone();
-            known.seen = Some(seen);
-            return off * (1.0 - share);
+        shifted(problem, &before, (&shifts, share));
+        let mut trial = point.clone();
+        go(problem, (point, &mut trial), (&step, share));
+        project(problem, &mut trial, Some(room), ROUNDS);
+        if let Some(seen) = left(problem, room, &trial, &seen.slacks) {
+            known.keep(room, seen);
+            *point = trial;
+            return off;
         }
         share *= 0.4;
     }
-    (problem.vertices, problem.ways) = before;
+    shifted(problem, &before, (&shifts, 0.0));
     off
+}
+
+/// Moves the inner vertices from where they were `before` by a share of their shifts.
+fn shifted<const D: usize>(
+    problem: &mut Problem<D>,
+    before: &[[f64; D]],
+    (shifts, share): (&[[f64; D]], f64),
+) {
+    let inner = problem.vertices.iter_mut().zip(before).skip(1);
+    for ((to, from), shift) in inner.zip(shifts) {
+        for d in 0..D {
+            to[d] = from[d] + share * shift[d];
+        }
+    }
+    problem.ways = ways(&problem.vertices);
+}
+
+/// The barrier at an iterate, if enough is left of the slacks `before`.
+fn left<const D: usize>(
+    problem: &Problem<D>,
+    room: &Room,
+    point: &Point<D>,
+    before: &[f64],
+) -> Option<Seen> {
+    let barrier = Barrier {
+        problem,
+        room,
+        weight: 0.0,
+        keep: LEAVE,
+    };
+    barrier.look(point, before)
 }
 
 /// What is known of the barrier at the iterate, under these bounds.
@@ -399,6 +450,12 @@ impl Known {
     fn nothing(room: &Room) -> Self {
         let room = room.clone();
         Self { room, seen: None }
+    }
+
+    /// Keeps what is seen under these bounds.
+    fn keep(&mut self, room: &Room, seen: Seen) {
+        self.room = room.clone();
+        self.seen = Some(seen);
     }
 
     /// [`search`] from the iterate that is known, unless a bound has changed.
@@ -506,24 +563,7 @@ fn search<const D: usize>(
     };
     let mut trial = point.clone();
     for _ in 0..40 {
-        trial.z = point.z + share * step.z;
-        let free = trial.control.iter_mut().zip(&point.control).skip(4);
-        for ((to, from), delta) in free.zip(step.control.chunks_exact(D)) {
-            for d in 0..D {
-                to[d] = from[d] + share * delta[d];
-            }
-        }
-        follow(problem, &mut trial, point.z);
-        problem.pin(&mut trial);
-        trial.crossings.copy_from_slice(&point.crossings);
-        for (time, change) in trial
-            .crossings
-            .iter_mut()
-            .zip(&step.times)
-            .filter(|_| D > 3)
-        {
-            *time += share * change;
-        }
+        go(problem, (point, &mut trial), (step, share));
         project(problem, &mut trial, Some(barrier.room), rounds);
         if let Some(there) = barrier.look(&trial, &seen.slacks)
             && barrier.value(&trial, &there) < here - 0.01 * share * step.decrement
@@ -534,6 +574,28 @@ fn search<const D: usize>(
         share *= BACK;
     }
     (0.0, Some(seen))
+}
+
+/// Moves a trial to where a share of a step leads from an iterate.
+fn go<const D: usize>(
+    problem: &Problem<D>,
+    (point, trial): (&Point<D>, &mut Point<D>),
+    (step, share): (&Step, f64),
+) {
+    trial.z = point.z + share * step.z;
+    let free = trial.control.iter_mut().zip(&point.control).skip(4);
+    for ((to, from), delta) in free.zip(step.control.chunks_exact(D)) {
+        for d in 0..D {
+            to[d] = from[d] + share * delta[d];
+        }
+    }
+    follow(problem, trial, point.z);
+    problem.pin(trial);
+    trial.crossings.copy_from_slice(&point.crossings);
+    let times = trial.crossings.iter_mut().zip(&step.times);
+    for (time, change) in times.filter(|_| D > 3) {
+        *time += share * change;
+    }
 }
 
 /// Lets the free control points follow those that two ends in motion fix, which do not move evenly with `z`:

@@ -20,8 +20,10 @@ const HELD: f64 = 0.3;
 pub(super) const FEWEST: f64 = 12.0;
 pub(super) const MOST: f64 = 700.0;
 
-/// Spans for each vertex of one that turns, if they are fewer.
+/// Spans for each vertex of one that turns, if they are fewer, and the share of them where knots are farther apart than
+/// usual.
 const TURNING: f64 = 58.0;
+const ROUGH: f64 = 0.8;
 
 /// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;
@@ -71,13 +73,13 @@ impl Schedule {
 }
 
 /// Most spans of a spline through so many vertices. One that turns needs twice the work for each span, and its steps are
-/// longer where knots are farther apart.
-fn most<const D: usize>(vertices: usize) -> f64 {
+/// longer where knots are farther apart. `knots` is the number of them in one time `A / J`.
+fn most<const D: usize>(vertices: usize, knots: f64) -> f64 {
     if D == 3 {
-        MOST
-    } else {
-        (TURNING * vertices as f64).clamp(0.5 * MOST, MOST)
+        return MOST;
     }
+    let share = if knots < KNOTS_PER_RAMP { ROUGH } else { 1.0 };
+    share * (TURNING * vertices as f64).clamp(0.5 * MOST, MOST)
 }
 
 /// First iterate of a problem, with at least so many `knots` in one time `A / J`; also sets the `scale` of the
@@ -101,7 +103,7 @@ pub(crate) fn first<const D: usize>(
     let smoothing = ramp.min(0.5 * schedule.duration / (schedule.dips + 1) as f64);
     let total = schedule.duration + smoothing;
     let finest = total / (8 * (schedule.dips + 1)) as f64;
-    let most = most::<D>(problem.vertices.len());
+    let most = most::<D>(problem.vertices.len(), knots);
     let h = coarse.min(finest).min(total / FEWEST).max(total / most);
     let spans = (total / h).ceil().clamp(FEWEST, MOST) as usize + 3;
     problem.scale = if moving {
