@@ -38,14 +38,26 @@ impl Found {
 
     /// The faster of two, the first if they are equal.
     pub(super) fn faster(first: Option<Self>, second: Option<Self>) -> Option<Self> {
+        Some(Self::ordered(first, second)?.0)
+    }
+
+    /// The same, and the other one.
+    pub(super) fn ordered(
+        first: Option<Self>,
+        second: Option<Self>,
+    ) -> Option<(Self, Option<Self>)> {
         let (mut first, mut second) = match (first, second) {
             (Some(first), Some(second)) => (first, second),
-            (first, second) => return first.or(second),
+            (first, second) => return Some((first.or(second)?, None)),
         };
         let later = second.before.0 < first.before.0;
         let before = if later { second.before } else { first.before };
         (first.before, second.before) = (before, before);
         let better = second.plan.duration() < first.plan.duration();
-        Some(if better { second } else { first })
+        Some(if better {
+            (second, Some(first))
+        } else {
+            (first, Some(second))
+        })
     }
 }

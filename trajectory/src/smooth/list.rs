@@ -101,9 +101,9 @@ impl<'a> List<'a> {
     /// tolerance, and where no certificate holds.
     fn fastest(&self) -> Option<SmoothPlan> {
         let form = &NormalForm::new(self.poses, self.options)?;
-        let first = self.at_first(form)?;
+        let (first, other) = self.at_first(form)?;
         let best = if self.is_doubtful(&first) {
-            self.compared(form, first)?
+            self.compared(form, first, other)?
         } else {
             first
         };
@@ -112,8 +112,8 @@ impl<'a> List<'a> {
         Some(plan)
     }
 
-    /// The motion of the way of planning that suits the list, or the faster one of two.
-    fn at_first(&self, form: &NormalForm) -> Option<Found> {
+    /// The motion of the way of planning that suits the list; or the faster one of two, and the other one.
+    fn at_first(&self, form: &NormalForm) -> Option<(Found, Option<Found>)> {
         let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
         let fitted = if dense { self.fitted(form) } else { None };
         let enough = fitted.as_ref().is_some_and(Found::suffices);
@@ -121,15 +121,15 @@ impl<'a> List<'a> {
             .as_ref()
             .is_some_and(|fitted| self.is_fitted_alone(fitted));
         if alone || enough && dense::suffices(&form.poses, &form.options) {
-            return fitted;
+            return Some((fitted?, None));
         }
         let spline = self.by_spline(form);
         let spline = spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
-        let best = Found::faster(fitted, spline)?;
+        let (best, other) = Found::ordered(fitted, spline)?;
         if self.options.is_rough() || dense || !self.is_slow(&best) || !self.may_be_fitted(form) {
-            return Some(best);
+            return Some((best, other));
         }
-        Found::faster(Some(best), self.fitted(form))
+        Found::ordered(Some(best), self.fitted(form))
     }
 
     /// Whether a curve may be fitted through the list.
@@ -173,10 +173,10 @@ impl<'a> List<'a> {
         !self.options.is_rough() && (found.is_divided() || (far && self.poses.len() > FEW))
     }
 
-    /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need, of a
-    /// search that starts from the motion, and, where an attempt failed, the list is too long for that, or the motion is still far above the
+    /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need, of
+    /// searches that start from the motion and, if that is far above the bound then, from the one of another way of planning, and, where an attempt failed, the list is too long for that, or the motion is still far above the
     /// bound, of those within less of the tolerance.
-    fn compared(&self, form: &NormalForm, first: Found) -> Option<Found> {
+    fn compared(&self, form: &NormalForm, first: Found, other: Option<Found>) -> Option<Found> {
         let (hard, mut best) = (first.is_hard(), first);
         if best.is_divided() && !self.is_fitted_alone(&best) {
             let turned = form.turned(self.poses, self.options);
@@ -186,6 +186,10 @@ impl<'a> List<'a> {
         // A long list that was divided at seams only is as fast within less.
         if best.is_divided() && self.is_fitted_alone(&best) {
             return Some(best);
+        }
+        // A search may end elsewhere from the slower one of two motions.
+        if let Some(other) = other.filter(|_| best.plan.duration() > FAR * self.least) {
+            best = Found::faster(Some(best), Some(self.refined(form, other)))?;
         }
         let far = best.plan.duration() > FAR * self.least;
         if hard || far || best.is_hard() || self.is_long() {
