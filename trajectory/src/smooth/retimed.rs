@@ -122,3 +122,41 @@ impl Path<1> for Way<'_> {
         self.tool(u)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smooth::choose::{Then, from_rest};
+
+    /// Along the way of a motion that was planned for half of the limits the fastest law takes as much less as the limits
+    /// say, and keeps the way; a second one saves nothing.
+    #[test]
+    fn a_law_along_the_way_is_faster() {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            ..ToolLimits::UNLIMITED
+        };
+        let at = |i: u32| {
+            let a = 0.3 * f64::from(i);
+            Isometry3::translation(0.05 * a.cos(), 0.05 * a.sin(), 0.002 * f64::from(i % 2))
+        };
+        let poses: Vec<_> = (0..16).map(at).collect();
+        let within = |limits| SmoothOptions::new(1e-3, limits).finite();
+        // A quarter of the acceleration and an eighth of the jerk: the same motion in twice the time.
+        let slow = ToolLimits {
+            speed: 0.25,
+            acceleration: 1.25,
+            jerk: 12.5,
+            ..limits
+        };
+        let known = from_rest(&poses, &within(slow), Then::Stop);
+        let faster = motion(&known, (&poses, &within(limits)), 0.998).unwrap();
+        let ratio = faster.duration() / known.duration();
+        assert!((0.49..0.51).contains(&ratio), "{ratio}");
+        let (certificate, _) = certify(&faster.spans, &poses, &within(limits));
+        assert!(certificate.worst_limit() <= 1.0 + 1e-9);
+        assert!(motion(&faster, (&poses, &within(limits)), 0.99).is_none());
+    }
+}

@@ -159,8 +159,8 @@ impl<const D: usize, const B: usize> System<D, B> {
 #[cfg(test)]
 mod tests {
     use crate::smooth::spline::barrier::Barrier;
-    use crate::smooth::spline::newton::System;
-    use crate::smooth::spline::problem::{Group, Problem, Room, ways};
+    use crate::smooth::spline::newton::{Step, System};
+    use crate::smooth::spline::problem::{Group, Point, Problem, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::start;
 
@@ -218,6 +218,82 @@ mod tests {
             }
             assert!((whole.z - apart.z).abs() < 1e-7 * whole.z.abs());
             assert!((whole.decrement / apart.decrement - 1.0).abs() < 1e-7);
+        }
+    }
+
+    /// Moves an iterate along a step.
+    fn moved(
+        problem: &Problem<6>,
+        room: &Room,
+        (point, step): (&Point<6>, &Step),
+        share: f64,
+    ) -> Point<6> {
+        let mut moved = point.clone();
+        moved.z += share * step.z;
+        let free = moved.control.iter_mut().skip(4);
+        for (control, change) in free.zip(step.control.chunks_exact(6)) {
+            for d in 0..6 {
+                control[d] += share * change[d];
+            }
+        }
+        project(problem, &mut moved, Some(room), 20);
+        moved
+    }
+
+    /// From a centre, an iterate that follows its inner vertices is nearer to the new centre than one that stays, by the square
+    /// of the decrement; what is left is that the legs move, too. With either band it is the same step.
+    #[test]
+    fn an_iterate_at_a_centre_follows_its_vertices() {
+        for led in [false, true] {
+            let mut problem = problem(0.0);
+            problem.led = vec![led; 3];
+            let mut point = start::first(&mut problem, None, start::KNOTS_PER_RAMP);
+            problem.pin(&mut point);
+            project(&problem, &mut point, None, 20);
+            let room = Room::new(&problem, &point);
+            let weight = 0.1 * problem.parameter(&point) / point.z;
+            let mut system = System::<6, 20>::new(&point);
+            for _ in 0..400 {
+                let step = system.step(&problem, &point, &room, weight);
+                let Some(step) = step.filter(|step| step.decrement > 1e-18) else {
+                    break;
+                };
+                let share = 1.0 / (1.0 + step.decrement.sqrt());
+                point = moved(&problem, &room, (&point, &step), share);
+            }
+            let shifts: Vec<[f64; 6]> = [1e-4, -2e-4, 3e-4]
+                .map(|x| [0.0, 0.0, 0.0, x, 0.5 * x, -x])
+                .to_vec();
+            let shift = system.shift(&problem, &point, (&room, &shifts)).unwrap();
+            if !led {
+                let mut whole = System::<6, 36>::new(&point);
+                let whole = whole.shift(&problem, &point, (&room, &shifts)).unwrap();
+                near(&whole, &shift, 1e-6);
+            }
+            for (vertex, shift) in problem.vertices[1..].iter_mut().zip(&shifts) {
+                for d in 0..6 {
+                    vertex[d] += shift[d];
+                }
+            }
+            problem.ways = ways(&problem.vertices);
+            project(&problem, &mut point, Some(&room), 20);
+            let left = |system: &mut System<6, 20>, point: &Point<6>| {
+                let step = system.step(&problem, point, &room, weight);
+                step.map_or(0.0, |step| step.decrement)
+            };
+            let stays = left(&mut system, &point);
+            let followed = moved(&problem, &room, (&point, &shift), 1.0);
+            let follows = left(&mut system, &followed);
+            assert!(follows < 0.7 * stays, "led {led}: {follows} of {stays}");
+        }
+    }
+
+    /// Whether two steps are the same up to a share of their size.
+    fn near(a: &Step, b: &Step, share: f64) {
+        let size = a.control.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        assert!(size > 0.0);
+        for (a, b) in a.control.iter().zip(&b.control) {
+            assert!((a - b).abs() < share * size, "{a} {b} of {size}");
         }
     }
 
