@@ -264,7 +264,11 @@ fn a_start_that_is_off_changes_little() {
         broken(dense().map(turning), off_at_its_start, SAME),
         [""; 0]
     );
-    assert_eq!(broken(all(), off_at_its_start, NOISY), [""; 0]);
+    // List 7 has two motions 4 % apart, and the last bits say which one is found (decision 0180).
+    let (seven, others): (Vec<_>, Vec<_>) = all().partition(|list| list.name == "random 7");
+    assert_eq!(broken(others.into_iter(), off_at_its_start, NOISY), [""; 0]);
+    let bound = Bound::Longer(0.05);
+    assert_eq!(broken(seven.into_iter(), off_at_its_start, bound), [""; 0]);
 }
 
 /// A list that closes, but for what its start is off, begins and ends where it was given, to the last digits.

@@ -94,7 +94,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         motion: &Move,
     ) -> Result<Checked<N>, NoWay> {
-        let mut part = curve.begin(&motion.poses).ok_or(NoWay::Curve)?;
+        let mut part = FittedPart::begin(curve, &motion.poses).ok_or(NoWay::Curve)?;
         let covered = |part: &mut FittedPart, to: f64| {
             let good = part.cover(curve, &motion.poses, to) && part.check();
             good.then_some(()).ok_or(NoWay::Curve)
@@ -294,7 +294,7 @@ mod tests {
         let Ok(Checked { joints: along, .. }) = checked else {
             panic!("the arm does not follow");
         };
-        let mut part = curve.begin(&motion.poses).unwrap();
+        let mut part = FittedPart::begin(&curve, &motion.poses).unwrap();
         assert!(along.count() >= 3, "{}", along.count());
         for index in 0..along.count() {
             let to = *grid(&curve, index).last().unwrap();

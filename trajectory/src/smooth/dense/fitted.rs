@@ -2,7 +2,6 @@
 //! part.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -13,7 +12,6 @@ use super::list::List;
 use super::marks::Marks;
 use super::moved::Moved;
 use super::open::{AIM, Recipe};
-use super::part::FittedPart;
 use super::places::Units;
 use super::profile::Profile;
 use super::section::{DENSITIES, FIT_KNOTS, ORIENTATIONS, scaled};
@@ -30,13 +28,13 @@ const OFF_SHARE: f64 = 0.01;
 /// A smooth curve from the first pose of a long dense list to the last, without times: it passes all
 /// poses between them in order within 0.98 of the tolerances, and stays within 0.98 of the corridor.
 ///
-/// The curve is not kept, as a list may be long: four bytes for each pose say how it is made. A [`FittedPart`]
-/// makes it, part by part, from the poses, to the last bit the same each time, and checks it.
+/// The curve is not kept, as a list may be long: four bytes for each pose say how it is made. A part of it at hand
+/// (`FittedPart`) makes it, part by part, from the poses, to the last bit the same each time, and checks it.
 #[derive(Clone, Debug)]
 pub struct FittedCurve {
     pub(super) start: Isometry3<f64>,
     /// The poses without repeats, where the list has some.
-    pub(super) moved: Option<Arc<Moved>>,
+    pub(super) moved: Option<Moved>,
     pub(super) recipe: Recipe,
     pub(super) turning: bool,
     /// Half width of the corridor, in balls.
@@ -46,13 +44,13 @@ pub struct FittedCurve {
 
 impl FittedCurve {
     /// The curves from `start` through a list that are worth a try, one after the other: each may turn out to miss
-    /// a pose where it is made ([`FittedPart::check`]), then the next is one with more knots. None where another
+    /// a pose where it is made (`FittedPart::check`), then the next is one with more knots. None where another
     /// way of planning may be better or is needed: a list that is short or not dense all along, a way that
     /// turns back, a tolerance that shows each corner.
     ///
     /// ```
     /// use nalgebra::Isometry3;
-    /// use trajectory::{ToolLimits, smooth::{FittedCurve, SmoothOptions}};
+    /// use trajectory::{ToolLimits, smooth::{FittedCurve, FittedPart, SmoothOptions}};
     /// let limits = ToolLimits { speed: 0.5, acceleration: 5.0, jerk: 100.0, ..ToolLimits::UNLIMITED };
     /// let at = |i: i32| 0.002 * f64::from(i);
     /// let poses: Vec<_> = (0..500)
@@ -60,7 +58,7 @@ impl FittedCurve {
     ///     .collect();
     /// let options = SmoothOptions::new(1e-4, limits);
     /// let curve = FittedCurve::all(&poses[0], &poses[1..], &options).next().unwrap();
-    /// let mut part = curve.begin(&poses[1..]).unwrap();
+    /// let mut part = FittedPart::begin(&curve, &poses[1..]).unwrap();
     /// assert!(part.cover(&curve, &poses[1..], curve.end()) && part.check());
     /// let passed = part.tool(part.passes(&curve, 99)[0]).pose;
     /// let missed = passed.translation.vector - poses[100].translation.vector;
@@ -73,12 +71,6 @@ impl FittedCurve {
     ) -> impl Iterator<Item = Self> + use<'a> {
         let mut trials = Trials::new(List::new(start, poses), options);
         std::iter::from_fn(move || trials.as_mut()?.next())
-    }
-
-    /// The begin of the curve, made from the poses after the start; `None` where it cannot be fitted.
-    #[must_use]
-    pub fn begin(&self, poses: &[Isometry3<f64>]) -> Option<FittedPart> {
-        FittedPart::new(self, poses)
     }
 
     /// Last value of its parameter, which has no meaning.
@@ -125,7 +117,7 @@ enum Unfit {
 /// The curves that are tried for a list.
 struct Trials<'a> {
     given: List<'a>,
-    moved: Option<Arc<Moved>>,
+    moved: Option<Moved>,
     options: SmoothOptions,
     units: Units,
     turning: bool,
@@ -142,7 +134,7 @@ impl<'a> Trials<'a> {
         if !is_limited(&options) {
             return None;
         }
-        let moved = Moved::new(&given).map(Arc::new);
+        let moved = Moved::new(&given);
         let list = moved.as_ref().map_or(given, |moved| List::of(&moved.poses));
         let legs = are_dense(&list, &options)?;
         let slight = slight_turn(&list, &options);
@@ -260,57 +252,4 @@ fn slight_turn(list: &List<'_>, options: &SmoothOptions) -> Option<Vector3<f64>>
     let turn = |pose: &Isometry3<f64>| body_turn(&list.at(0).rotation, &pose.rotation);
     let still = list.iter().all(|pose| turn(pose).norm() <= most);
     still.then(|| turn(list.last()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{ToolCurve, ToolLimits};
-    use nalgebra::{UnitQuaternion, Vector3};
-
-    /// A list that turns by no more than an arm is off at its start is fitted as one that does not turn, and its curve
-    /// meets both ends.
-    #[test]
-    fn a_start_that_is_off_is_met() {
-        let at = |i: i32| 0.002 * f64::from(i);
-        let mut poses: Vec<_> = (0..500)
-            .map(|i| Isometry3::translation(0.1 * at(i).cos(), 0.1 * at(i).sin(), 0.0))
-            .collect();
-        let limits = ToolLimits {
-            speed: 0.5,
-            acceleration: 5.0,
-            jerk: 100.0,
-            angular_speed: 2.0,
-            angular_acceleration: 20.0,
-            angular_jerk: 400.0,
-        };
-        let options = SmoothOptions::new(1e-4, limits);
-        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::new(3e-10, 0.0, -1e-10));
-        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
-            .next()
-            .unwrap();
-        assert!(!curve.turning);
-        let end = curve.end();
-        let mut part = curve.begin(&poses[1..]).unwrap();
-        assert!(part.cover(&curve, &poses[1..], end) && part.check());
-        let curve = part;
-        for (u, pose) in [(0.0, poses[0]), (end, poses[499])] {
-            let turned = (curve.at(u).pose.rotation.inverse() * pose.rotation).scaled_axis();
-            assert!(turned.norm() < 1e-15, "{turned}");
-        }
-        let (u, d) = (0.3 * end, 1e-3 * end);
-        let [before, here, after] = [u - d, u, u + d].map(|u| curve.at(u));
-        let rate = (before.pose.rotation.inverse() * after.pose.rotation).scaled_axis() / (2.0 * d);
-        let off = (rate - here.angular[0]).norm();
-        assert!(
-            off < 1e-5 * here.angular[0].norm(),
-            "{rate} {}",
-            here.angular[0]
-        );
-        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * 1e-4);
-        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
-            .next()
-            .unwrap();
-        assert!(curve.turning);
-    }
 }

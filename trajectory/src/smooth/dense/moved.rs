@@ -7,7 +7,7 @@ use super::moved_list;
 use crate::line::Line;
 
 /// The poses without repeats, and with more of them where the tool turns far.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Moved {
     pub(super) poses: Vec<Isometry3<f64>>,
     /// Which of them each pose of the list is.

@@ -36,7 +36,9 @@ macro_rules! with {
 }
 
 impl FittedPart {
-    pub(super) fn new(curve: &FittedCurve, poses: &[Isometry3<f64>]) -> Option<Self> {
+    /// The begin of a curve, made from the poses after the start; `None` where it cannot be fitted.
+    #[must_use]
+    pub fn begin(curve: &FittedCurve, poses: &[Isometry3<f64>]) -> Option<Self> {
         let kind = if curve.turning {
             Kind::Turns(Open::new(&curve.recipe, &curve.start))
         } else {
@@ -72,7 +74,7 @@ impl FittedPart {
 
     /// Frees the curve before a parameter, and the passes of the first poses after the start.
     pub fn forget(&mut self, curve: &FittedCurve, (from, passed): (f64, usize)) {
-        let pose = match curve.moved.as_deref() {
+        let pose = match curve.moved.as_ref() {
             Some(Moved { given, .. }) => given[passed.min(given.len() - 1)],
             None => passed,
         };
@@ -83,7 +85,7 @@ impl FittedPart {
     /// after the first `passed` of them to the last that is made.
     #[must_use]
     pub fn passes(&self, curve: &FittedCurve, passed: usize) -> Vec<f64> {
-        with!(&self.kind, open => match curve.moved.as_deref() {
+        with!(&self.kind, open => match curve.moved.as_ref() {
             Some(Moved { given, .. }) => {
                 let between = &given[..given.len() - 1];
                 let made = between.iter().skip(passed + 1).take_while(|pose| **pose < open.passed);
@@ -120,5 +122,58 @@ impl ToolCurve for FittedPart {
 
     fn at(&self, u: f64) -> ToolPoint {
         self.tool(u)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ToolCurve, ToolLimits};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// A list that turns by no more than an arm is off at its start is fitted as one that does not turn, and its curve
+    /// meets both ends.
+    #[test]
+    fn a_start_that_is_off_is_met() {
+        let at = |i: i32| 0.002 * f64::from(i);
+        let mut poses: Vec<_> = (0..500)
+            .map(|i| Isometry3::translation(0.1 * at(i).cos(), 0.1 * at(i).sin(), 0.0))
+            .collect();
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            angular_speed: 2.0,
+            angular_acceleration: 20.0,
+            angular_jerk: 400.0,
+        };
+        let options = SmoothOptions::new(1e-4, limits);
+        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::new(3e-10, 0.0, -1e-10));
+        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
+            .next()
+            .unwrap();
+        assert!(!curve.turning);
+        let end = curve.end();
+        let mut part = FittedPart::begin(&curve, &poses[1..]).unwrap();
+        assert!(part.cover(&curve, &poses[1..], end) && part.check());
+        let curve = part;
+        for (u, pose) in [(0.0, poses[0]), (end, poses[499])] {
+            let turned = (curve.at(u).pose.rotation.inverse() * pose.rotation).scaled_axis();
+            assert!(turned.norm() < 1e-15, "{turned}");
+        }
+        let (u, d) = (0.3 * end, 1e-3 * end);
+        let [before, here, after] = [u - d, u, u + d].map(|u| curve.at(u));
+        let rate = (before.pose.rotation.inverse() * after.pose.rotation).scaled_axis() / (2.0 * d);
+        let off = (rate - here.angular[0]).norm();
+        assert!(
+            off < 1e-5 * here.angular[0].norm(),
+            "{rate} {}",
+            here.angular[0]
+        );
+        poses[0].rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * 1e-4);
+        let curve = FittedCurve::all(&poses[0], &poses[1..], &options)
+            .next()
+            .unwrap();
+        assert!(curve.turning);
     }
 }
