@@ -128,7 +128,8 @@ impl ToolCurve for FittedPart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ToolCurve, ToolLimits};
+    use crate::ToolLimits;
+    use crate::smooth::SmoothOptions;
     use nalgebra::{UnitQuaternion, Vector3};
 
     /// A list that turns by no more than an arm is off at its start is fitted as one that does not turn, and its curve
