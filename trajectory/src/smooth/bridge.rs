@@ -189,6 +189,7 @@ impl Bridges<'_> {
             finish: Some(&ends[1]),
             then: Then::Stop,
             onward: self.search.onward,
+            backwards: false,
         };
         let most = ((to - from) * (1.0 - GAIN)).min(to - from - saved);
         let bridge = window.spline(Some(&known), most)?;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::angular_bounds::{ACTIVE, angular_bounds};
-use super::crossing::{self, Crossing, RESOLUTION};
+use super::crossing::{self, Crossing, RESOLUTION, backwards, forwards};
 use super::options::SmoothOptions;
 use super::poly::{halve, hull};
 use super::span::Span;
@@ -171,6 +171,17 @@ pub(crate) fn certify(
     certificate.in_order = crossings.iter().all(Crossing::holds);
     certificate.corridor = corridor(spans, poses, &crossings, options.corridor());
     (certificate, crossings)
+}
+
+/// The same of a motion that is made from its end to its start: its passes are those that are seen then.
+pub(super) fn certify_backwards(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> (Certificate, Vec<Crossing>) {
+    let (back, poses) = backwards(spans, poses);
+    let (certificate, passes) = certify(&back, &poses, options);
+    (certificate, forwards(passes, spans))
 }
 
 /// The same of a motion from rest to rest.

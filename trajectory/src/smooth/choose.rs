@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{Certificate, Peak, certify};
+use super::certificate::{Certificate, Peak, certify, certify_backwards};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
@@ -71,34 +71,42 @@ pub(crate) struct Window<'a> {
     pub(crate) then: Then,
     /// Whether a search between two ends in motion goes on where they hold it.
     pub(crate) onward: bool,
+    /// Whether the motion will be made from its end to its start: the first approaches to poses may be others then.
+    pub(crate) backwards: bool,
 }
 
-/// Fastest certified motion from rest in the first pose to rest in the last.
-pub(crate) fn from_rest(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
-    let motion = in_parts(poses, options, then);
+/// Fastest certified motion from rest in the first pose of a window to rest in its last.
+pub(crate) fn from_rest(window: &Window<'_>) -> Motion {
+    let motion = in_parts(window);
     if motion.rests.is_empty() {
         return motion;
     }
     // From a motion that rests, a search may find one that does not.
-    let window = Window::from_rest(poses, options, then);
     let through = window.spline(Some(&motion.spans), motion.duration());
     through.unwrap_or(motion)
 }
 
 /// The same, with stops where no spline is found.
-fn in_parts(poses: &[Isometry3<f64>], options: &SmoothOptions, then: Then) -> Motion {
+fn in_parts(window: &Window<'_>) -> Motion {
+    let Window { poses, options, .. } = *window;
     let stop = corners(poses, options);
     if poses.len() < 3 || options.tolerance <= RESOLUTION {
         return stop;
     }
-    let window = Window::from_rest(poses, options, then);
     if let Some(motion) = window.spline(None, stop.duration()) {
         return motion;
     }
     // A stop in the middle splits the window into two easier ones.
     let middle = poses.len() / 2;
-    let mut halves = in_parts(&poses[..=middle], options, Then::More);
-    let second = in_parts(&poses[middle..], options, then);
+    let mut halves = in_parts(&Window {
+        poses: &poses[..=middle],
+        then: Then::More,
+        ..*window
+    });
+    let second = in_parts(&Window {
+        poses: &poses[middle..],
+        ..*window
+    });
     halves.append(second, RestCause::Division);
     if halves.duration() < stop.duration() {
         halves
@@ -152,6 +160,16 @@ impl<'a> Window<'a> {
             finish: None,
             then,
             onward: false,
+            backwards: false,
+        }
+    }
+
+    /// The certificate of spans through the window and their passes, as they are seen when the motion is made.
+    fn certify(&self, spans: &[Span]) -> (Certificate, Vec<Crossing>) {
+        if self.backwards {
+            certify_backwards(spans, self.poses, self.options)
+        } else {
+            certify(spans, self.poses, self.options)
         }
     }
 
@@ -249,11 +267,11 @@ impl Attempts<'_> {
                 retried = true;
                 continue;
             };
-            let (mut certificate, mut crossings) = certify(&spans, poses, options);
+            let (mut certificate, mut crossings) = self.window.certify(&spans);
             let over = certificate.worst_limit();
             if over > 1.0 && over < 1.3 && moving.is_none() {
                 stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-                (certificate, crossings) = certify(&spans, poses, options);
+                (certificate, crossings) = self.window.certify(&spans);
             }
             let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
             if certificate.holds() && settled {
@@ -296,7 +314,12 @@ impl Attempts<'_> {
 
     /// Keeps the spans of a motion from rest that misses poses by the angle only, turned to them, if no faster ones are kept.
     fn keep(&mut self, spans: &[Span], crossings: &[Crossing], retried: bool) {
-        let Window { poses, options, .. } = self.window;
+        let Window {
+            poses,
+            options,
+            backwards,
+            ..
+        } = self.window;
         let near = |pass: &Crossing| {
             pass.deviation <= pass.tolerance && pass.angle <= TURNED * pass.angular_tolerance
         };
@@ -306,8 +329,9 @@ impl Attempts<'_> {
         let most = self.turned.as_ref().and_then(|(spans, _)| spans.last());
         let most = most.map_or(f64::INFINITY, Span::end);
         let motion = Motion::new(spans.to_vec(), Method::Spline);
-        let met = missed::met(&motion, poses, options).filter(|met| met.duration() < most);
-        let holds = |met: &Motion| certify(&met.spans, poses, options).0.holds();
+        let met = missed::met(&motion, (poses, backwards), options);
+        let met = met.filter(|met| met.duration() < most);
+        let holds = |met: &Motion| self.window.certify(&met.spans).0.holds();
         if let Some(met) = met.filter(holds) {
             self.turned = Some((met.spans, retried));
         }

@@ -83,6 +83,40 @@ pub(crate) fn crossings(
     result
 }
 
+/// The same, `back` if the motion is made from its end to its start: the first approaches may be others then.
+pub(super) fn crossings_made(
+    spans: &[Span],
+    (poses, back): (&[Isometry3<f64>], bool),
+    options: &SmoothOptions,
+) -> Vec<Crossing> {
+    if !back {
+        return crossings(spans, poses, options);
+    }
+    let (reversed, poses) = backwards(spans, poses);
+    forwards(crossings(&reversed, &poses, options), spans)
+}
+
+/// A motion and its poses from their end to their start.
+pub(super) fn backwards(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+) -> (Vec<Span>, Vec<Isometry3<f64>>) {
+    let total = spans.last().map_or(0.0, Span::end);
+    let spans = spans.iter().rev().map(|span| span.reversed(total));
+    (spans.collect(), poses.iter().rev().copied().collect())
+}
+
+/// Passes of the motion that goes through `spans` from its end to its start, as seen from their start.
+pub(super) fn forwards(mut passes: Vec<Crossing>, spans: &[Span]) -> Vec<Crossing> {
+    let (total, last) = (spans.last().map_or(0.0, Span::end), passes.len() + 1);
+    passes.reverse();
+    for pass in &mut passes {
+        pass.index = last - pass.index;
+        pass.time = total - pass.time;
+    }
+    passes
+}
+
 /// Distance (m) and angle (rad) between the motion at a moment and a pose.
 fn apart(spans: &[Span], start: &Isometry3<f64>, at: Moment, pose: &Isometry3<f64>) -> (f64, f64) {
     let (point, rotation) = match spans.get(at.span) {

@@ -263,8 +263,16 @@ impl<'a> List<'a> {
         let (poses, options) = (&form.poses, &form.options);
         let search = |from: &Motion| {
             let times = known.duration() / from.duration();
-            let motion = windows::refined(poses, options, from, times, dear)?;
-            self.certified(form, motion)
+            let found = |backwards| {
+                let motion = windows::refined(poses, options, (from, times), (dear, backwards))?;
+                self.certified(form, motion)
+            };
+            let first = found(false);
+            // Made from its end, a motion may miss poses that it passes from its start.
+            if first.is_none() && form.backwards {
+                return found(true);
+            }
+            first
         };
         let Some(sooner) = retimed::motion(known, (poses, options), GAIN) else {
             return [None, search(known)];
@@ -402,21 +410,26 @@ impl<'a> List<'a> {
     /// else that with which a search ends that starts there and passes those poses, too.
     fn repaired(&self, form: &NormalForm, mut motion: Motion) -> Option<(SmoothPlan, Motion)> {
         let placed = |motion: Motion| Some((self.placed(form, &motion)?, motion));
-        if self.poses.len() == self.given.len() {
+        let fewer = self.poses.len() < self.given.len();
+        if !fewer && !form.backwards {
             return None;
         }
         let whole = form.through(self.given, self.options);
+        let seen = |back| (&whole.poses[..], back);
         let mut through = form.poses.clone();
         for _ in 0..REPAIRS {
-            let met = missed::met(&motion, &whole.poses, &whole.options);
-            if let Some(good) = met.and_then(placed) {
+            let met = |back| missed::met(&motion, seen(back), &whole.options).and_then(placed);
+            if let Some(good) = met(false).or_else(|| met(form.backwards)) {
                 return Some(good);
             }
             let far = motion.duration() > WORSE * self.best.get();
-            through = missed::with(&through, &whole.poses, &motion.spans, &whole.options)
-                .filter(|_| !far)?;
-            let known = &motion;
-            motion = windows::refined(&through, &whole.options, known, WORSE, true)?;
+            if !fewer || far {
+                return None;
+            }
+            let with = |back| missed::with(&through, seen(back), &motion.spans, &whole.options);
+            through = with(false).or_else(|| with(form.backwards))?;
+            let known = (&motion, WORSE);
+            motion = windows::refined(&through, &whole.options, known, (true, false))?;
             if let Some(good) = placed(motion.clone()) {
                 return Some(good);
             }

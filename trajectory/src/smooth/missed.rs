@@ -6,7 +6,7 @@
 use nalgebra::Isometry3;
 
 use super::certificate::certify;
-use super::crossing::{Crossing, crossings};
+use super::crossing::{Crossing, crossings_made};
 use super::motion::Motion;
 use super::options::SmoothOptions;
 use super::span::{Span, stretch};
@@ -18,15 +18,16 @@ const ROUNDS: usize = 3;
 const STRETCH: f64 = 1.1;
 
 /// The motion with orientations that meet the poses, slowed down by a little where it turns too fast then; `None` where a
-/// pose is missed in place, or orientations cannot be turned.
+/// pose is missed in place, or orientations cannot be turned. `back` says that the motion is made from its end to its start.
 pub(super) fn met(
     motion: &Motion,
-    poses: &[Isometry3<f64>],
+    (poses, back): (&[Isometry3<f64>], bool),
     options: &SmoothOptions,
 ) -> Option<Motion> {
+    let seen = |motion: &Motion| crossings_made(&motion.spans, (poses, back), options);
     let near = |pass: &Crossing| pass.deviation <= pass.tolerance;
     let mut next = motion.clone();
-    let mut passes = crossings(&next.spans, poses, options);
+    let mut passes = seen(&next);
     for _ in 0..ROUNDS {
         if passes.iter().all(Crossing::holds) {
             break;
@@ -34,7 +35,7 @@ pub(super) fn met(
         if !passes.iter().all(near) || !turn(&mut next, &passes, poses, options) {
             return None;
         }
-        passes = crossings(&next.spans, poses, options);
+        passes = seen(&next);
     }
     if !passes.iter().all(Crossing::holds) {
         return None;
@@ -51,16 +52,17 @@ pub(super) fn met(
     Some(next)
 }
 
-/// Some of the poses of a list with those that a motion misses beside them, in order; `None` if it misses no others.
+/// Some of the poses of a list with those that a motion misses beside them, in order; `None` if it misses no others. `back` says that
+/// the motion is made from its end to its start.
 ///
 /// The poses that are known are among those of the list, to the last digit.
 pub(super) fn with(
     some: &[Isometry3<f64>],
-    poses: &[Isometry3<f64>],
+    (poses, back): (&[Isometry3<f64>], bool),
     spans: &[Span],
     options: &SmoothOptions,
 ) -> Option<Vec<Isometry3<f64>>> {
-    let passes = crossings(spans, poses, options);
+    let passes = crossings_made(spans, (poses, back), options);
     let missed = |k: usize| k > 0 && passes.get(k - 1).is_some_and(|pass| !pass.holds());
     let mut next = some.iter().peekable();
     let mut result = Vec::with_capacity(some.len());

@@ -126,7 +126,7 @@ impl Path<1> for Way<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smooth::choose::{Then, from_rest};
+    use crate::smooth::choose::{Then, Window, from_rest};
 
     /// Along the way of a motion that was planned for half of the limits the fastest law takes as much less as the limits
     /// say, and keeps the way; a second one saves nothing.
@@ -151,7 +151,7 @@ mod tests {
             jerk: 12.5,
             ..limits
         };
-        let known = from_rest(&poses, &within(slow), Then::Stop);
+        let known = from_rest(&Window::from_rest(&poses, &within(slow), Then::Stop));
         let faster = motion(&known, (&poses, &within(limits)), 0.998).unwrap();
         let ratio = faster.duration() / known.duration();
         assert!((0.49..0.51).contains(&ratio), "{ratio}");

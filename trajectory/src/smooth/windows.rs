@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::certificate::certify_whole;
 use super::choose::{Then, Window, corners, from_rest};
-use super::crossing::{RESOLUTION, crossings};
+use super::crossing::{RESOLUTION, crossings, crossings_made};
 use super::exact_stop;
 use super::lower_bound::lower_bound;
 use super::method::Method;
@@ -52,15 +52,17 @@ pub(super) fn motion(
 pub(super) fn refined(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
-    known: &Motion,
-    times: f64,
-    dear: bool,
+    (known, times): (&Motion, f64),
+    (dear, backwards): (bool, bool),
 ) -> Option<Motion> {
     let poses = divided(poses, options);
     if poses.len() > MOST_POSES {
         return None;
     }
-    let window = Window::from_rest(&poses, options, Then::Stop);
+    let window = Window {
+        backwards,
+        ..Window::from_rest(&poses, options, Then::Stop)
+    };
     window.refined(&known.spans, times * known.duration(), dear)
 }
 
@@ -88,16 +90,14 @@ fn missed(
     options: &SmoothOptions,
     backwards: bool,
 ) -> Option<usize> {
-    if !backwards {
-        let passes = crossings(&motion.spans, poses, options);
-        return passes
-            .iter()
-            .find(|pass| !pass.holds())
-            .map(|pass| pass.index);
-    }
-    let back: Vec<_> = poses.iter().rev().copied().collect();
-    let index = missed(&motion.reversed(), &back, options, false)?;
-    Some(poses.len() - 1 - index)
+    let passes = crossings_made(&motion.spans, (poses, backwards), options);
+    let mut missed = passes.iter().filter(|pass| !pass.holds());
+    let first = if backwards {
+        missed.next_back()
+    } else {
+        missed.next()
+    };
+    first.map(|pass| pass.index)
 }
 
 /// Plans a list of poses window by window, with look-ahead.
@@ -277,8 +277,9 @@ impl Windows {
             Then::Stop
         };
         let more = &self.poses[self.end..=end];
+        let resting = Window::from_rest(more, options, then);
         if self.tail.spans.is_empty() {
-            return from_rest(more, options, then);
+            return from_rest(&resting);
         }
         let moving = self.tail.spans.first().map(|span| Moving {
             state: span.at(0.0),
@@ -286,16 +287,13 @@ impl Windows {
         });
         let window = Window {
             poses: &self.poses[self.passed..=end],
-            options,
             moving: moving.as_ref(),
-            finish: None,
-            then,
-            onward: false,
+            ..resting
         };
         let most = self.tail.duration() + corners(more, options).duration();
         window.spline(None, most).unwrap_or_else(|| {
             let mut known = self.tail.clone();
-            known.append(from_rest(more, options, then), RestCause::Division);
+            known.append(from_rest(&resting), RestCause::Division);
             let through = window.spline(Some(&known.spans), known.duration());
             through.unwrap_or(known)
         })

@@ -9,7 +9,7 @@ use super::places::Units;
 use super::spans::spans_along;
 use super::time_parameter::TimeParameter;
 use crate::smooth::certificate::{Certificate, certify};
-use crate::smooth::choose::{Then, corners, from_rest, stretch};
+use crate::smooth::choose::{Then, Window, corners, from_rest, stretch};
 use crate::smooth::crossing::Crossing;
 use crate::smooth::method::Method;
 use crate::smooth::motion::Motion;
@@ -93,7 +93,11 @@ impl<'a, const D: usize> Section<'a, D> {
         match self.fitted() {
             Ok(motion) => Some(motion),
             Err(Failure::TooFast) => None,
-            Err(_) if last < FEW => Some(from_rest(self.poses, self.options, Then::More)),
+            Err(_) if last < FEW => Some(from_rest(&Window::from_rest(
+                self.poses,
+                self.options,
+                Then::More,
+            ))),
             Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
             Err(Failure::Missed(worst)) => {
                 let at = worst.clamp(1, last - 1);
