@@ -6,7 +6,7 @@ use super::angular_bounds::{ACTIVE, angular_bounds};
 use super::crossing::{self, Crossing, RESOLUTION, backwards, forwards};
 use super::options::SmoothOptions;
 use super::poly::{halve, hull};
-use super::span::Span;
+use super::span::{Span, stretch};
 use crate::ToolPoint;
 use crate::active::Active;
 use crate::timing::{ActiveSpan, Limit};
@@ -171,6 +171,23 @@ pub(crate) fn certify(
     certificate.in_order = crossings.iter().all(Crossing::holds);
     certificate.corridor = corridor(spans, poses, &crossings, options.corridor());
     (certificate, crossings)
+}
+
+/// The same of a motion that is slowed down by a little first where its bounds are above a limit, by less than a factor
+/// `most`.
+pub(super) fn certify_slowed(
+    spans: &mut [Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    most: f64,
+) -> (Certificate, Vec<Crossing>) {
+    let first = certify(spans, poses, options);
+    let over = first.0.worst_limit();
+    if over <= 1.0 || over >= most {
+        return first;
+    }
+    stretch(spans, first.0.stretch() * (1.0 + 1e-12));
+    certify(spans, poses, options)
 }
 
 /// The same of a motion that is made from its end to its start: its passes are those that are seen then.

@@ -173,9 +173,10 @@ impl<'a> List<'a> {
         !self.options.is_rough() && (found.is_divided() || (far && self.poses.len() > FEW))
     }
 
-    /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need, of
-    /// searches that start from the motion and, if that is far above the bound then, from the one of another way of planning, and, where an attempt failed, the list is too long for that, or the motion is still far above the
-    /// bound, of those within less of the tolerance.
+    /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need; of searches
+    /// that start from the motion and, if that is far above the bound then, from the one of another way of planning; and of
+    /// those within less of the tolerance, where an attempt failed, the list is too long for searches, or the motion is
+    /// still far above the bound.
     fn compared(&self, form: &NormalForm, first: Found, other: Option<Found>) -> Option<Found> {
         let (hard, mut best) = (first.is_hard(), first);
         if best.is_divided() && !self.is_fitted_alone(&best) {

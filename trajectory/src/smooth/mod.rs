@@ -36,6 +36,7 @@ mod rest;
 mod retimed;
 mod span;
 mod spline;
+mod tool_law;
 mod turning_back;
 mod windows;
 

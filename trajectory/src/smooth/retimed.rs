@@ -4,19 +4,16 @@
 //! moves control points around them, which their corridor hardly allows, so a search may end far from the fastest law
 //! along its own way. The path timing finds that law whatever the corners are.
 
-use nalgebra::{Isometry3, SVector};
+use nalgebra::Isometry3;
 
-use super::certificate::certify;
-use super::choose::stretch;
+use super::certificate::certify_slowed;
 use super::dense;
 use super::method::Method;
 use super::motion::Motion;
 use super::options::SmoothOptions;
 use super::span::Span;
-use crate::{
-    Boundary, JointLimits, JointPoint, Path, PathPoint, TimingOptions, ToolLimits, ToolPoint,
-    time_path,
-};
+use super::tool_law::tool_law;
+use crate::{Boundary, TimingOptions, ToolCurve, ToolLimits, ToolPoint};
 
 /// Greatest rate of the law, in the time of the motion that is known.
 const FASTEST: f64 = 8.0;
@@ -33,28 +30,24 @@ pub(super) fn motion(
     if !known.rests.is_empty() || known.spans.is_empty() || !dense::is_limited(options) {
         return None;
     }
-    let way = Way::new(&known.spans);
+    let way = Way(&known.spans);
     let resting = TimingOptions {
         start: Boundary::Free,
         end: Boundary::Free,
         rate_cap: Some(FASTEST),
         ..TimingOptions::default()
     };
-    let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let limits = angular(options.limits, &known.spans);
     let most = most * known.duration();
-    let law = time_path(&way, &free, &limits, &resting).ok()?.law;
+    let law = tool_law(&way, &limits, &resting).ok()?.law;
     if law.duration() > most {
         return None;
     }
-    let pose = |time: f64| way.tool(law.sample(time).position[0]).pose;
+    let pose = |time: f64| way.at(law.sample(time).position[0]).pose;
     let ends = [&poses[0], &poses[poses.len() - 1]];
     let near = options.tolerance.min(options.corridor());
     let mut spans = dense::spans_along(&pose, law.duration(), ends, (near, &options.limits));
-    let over = certify(&spans, poses, options).0;
-    if over.worst_limit() > 1.0 && over.worst_limit() < STRETCH {
-        stretch(&mut spans, over.stretch() * (1.0 + 1e-12));
-    }
+    certify_slowed(&mut spans, poses, options, STRETCH);
     let motion = Motion {
         eased: known.eased,
         retried: known.retried,
@@ -76,56 +69,30 @@ fn angular(limits: ToolLimits, spans: &[Span]) -> ToolLimits {
     }
 }
 
-/// The way of a motion. Its only joint is the time of that motion, which nothing limits.
-struct Way<'a> {
-    spans: &'a [Span],
-    knots: Vec<f64>,
-}
+/// The way of a motion: at least one span, over the time of that motion.
+struct Way<'a>(&'a [Span]);
 
-impl<'a> Way<'a> {
-    fn new(spans: &'a [Span]) -> Self {
-        let mut knots: Vec<f64> = spans.iter().map(|span| span.start).collect();
-        knots.extend(spans.last().map(Span::end));
-        Self { spans, knots }
-    }
-
-    fn tool(&self, u: f64) -> ToolPoint {
-        let next = self.spans.partition_point(|span| span.start <= u);
-        let span = &self.spans[next.saturating_sub(1)];
-        span.at((u - span.start).clamp(0.0, span.duration))
-    }
-}
-
-impl Path<1> for Way<'_> {
+impl ToolCurve for Way<'_> {
     fn end(&self) -> f64 {
-        self.spans.last().map_or(0.0, Span::end)
+        self.0.last().map_or(0.0, Span::end)
     }
 
-    fn knots(&self) -> &[f64] {
-        &self.knots
+    fn knots(&self) -> Vec<f64> {
+        let starts = self.0.iter().map(|span| span.start);
+        starts.chain([self.end()]).collect()
     }
 
-    fn at(&self, u: f64) -> PathPoint<1> {
-        PathPoint {
-            joint: self.joint_at(u),
-            tool: self.tool_at(u),
-        }
-    }
-
-    fn joint_at(&self, u: f64) -> JointPoint<1> {
-        JointPoint {
-            q: [u, 1.0, 0.0, 0.0].map(SVector::<f64, 1>::new),
-        }
-    }
-
-    fn tool_at(&self, u: f64) -> ToolPoint {
-        self.tool(u)
+    fn at(&self, u: f64) -> ToolPoint {
+        let next = self.0.partition_point(|span| span.start <= u);
+        let span = &self.0[next.saturating_sub(1)];
+        span.at((u - span.start).clamp(0.0, span.duration))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::smooth::certificate::certify;
     use crate::smooth::choose::{Then, Window, from_rest};
 
     /// Along the way of a motion that was planned for half of the limits the fastest law takes as much less as the limits

@@ -1,4 +1,4 @@
-//! A fitted curve as a path for the time law.
+//! A fitted curve of the tool.
 
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 
@@ -6,13 +6,12 @@ use super::fit::Fit;
 use super::places::Units;
 use crate::smooth::fade::Fade;
 use crate::smooth::poly;
-use crate::{JointPoint, Path, PathPoint, ToolPoint};
+use crate::{ToolCurve, ToolPoint};
 
 /// Knot intervals of the fit from one knot that the time law sees to the next.
 pub(super) const SEEN: usize = 4;
 
-/// A fitted curve of the tool. Its only joint is its parameter, which nothing limits: the time law
-/// follows from the limits of the tool.
+/// A fitted curve of the tool.
 #[derive(Clone, Debug)]
 pub(super) struct Curve<const D: usize> {
     pub(super) fit: Fit<D>,
@@ -109,29 +108,16 @@ impl<const D: usize> Curve<D> {
     }
 }
 
-impl<const D: usize> Path<1> for Curve<D> {
+impl<const D: usize> ToolCurve for Curve<D> {
     fn end(&self) -> f64 {
         self.end
     }
 
-    fn knots(&self) -> &[f64] {
-        &self.knots
+    fn knots(&self) -> Vec<f64> {
+        self.knots.clone()
     }
 
-    fn at(&self, u: f64) -> PathPoint<1> {
-        PathPoint {
-            joint: self.joint_at(u),
-            tool: self.tool_at(u),
-        }
-    }
-
-    fn joint_at(&self, u: f64) -> JointPoint<1> {
-        JointPoint {
-            q: [u, 1.0, 0.0, 0.0].map(SVector::<f64, 1>::new),
-        }
-    }
-
-    fn tool_at(&self, u: f64) -> ToolPoint {
+    fn at(&self, u: f64) -> ToolPoint {
         let d = self.fit.derivatives(u - self.from);
         let place = self.origin + self.units.place(&d[0]);
         let (turn, angular) = if D > 3 {

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::fitted::FittedCurve;
 use super::moved::Moved;
 use super::open::Open;
-use crate::{Path, ToolCurve, ToolPoint};
+use crate::{ToolCurve, ToolPoint};
 
 /// The part of a [`FittedCurve`] that is at hand: it grows to the end of the curve, and is freed from its start.
 ///
@@ -107,7 +107,7 @@ impl FittedPart {
     /// The tool at a parameter that was covered.
     #[must_use]
     pub fn tool(&self, u: f64) -> ToolPoint {
-        with!(&self.kind, open => open.curve.tool_at(u))
+        with!(&self.kind, open => open.curve.at(u))
     }
 }
 

@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::curve::Curve;
-use crate::{Path, ToolLimits};
+use crate::{ToolCurve, ToolLimits};
 
 /// Places in a knot interval.
 const PLACES: f64 = 2.0;
@@ -62,12 +62,12 @@ impl Motion {
 impl Profile {
     /// The fastest profile of a curve under the limits of the tool, from rest to rest.
     pub(super) fn new<const D: usize>(curve: &Curve<D>, limits: &ToolLimits) -> Self {
-        let end = Path::end(curve);
+        let end = curve.end();
         let count = (PLACES * end).ceil().max(2.0) as usize;
         let step = end / count as f64;
         // What is seen of the curve at a place is not kept: it would be most of the memory.
         let seen = |k: usize| {
-            let tool = curve.tool_at(k as f64 * step);
+            let tool = curve.at(k as f64 * step);
             let [first, second, _] = tool.linear;
             let [turn, bend, _] = tool.angular;
             [

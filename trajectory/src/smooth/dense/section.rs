@@ -8,16 +8,17 @@ use super::fit::{Balls, Fit, Orientation};
 use super::places::Units;
 use super::spans::spans_along;
 use super::time_parameter::TimeParameter;
-use crate::smooth::certificate::{Certificate, certify};
-use crate::smooth::choose::{Then, Window, corners, from_rest, stretch};
+use crate::smooth::certificate::{Certificate, certify_slowed};
+use crate::smooth::choose::{Then, Window, corners, from_rest};
 use crate::smooth::crossing::Crossing;
 use crate::smooth::method::Method;
 use crate::smooth::motion::Motion;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::rest::RestCause;
 use crate::smooth::span::Span;
+use crate::smooth::tool_law::tool_law;
 use crate::timing::Timed;
-use crate::{Boundary, JointLimits, TimingOptions, ToolLimits, time_path};
+use crate::{Boundary, TimingOptions, ToolLimits};
 
 /// Times that the curve is fitted over the time of the law before.
 const REFITS: usize = 2;
@@ -204,12 +205,8 @@ impl<'a, const D: usize> Section<'a, D> {
     /// limit, with their certificate and passes.
     fn certified(&self, best: &TimedCurve<D>) -> (Vec<Span>, Certificate, Vec<Crossing>) {
         let mut spans = self.spans(best);
-        let (mut certificate, mut crossings) = certify(&spans, self.poses, self.options);
-        let over = certificate.worst_limit();
-        if over > 1.0 && over < STRETCH {
-            stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-            (certificate, crossings) = certify(&spans, self.poses, self.options);
-        }
+        let (certificate, crossings) =
+            certify_slowed(&mut spans, self.poses, self.options, STRETCH);
         (spans, certificate, crossings)
     }
 
@@ -246,8 +243,7 @@ impl<'a, const D: usize> Section<'a, D> {
             end: Boundary::Rest,
             ..TimingOptions::default()
         };
-        let free = JointLimits::uniform(f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        time_path(curve, &free, limits, &options).map_err(|_| Failure::Missed(self.poses.len() / 2))
+        tool_law(curve, limits, &options).map_err(|_| Failure::Missed(self.poses.len() / 2))
     }
 
     /// Parameters for the poses that run like the time of a law.
