@@ -249,6 +249,25 @@ mod tests {
         }
     }
 
+    /// A motion that goes past a pose and comes back passes it on the way there; made from its end to its start, on the
+    /// way that was the one back.
+    #[test]
+    fn the_first_approach_depends_on_the_direction() {
+        let straight = |from: f64, to: f64, start: f64| {
+            let mut span = turn(&Isometry3::identity(), &Isometry3::identity(), start);
+            (span.turns, span.point[0].x, span.point[1].x) = (Vec::new(), from, to - from);
+            span
+        };
+        let spans = [straight(0.0, 1.0, 0.0), straight(1.0, 0.4, 1.0)];
+        let poses = [0.0, 0.5, 0.4].map(|x| Isometry3::translation(x, 0.0, 0.0));
+        let options = SmoothOptions::new(0.01, ToolLimits::UNLIMITED);
+        let pass = |back: bool| crossings_made(&spans, (&poses, back), &options)[0];
+        assert_eq!([pass(false), pass(true)].map(|pass| pass.index), [1, 1]);
+        assert!((pass(false).time - 0.5).abs() < 1e-9);
+        assert!((pass(true).time - (1.0 + 0.5 / 0.6)).abs() < 1e-9);
+        assert!(pass(false).holds() && pass(true).holds());
+    }
+
     /// A tool that only turns passes each pose where it is first turned towards it within the
     /// tolerance, also if the goal is turned like that pose even more.
     #[test]

@@ -318,15 +318,7 @@ mod tests {
                 keep: 0.0,
             };
             let value = |share: f64| {
-                let mut moved = point.clone();
-                moved.z += share * step.z;
-                let free = moved.control.iter_mut().skip(4);
-                for (control, change) in free.zip(step.control.chunks_exact(6)) {
-                    for d in 0..6 {
-                        control[d] += share * change[d];
-                    }
-                }
-                project(&problem, &mut moved, Some(&room), 20);
+                let moved = moved(&problem, &room, (&point, &step), share);
                 let seen = barrier.look(&moved, &[]).unwrap();
                 barrier.value(&moved, &seen)
             };
