@@ -264,16 +264,9 @@ impl<'a> List<'a> {
         let (poses, options) = (&form.poses, &form.options);
         let search = |from: &Motion| {
             let times = known.duration() / from.duration();
-            let found = |backwards| {
-                let motion = windows::refined(poses, options, (from, times), (dear, backwards))?;
-                self.certified(form, motion)
-            };
-            let first = found(false);
-            // Made from its end, a motion may miss poses that it passes from its start.
-            if first.is_none() && form.backwards {
-                return found(true);
-            }
-            first
+            let ways = (dear, form.backwards);
+            let motion = windows::refined(poses, options, (from, times), ways)?;
+            self.certified(form, motion)
         };
         let Some(sooner) = retimed::motion(known, (poses, options), GAIN) else {
             return [None, search(known)];

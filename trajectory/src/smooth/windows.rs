@@ -72,7 +72,11 @@ fn in_parts(
     options: &SmoothOptions,
     (backwards, divisions): (bool, usize),
 ) -> Option<Motion> {
-    let motion = Windows::new(poses, options).ok()?.motion();
+    let windows = Windows {
+        backwards,
+        ..Windows::new(poses, options).ok()?
+    };
+    let motion = windows.motion();
     let missed = missed(&motion, poses, options, backwards);
     let Some(missed) = missed.filter(|_| divisions > 0) else {
         return Some(motion);
@@ -127,6 +131,8 @@ pub struct Windows {
     /// Poses without repeats, long legs divided.
     poses: Vec<Isometry3<f64>>,
     options: SmoothOptions,
+    /// Whether the motion will be made from its end to its start, where one window is all of it.
+    backwards: bool,
     /// What is committed, from the start on.
     done: Motion,
     /// The rest of the last window, from the end of `done`, to rest in
@@ -151,6 +157,7 @@ impl Windows {
             poses: divided(poses, &options),
             given: poses.to_vec(),
             options,
+            backwards: false,
             done: Motion::default(),
             tail: Motion::default(),
             passed: 0,
@@ -277,7 +284,10 @@ impl Windows {
             Then::Stop
         };
         let more = &self.poses[self.end..=end];
-        let resting = Window::from_rest(more, options, then);
+        let resting = Window {
+            backwards: self.backwards && more.len() == self.poses.len(),
+            ..Window::from_rest(more, options, then)
+        };
         if self.tail.spans.is_empty() {
             return from_rest(&resting);
         }
