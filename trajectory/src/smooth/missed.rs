@@ -52,10 +52,10 @@ pub(super) fn met(
     Some(next)
 }
 
-/// Some of the poses of a list with those that a motion misses beside them, in order; `None` if it misses no others. `back` says that
-/// the motion is made from its end to its start.
+/// Some of the poses of a list with those that a motion misses beside them, in order; `None` if it misses no others.
 ///
-/// The poses that are known are among those of the list, to the last digit.
+/// The poses that are known are among those of the list, to the last digit. `back` says that the motion is made from its end
+/// to its start.
 pub(super) fn with(
     some: &[Isometry3<f64>],
     (poses, back): (&[Isometry3<f64>], bool),
