@@ -173,32 +173,35 @@ pub(crate) fn certify(
     (certificate, crossings)
 }
 
+/// The same, `back` if the motion is made from its end to its start: its passes are those that are seen then.
+pub(super) fn certify_made(
+    spans: &[Span],
+    (poses, back): (&[Isometry3<f64>], bool),
+    options: &SmoothOptions,
+) -> (Certificate, Vec<Crossing>) {
+    if !back {
+        return certify(spans, poses, options);
+    }
+    let (reversed, poses) = backwards(spans, poses);
+    let (certificate, passes) = certify(&reversed, &poses, options);
+    (certificate, forwards(passes, spans))
+}
+
 /// The same of a motion that is slowed down by a little first where its bounds are above a limit, by less than a factor
 /// `most`.
 pub(super) fn certify_slowed(
     spans: &mut [Span],
-    poses: &[Isometry3<f64>],
+    poses: (&[Isometry3<f64>], bool),
     options: &SmoothOptions,
     most: f64,
 ) -> (Certificate, Vec<Crossing>) {
-    let first = certify(spans, poses, options);
+    let first = certify_made(spans, poses, options);
     let over = first.0.worst_limit();
     if over <= 1.0 || over >= most {
         return first;
     }
     stretch(spans, first.0.stretch() * (1.0 + 1e-12));
-    certify(spans, poses, options)
-}
-
-/// The same of a motion that is made from its end to its start: its passes are those that are seen then.
-pub(super) fn certify_backwards(
-    spans: &[Span],
-    poses: &[Isometry3<f64>],
-    options: &SmoothOptions,
-) -> (Certificate, Vec<Crossing>) {
-    let (back, poses) = backwards(spans, poses);
-    let (certificate, passes) = certify(&back, &poses, options);
-    (certificate, forwards(passes, spans))
+    certify_made(spans, poses, options)
 }
 
 /// The same of a motion from rest to rest.

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{Certificate, Peak, certify, certify_backwards};
+use super::certificate::{Certificate, Peak, certify_made, certify_slowed};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
@@ -31,6 +31,9 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
+
+/// A motion from rest that exceeds a limit by less than this is slowed down as a whole.
+const SLOWED: f64 = 1.3;
 
 /// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
 const TURNED: f64 = 4.0;
@@ -164,15 +167,6 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// The certificate of spans through the window and their passes, as they are seen when the motion is made.
-    fn certify(&self, spans: &[Span]) -> (Certificate, Vec<Crossing>) {
-        if self.backwards {
-            certify_backwards(spans, self.poses, self.options)
-        } else {
-            certify(spans, self.poses, self.options)
-        }
-    }
-
     /// A certified spline through the window that takes at most `most` seconds, if one is found.
     ///
     /// From a motion that is `known`, the search has a point that holds every bound, so a motion
@@ -245,6 +239,7 @@ impl Attempts<'_> {
             moving,
             finish,
             then,
+            backwards,
             ..
         } = self.window;
         let whole = self.inner.clone();
@@ -267,12 +262,9 @@ impl Attempts<'_> {
                 retried = true;
                 continue;
             };
-            let (mut certificate, mut crossings) = self.window.certify(&spans);
-            let over = certificate.worst_limit();
-            if over > 1.0 && over < 1.3 && moving.is_none() {
-                stretch(&mut spans, certificate.stretch() * (1.0 + 1e-12));
-                (certificate, crossings) = self.window.certify(&spans);
-            }
+            let most = if moving.is_none() { SLOWED } else { 1.0 };
+            let (certificate, crossings) =
+                certify_slowed(&mut spans, (poses, backwards), options, most);
             let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
             if certificate.holds() && settled {
                 return Some((spans, retried));
@@ -289,7 +281,8 @@ impl Attempts<'_> {
             if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
                 return None;
             }
-            let couple = ((attempt == 1 && self.dear) || over > 1.3) && turns;
+            let fast = certificate.worst_limit() > SLOWED;
+            let couple = ((attempt == 1 && self.dear) || fast) && turns;
             self.coupled = Some(request.coupled || couple);
             if couple && !request.coupled {
                 // What an orientation exceeds that follows the path says nothing about the optimum.
@@ -331,7 +324,8 @@ impl Attempts<'_> {
         let motion = Motion::new(spans.to_vec(), Method::Spline);
         let met = missed::met(&motion, (poses, backwards), options);
         let met = met.filter(|met| met.duration() < most);
-        let holds = |met: &Motion| self.window.certify(&met.spans).0.holds();
+        let made = |met: &Motion| certify_made(&met.spans, (poses, backwards), options);
+        let holds = |met: &Motion| made(met).0.holds();
         if let Some(met) = met.filter(holds) {
             self.turned = Some((met.spans, retried));
         }

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 pub use super::approach::RESOLUTION;
 use super::approach::{Moment, approach, closest};
 use super::options::SmoothOptions;
-use super::span::Span;
+use super::span::{Span, reversed};
 
 /// How one intermediate pose is passed.
 ///
@@ -92,8 +92,8 @@ pub(super) fn crossings_made(
     if !back {
         return crossings(spans, poses, options);
     }
-    let (reversed, poses) = backwards(spans, poses);
-    forwards(crossings(&reversed, &poses, options), spans)
+    let (back, poses) = backwards(spans, poses);
+    forwards(crossings(&back, &poses, options), spans)
 }
 
 /// A motion and its poses from their end to their start.
@@ -101,9 +101,7 @@ pub(super) fn backwards(
     spans: &[Span],
     poses: &[Isometry3<f64>],
 ) -> (Vec<Span>, Vec<Isometry3<f64>>) {
-    let total = spans.last().map_or(0.0, Span::end);
-    let spans = spans.iter().rev().map(|span| span.reversed(total));
-    (spans.collect(), poses.iter().rev().copied().collect())
+    (reversed(spans), poses.iter().rev().copied().collect())
 }
 
 /// Passes of the motion that goes through `spans` from its end to its start, as seen from their start.

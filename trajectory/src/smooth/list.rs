@@ -410,10 +410,16 @@ impl<'a> List<'a> {
         }
         let whole = form.through(self.given, self.options);
         let seen = |back| (&whole.poses[..], back);
+        // The passes from the start of the form, and those that are made.
+        let ways = if form.backwards {
+            &[false, true][..]
+        } else {
+            &[false]
+        };
         let mut through = form.poses.clone();
         for _ in 0..REPAIRS {
             let met = |back| missed::met(&motion, seen(back), &whole.options).and_then(placed);
-            if let Some(good) = met(false).or_else(|| met(form.backwards)) {
+            if let Some(good) = ways.iter().find_map(|back| met(*back)) {
                 return Some(good);
             }
             let far = motion.duration() > WORSE * self.best.get();
@@ -421,7 +427,7 @@ impl<'a> List<'a> {
                 return None;
             }
             let with = |back| missed::with(&through, seen(back), &motion.spans, &whole.options);
-            through = with(false).or_else(|| with(form.backwards))?;
+            through = ways.iter().find_map(|back| with(*back))?;
             let known = (&motion, WORSE);
             motion = windows::refined(&through, &whole.options, known, (true, false))?;
             if let Some(good) = placed(motion.clone()) {

@@ -2,7 +2,7 @@
 
 use super::method::Method;
 use super::rest::{Rest, RestCause};
-use super::span::Span;
+use super::span::{Span, reversed};
 
 /// A certified motion, or a part of one.
 #[derive(Clone, Debug, Default)]
@@ -59,12 +59,7 @@ impl Motion {
             ..*rest
         });
         Self {
-            spans: self
-                .spans
-                .iter()
-                .rev()
-                .map(|span| span.reversed(total))
-                .collect(),
+            spans: reversed(&self.spans),
             parts: self.parts.iter().rev().copied().collect(),
             rests: rests.collect(),
             eased: self.eased,

@@ -7,7 +7,7 @@ use super::crossing::Crossing;
 use super::method::Method;
 use super::motion::Motion;
 use super::rest::{Rest, RestCause};
-use super::span::Span;
+use super::span::{Span, span_at};
 use super::turning_back::turns_back;
 use crate::{ToolCurve, ToolPoint};
 
@@ -111,9 +111,7 @@ impl SmoothPlan {
 
     /// The span of a time and the time within it.
     fn span(&self, time: f64) -> Option<(&Span, f64)> {
-        let next = self.spans.partition_point(|span| span.start <= time);
-        let span = self.spans.get(next.saturating_sub(1))?;
-        Some((span, (time - span.start).clamp(0.0, span.duration)))
+        span_at(&self.spans, time)
     }
 }
 

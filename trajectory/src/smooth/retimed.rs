@@ -11,7 +11,7 @@ use super::dense;
 use super::method::Method;
 use super::motion::Motion;
 use super::options::SmoothOptions;
-use super::span::Span;
+use super::span::{Span, span_at};
 use super::tool_law::tool_law;
 use crate::{Boundary, TimingOptions, ToolCurve, ToolLimits, ToolPoint};
 
@@ -47,7 +47,7 @@ pub(super) fn motion(
     let ends = [&poses[0], &poses[poses.len() - 1]];
     let near = options.tolerance.min(options.corridor());
     let mut spans = dense::spans_along(&pose, law.duration(), ends, (near, &options.limits));
-    certify_slowed(&mut spans, poses, options, STRETCH);
+    certify_slowed(&mut spans, (poses, false), options, STRETCH);
     let motion = Motion {
         eased: known.eased,
         retried: known.retried,
@@ -83,9 +83,10 @@ impl ToolCurve for Way<'_> {
     }
 
     fn at(&self, u: f64) -> ToolPoint {
-        let next = self.0.partition_point(|span| span.start <= u);
-        let span = &self.0[next.saturating_sub(1)];
-        span.at((u - span.start).clamp(0.0, span.duration))
+        span_at(self.0, u).map_or_else(
+            || ToolPoint::still(Isometry3::identity()),
+            |(span, local)| span.at(local),
+        )
     }
 }
 

@@ -140,6 +140,23 @@ impl Span {
     }
 }
 
+/// The span of a motion at a time and the time within it; that of its nearer end outside. `None` if nothing moves.
+pub(super) fn span_at(spans: &[Span], time: f64) -> Option<(&Span, f64)> {
+    let next = spans.partition_point(|span| span.start <= time);
+    let span = spans.get(next.saturating_sub(1))?;
+    Some((span, (time - span.start).clamp(0.0, span.duration)))
+}
+
+/// The spans of a motion from its end to its start.
+pub(super) fn reversed(spans: &[Span]) -> Vec<Span> {
+    let total = spans.last().map_or(0.0, Span::end);
+    spans
+        .iter()
+        .rev()
+        .map(|span| span.reversed(total))
+        .collect()
+}
+
 /// Slows a motion down by a factor; its path does not change.
 pub(crate) fn stretch(spans: &mut [Span], factor: f64) {
     for span in spans {

@@ -12,7 +12,7 @@ use super::motion::Motion;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::rest::RestCause;
-use super::span::Span;
+use super::span::{Span, span_at};
 use super::spline::Moving;
 use crate::ToolPoint;
 use crate::line::body_turn;
@@ -203,9 +203,8 @@ impl Windows {
         if !(0.0..=self.committed()).contains(&time) {
             return None;
         }
-        let next = self.done.spans.partition_point(|span| span.start <= time);
-        let span = self.done.spans.get(next.saturating_sub(1))?;
-        Some(span.at((time - span.start).clamp(0.0, span.duration)))
+        let (span, local) = span_at(&self.done.spans, time)?;
+        Some(span.at(local))
     }
 
     /// Plans what is left and certifies the whole.

@@ -206,7 +206,7 @@ impl<'a, const D: usize> Section<'a, D> {
     fn certified(&self, best: &TimedCurve<D>) -> (Vec<Span>, Certificate, Vec<Crossing>) {
         let mut spans = self.spans(best);
         let (certificate, crossings) =
-            certify_slowed(&mut spans, self.poses, self.options, STRETCH);
+            certify_slowed(&mut spans, (self.poses, false), self.options, STRETCH);
         (spans, certificate, crossings)
     }
 

@@ -16,7 +16,7 @@ use super::start::{FEWEST, KNOTS_PER_RAMP, MOST};
 use crate::line::body_turn;
 use crate::smooth::crossing::crossings;
 use crate::smooth::options::SmoothOptions;
-use crate::smooth::span::Span;
+use crate::smooth::span::{Span, span_at};
 
 /// Rate at which a motion that starts in motion is followed in the end, so that its limits leave the
 /// search room, and the share of its time in which the rate falls from 1.
@@ -223,11 +223,9 @@ impl<'a> Known<'a> {
 
     /// Place and orientation at a time; those of the ends before and after.
     fn at(&self, time: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
-        let next = self.spans.partition_point(|span| span.start <= time);
-        let Some(span) = self.spans.get(next.saturating_sub(1)) else {
+        let Some((span, local)) = span_at(self.spans, time) else {
             return (self.poses[0].translation.vector, self.poses[0].rotation);
         };
-        let local = (time - span.start).clamp(0.0, span.duration);
         (span.motion(local)[0], span.rotation(local))
     }
 }
