@@ -123,9 +123,12 @@ pub(super) fn bridged(
             // A spline has to be faster than both sides of the rest at the same time.
             let other = bridges.overlapped(k, holds);
             let saved = other.map_or(0.0, |other| bridges.duration() - other.duration());
-            let passed = search.reaches.iter().find_map(|reach| {
+            let mut ends = bridges.ends(k);
+            // Between rests two reaches may be the same.
+            ends.dedup();
+            let passed = ends.into_iter().find_map(|ends| {
                 left = left.checked_sub(1)?;
-                bridges.passed(k, (*reach, saved), holds)
+                bridges.passed(k, (ends, saved), holds)
             });
             match passed {
                 Some(passed) => bridges = passed,
@@ -146,11 +149,11 @@ impl Bridges<'_> {
     fn passed(
         &self,
         k: usize,
-        (reach, saved): (f64, f64),
+        (ends, saved): ([f64; 2], f64),
         holds: &dyn Fn(&Motion) -> bool,
     ) -> Option<Self> {
         let mut next = self.clone();
-        next.pass(k, reach, saved)?;
+        next.pass(k, ends, saved)?;
         holds(&next.clone().motion()).then_some(next)
     }
 
@@ -171,9 +174,9 @@ impl Bridges<'_> {
         limits.speed / limits.acceleration + limits.acceleration / limits.jerk
     }
 
-    /// Puts a spline in the place of the rest with the number `k`, if that saves more than so much time (s).
-    fn pass(&mut self, k: usize, reach: f64, saved: f64) -> Option<()> {
-        let [from, to] = self.reach(k, reach);
+    /// Puts a spline between two times (s) in the place of the rest with the number `k`, if that saves more than so much
+    /// time (s).
+    fn pass(&mut self, k: usize, [from, to]: [f64; 2], saved: f64) -> Option<()> {
         let ends = [self.state(from)?, self.state(to)?];
         let moving = Moving {
             state: ends[0],
@@ -263,6 +266,12 @@ impl Bridges<'_> {
         for time in rests.chain(&mut self.passes) {
             *time *= factor;
         }
+    }
+
+    /// When the bridges over a rest begin and end that are searched for, s.
+    fn ends(&self, k: usize) -> Vec<[f64; 2]> {
+        let reaches = self.search.reaches.iter();
+        reaches.map(|reach| self.reach(k, *reach)).collect()
     }
 
     /// When the bridge over a rest begins and ends, s.

@@ -170,16 +170,16 @@ fn turned(
         .map_while(seen)
         .collect();
     rest.reverse();
+    // Looked at only as far as it matters: a point may rest for long.
     let ahead = (approach.span..spans.len()).flat_map(moments);
-    rest.extend(
-        ahead
-            .filter(|moment| moment.time > approach.time)
-            .map_while(seen),
-    );
+    let ahead = ahead
+        .filter(|moment| moment.time > approach.time)
+        .map_while(seen);
+    let mut rest = rest.into_iter().chain(ahead).peekable();
     let here = seen(approach).map_or(0.0, |(_, angle)| angle);
     // A point that rests from the pass before until the end has no approach of its own.
     let end = spans.last().map_or(0.0, Span::end);
-    let first = rest.first().map(|(moment, _)| moment.time);
+    let first = rest.peek().map(|(moment, _)| moment.time);
     let still = approach.time >= end && first.is_some_and(|time| time <= since.time);
     let mut best = (approach, if still { f64::INFINITY } else { here - 1e-9 });
     for (moment, angle) in rest {

@@ -9,7 +9,7 @@ mod random;
 mod sparse;
 
 use lists::suite;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use trajectory::smooth::{Method, SmoothOptions, plan};
 
 /// On each list of the suite the motion is certified, without a fallback, and about as fast as the
@@ -52,4 +52,23 @@ fn mixed_density_is_faster_than_with_rests() {
     assert!(plan.certificate().holds() && plan.fallbacks() == 0);
     // The straights take 0.55 s each from rest to rest, the bend 0.27 s.
     assert!(plan.duration() < 1.33, "{}", plan.duration());
+}
+
+/// A straight leg, a dense fillet that turns the tool, a straight leg: the legs of the fillet are shorter than the tolerance,
+/// and each pose is seen turned where the tool is nearest to it. One search finds the motion; planned in parts, one of these rested.
+#[test]
+fn a_dense_fillet_that_turns_is_planned_as_a_whole() {
+    for (radius, tolerance, most) in [(0.01, 6e-4, 0.73), (0.006, 2e-4, 0.80), (0.02, 4e-4, 0.735)]
+    {
+        let mut poses = lists::straight_bend_straight(0.08, radius, 56);
+        let count = poses.len();
+        for (i, pose) in poses.iter_mut().enumerate() {
+            let turn = 0.47 * ((i as f64 - 1.0) / (count - 3) as f64).clamp(0.0, 1.0);
+            *pose = Isometry3::new(pose.translation.vector, Vector3::z() * turn);
+        }
+        let options = SmoothOptions::new(tolerance, lists::turning_limits());
+        let plan = plan(&poses, &options).unwrap();
+        assert!(plan.certificate().holds() && plan.rests().is_empty());
+        assert!(plan.duration() < most, "{radius} m: {} s", plan.duration());
+    }
 }

@@ -5,18 +5,29 @@ use nalgebra::{Isometry3, UnitQuaternion};
 use super::build::Task;
 use super::meet::{meet, seen};
 use super::problem::{Point, Problem};
+use crate::line::body_turn;
+
+/// Least way of a leg that moves the place, in tolerances.
+const STANDING: f64 = 1e-3;
+/// Least time of its way over that of its turn, both at full speed, where the way is within the tolerance.
+const SPOT: f64 = 0.01;
 
 impl Task<'_> {
     /// Whether the place alone says when each inner pose is passed: the legs beside it are not turns on the spot.
     pub(super) fn led(&self) -> Vec<bool> {
-        let far = |pair: &[Isometry3<f64>]| {
-            let way = pair[1].translation.vector - pair[0].translation.vector;
-            way.norm() > self.options.tolerance
-        };
         let around = self.poses.windows(3);
         around
-            .map(|three| far(&three[..2]) && far(&three[1..]))
+            .map(|three| self.leads(&three[..2]) && self.leads(&three[1..]))
             .collect()
+    }
+
+    /// Whether a leg moves the place: by more than the tolerance, or far enough beside its turn.
+    fn leads(&self, leg: &[Isometry3<f64>]) -> bool {
+        let (limits, tolerance) = (&self.options.limits, self.options.tolerance);
+        let way = (leg[1].translation.vector - leg[0].translation.vector).norm();
+        let turn = body_turn(&leg[0].rotation, &leg[1].rotation).norm();
+        let turned = SPOT * turn / limits.angular_speed;
+        way > tolerance || (way > STANDING * tolerance && way / limits.speed > turned)
     }
 
     /// Turns control orientations that follow the path where they cut corners, so that the poses are met within the

@@ -287,7 +287,7 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
             anchor: None,
-            led: if B < 5 * D { self.led() } else { Vec::new() },
+            led: self.led(),
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;

@@ -17,6 +17,7 @@ mod coordinates;
 mod ends;
 mod iterate;
 mod known;
+mod led;
 mod meet;
 mod newton;
 mod norms;

@@ -149,7 +149,8 @@ impl<const D: usize, const B: usize> System<D, B> {
             *step += slide * z;
         }
         let times: Vec<f64> = self.around.iter().map(|ball| ball.time(&control)).collect();
-        let passes = self.around.iter().zip(&times);
+        // Elsewhere the sides hold what the passing times do.
+        let passes = self.around.iter().zip(&times).filter(|_| Self::APART);
         let passing: f64 = passes.map(|(ball, time)| ball.slope * time).sum();
         let slope = self.gradient_z * z + falls + passing;
         (slope < 0.0 && slope.is_finite()).then_some(Step {
