@@ -6,6 +6,7 @@ pub use super::approach::RESOLUTION;
 use super::approach::{Moment, approach, closest};
 use super::options::SmoothOptions;
 use super::span::{Span, reversed};
+use crate::line::body_turn;
 
 /// How one intermediate pose is passed.
 ///
@@ -117,15 +118,26 @@ pub(super) fn forwards(mut passes: Vec<Crossing>, spans: &[Span]) -> Vec<Crossin
 
 /// Distance (m) and angle (rad) between the motion at a moment and a pose.
 fn apart(spans: &[Span], start: &Isometry3<f64>, at: Moment, pose: &Isometry3<f64>) -> (f64, f64) {
-    let (point, rotation) = match spans.get(at.span) {
-        Some(span) => {
-            let local = (at.time - span.start).clamp(0.0, span.duration);
-            (span.motion(local)[0], span.rotation(local))
-        }
-        None => (start.translation.vector, start.rotation),
+    let Some(span) = spans.get(at.span) else {
+        let angle = body_turn(&start.rotation, &pose.rotation).norm();
+        return (
+            (start.translation.vector - pose.translation.vector).norm(),
+            angle,
+        );
     };
-    let angle = crate::line::body_turn(&rotation, &pose.rotation).norm();
-    ((point - pose.translation.vector).norm(), angle)
+    (distance(span, at.time, pose), angle(span, at.time, pose))
+}
+
+/// Distance (m) between the motion in a span at a time of the motion and a pose.
+fn distance(span: &Span, time: f64, pose: &Isometry3<f64>) -> f64 {
+    let local = (time - span.start).clamp(0.0, span.duration);
+    (span.motion(local)[0] - pose.translation.vector).norm()
+}
+
+/// The same angle, rad.
+fn angle(span: &Span, time: f64, pose: &Isometry3<f64>) -> f64 {
+    let local = (time - span.start).clamp(0.0, span.duration);
+    body_turn(&span.rotation(local), &pose.rotation).norm()
 }
 
 /// Samples of one span in the search of [`turned`].
@@ -145,10 +157,8 @@ fn turned(
     if spans.is_empty() {
         return approach;
     }
-    let seen = |moment: Moment| {
-        let (distance, angle) = apart(spans, pose, moment, pose);
-        (distance <= near[0]).then_some((moment, angle))
-    };
+    let is_near = |at: &Moment| distance(&spans[at.span], at.time, pose) <= near[0];
+    let seen = |at: Moment| (at, angle(&spans[at.span], at.time, pose));
     // Times of a span, from the first to the last one wanted.
     let moments = |at: usize| {
         let (span, share) = (&spans[at], 1.0 / f64::from(STEPS));
@@ -167,22 +177,26 @@ fn turned(
         .flat_map(|at| moments(at).rev());
     let mut rest: Vec<_> = back
         .filter(|moment| moment.time < approach.time)
-        .map_while(seen)
+        .take_while(is_near)
         .collect();
     rest.reverse();
     // Looked at only as far as it matters: a point may rest for long.
     let ahead = (approach.span..spans.len()).flat_map(moments);
     let ahead = ahead
         .filter(|moment| moment.time > approach.time)
-        .map_while(seen);
+        .take_while(is_near);
     let mut rest = rest.into_iter().chain(ahead).peekable();
-    let here = seen(approach).map_or(0.0, |(_, angle)| angle);
+    let here = if is_near(&approach) {
+        seen(approach).1
+    } else {
+        0.0
+    };
     // A point that rests from the pass before until the end has no approach of its own.
     let end = spans.last().map_or(0.0, Span::end);
-    let first = rest.peek().map(|(moment, _)| moment.time);
+    let first = rest.peek().map(|moment| moment.time);
     let still = approach.time >= end && first.is_some_and(|time| time <= since.time);
     let mut best = (approach, if still { f64::INFINITY } else { here - 1e-9 });
-    for (moment, angle) in rest {
+    for (moment, angle) in rest.map(seen) {
         if angle > best.1 + 1e-9 && best.0 != approach && best.1 <= near[1] {
             break;
         }
