@@ -123,10 +123,7 @@ pub(super) fn bridged(
             // A spline has to be faster than both sides of the rest at the same time.
             let other = bridges.overlapped(k, holds);
             let saved = other.map_or(0.0, |other| bridges.duration() - other.duration());
-            let mut ends = bridges.ends(k);
-            // Between rests two reaches may be the same.
-            ends.dedup();
-            let passed = ends.into_iter().find_map(|ends| {
+            let passed = bridges.ends(k).into_iter().find_map(|ends| {
                 left = left.checked_sub(1)?;
                 bridges.passed(k, (ends, saved), holds)
             });
@@ -268,10 +265,13 @@ impl Bridges<'_> {
         }
     }
 
-    /// When the bridges over a rest begin and end that are searched for, s.
+    /// When the bridges over a rest begin and end that are searched for, s: each once, as two reaches may be the same
+    /// between rests.
     fn ends(&self, k: usize) -> Vec<[f64; 2]> {
         let reaches = self.search.reaches.iter();
-        reaches.map(|reach| self.reach(k, *reach)).collect()
+        let mut ends: Vec<_> = reaches.map(|reach| self.reach(k, *reach)).collect();
+        ends.dedup();
+        ends
     }
 
     /// When the bridge over a rest begins and ends, s.

@@ -187,7 +187,7 @@ fn turned(
         .take_while(is_near);
     let mut rest = rest.into_iter().chain(ahead).peekable();
     let here = if is_near(&approach) {
-        seen(approach).1
+        angle(&spans[approach.span], approach.time, pose)
     } else {
         0.0
     };
@@ -243,7 +243,6 @@ pub(crate) fn settled(
 mod tests {
     use super::*;
     use crate::ToolLimits;
-    use crate::line::body_turn;
     use crate::smooth::span::Turn;
     use nalgebra::{UnitQuaternion, Vector3};
 

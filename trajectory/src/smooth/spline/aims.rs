@@ -15,10 +15,9 @@ const SPOT: f64 = 0.01;
 impl Task<'_> {
     /// Whether the place alone says when each inner pose is passed: the legs beside it are not turns on the spot.
     pub(super) fn led(&self) -> Vec<bool> {
-        let around = self.poses.windows(3);
-        around
-            .map(|three| self.leads(&three[..2]) && self.leads(&three[1..]))
-            .collect()
+        let legs = self.poses.windows(2);
+        let leads: Vec<bool> = legs.map(|leg| self.leads(leg)).collect();
+        leads.windows(2).map(|pair| pair[0] && pair[1]).collect()
     }
 
     /// Whether a leg moves the place: by more than the tolerance, or far enough beside its turn.

@@ -33,6 +33,15 @@ pub(super) struct Lead {
     pub(super) tie: f64,
 }
 
+impl Lead {
+    /// By how much the passing time falls when each of the control points moves by so much.
+    pub(super) fn fall<const D: usize>(&self, moves: &[[f64; D]]) -> f64 {
+        let each = self.falls.iter().zip(moves);
+        each.map(|(falls, moves)| falls.iter().zip(moves).map(|(a, b)| a * b).sum::<f64>())
+            .sum()
+    }
+}
+
 /// Weight of the tie between a passing time and the place, beside the curvature along that time.
 const TIE: f64 = 1e6;
 

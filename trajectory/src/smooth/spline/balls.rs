@@ -43,9 +43,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         if let Some(lead) = &ball.lead
             && !slides.is_empty()
         {
-            for (falls, slide) in lead.falls.iter().zip(&slides[ball.first..]) {
-                drift += falls.iter().zip(slide).map(|(a, b)| a * b).sum::<f64>();
-            }
+            drift = lead.fall(&slides[ball.first..]);
             drawn += lead.tie * drift;
             self.hessian_z += lead.tie * drift * drift;
         }

@@ -287,7 +287,7 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
             anchor: None,
-            led: self.led(),
+            led: if D > 3 { self.led() } else { Vec::new() },
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;

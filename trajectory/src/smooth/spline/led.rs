@@ -36,8 +36,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         // How the ball and its passing time move with `z`.
         let (mut border, mut late) = ([0.0; D], 0.0);
         if let Some(slide) = &ball.slide {
-            let each = shares.iter().zip(&slides[ball.first..]);
-            let earlier: f64 = each.map(|(share, slide)| dot(&share.falls, slide)).sum();
+            let earlier = lead.fall(&slides[ball.first..]);
             let (own, along) = (ball.times(slide), dot(&ball.bent, slide));
             border = std::array::from_fn(|d| own[d] - earlier * ball.bent[d]);
             late = along - earlier * ball.stiff;
