@@ -92,6 +92,65 @@ where
     (left, right)
 }
 
+/// Value of a polynomial in Bernstein form at a share of its interval, and its derivative by that share (de Casteljau).
+pub(crate) fn at_share<T, const M: usize>(control: &[T; M], share: f64) -> [T; 2]
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let mut points = *control;
+    for level in (2..M).rev() {
+        for k in 0..level {
+            points[k] = points[k] * (1.0 - share) + points[k + 1] * share;
+        }
+    }
+    let rise = (points[1] + points[0] * -1.0) * (M - 1) as f64;
+    [points[0] * (1.0 - share) + points[1] * share, rise]
+}
+
+/// Most steps to a root: halving alone ends with the last digit of a share after so many.
+const STEPS: usize = 60;
+
+/// The share of the interval at which a polynomial in Bernstein form is zero; `None` unless its coefficients change sign
+/// just once: then it has one root, which is found to the last digits.
+///
+/// # Source
+/// Variation diminishing property: Farin 2002, section 5.6. Newton's method inside a bracket.
+pub(crate) fn only_root<const M: usize>(control: &[f64; M]) -> Option<f64> {
+    let signs = || (0..M).filter(|k| control[*k] != 0.0);
+    let changes = || {
+        let pairs = signs().zip(signs().skip(1));
+        pairs.filter(|(i, k)| (control[*i] > 0.0) != (control[*k] > 0.0))
+    };
+    let (before, after) = changes().next()?;
+    if changes().nth(1).is_some() {
+        return None;
+    }
+    let rises = control[after] > 0.0;
+    let far = control[before] / (control[before] - control[after]);
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut share = (before as f64 + far * (after - before) as f64) / (M - 1) as f64;
+    for _ in 0..STEPS {
+        let [value, slope] = at_share(control, share);
+        if (value > 0.0) == rises {
+            high = share;
+        } else {
+            low = share;
+        }
+        let next = share - value / slope;
+        let next = if next > low && next < high {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        let step = (next - share).abs();
+        share = next;
+        if step <= 4.0 * f64::EPSILON {
+            break;
+        }
+    }
+    Some(share)
+}
+
 /// Bernstein coefficients of the dot product of a quartic and a cubic.
 pub(crate) fn dot(quartic: &[Vector3<f64>; 5], cubic: &[Vector3<f64>; 4]) -> [f64; 8] {
     let mut product = [0.0; 8];
@@ -162,6 +221,28 @@ mod tests {
             assert_relative_eq!(left[4], value(&power, from + width / 2.0), epsilon = 1e-10);
             assert_relative_eq!(right[0], left[4], epsilon = 1e-12);
             assert_relative_eq!(right[4], control[4], epsilon = 1e-12);
+        }
+
+        /// Values at a share are those of the power form, and so is the derivative.
+        #[test]
+        fn values_at_a_share(power in prop::array::uniform5(-2.0..2.0_f64), share in 0.0..1.0_f64) {
+            let [value, rise] = at_share(&bernstein(&power, 0.0, 1.0), share);
+            let [right, slope, ..] = quartic(&power, share);
+            assert_relative_eq!(value, right, epsilon = 1e-12);
+            assert_relative_eq!(rise, slope, epsilon = 1e-11);
+        }
+
+        /// Where the coefficients change sign once the root is one, to the last digits; else none is given.
+        #[test]
+        fn the_only_root_is_a_root(control in prop::array::uniform8(-1.0..1.0_f64), low in 0..7_usize) {
+            let [mut once, mut twice] = [control.map(f64::abs); 2];
+            once[..=low].iter_mut().for_each(|c| *c = -*c);
+            twice[low] = -0.1;
+            let root = only_root(&once).unwrap();
+            let [value, slope] = at_share(&once, root);
+            prop_assert!(value.abs() <= 1e-15 * (1.0 + slope.abs()) * 8.0, "{once:?} {root} {value} {slope}");
+            prop_assert_eq!(only_root(&twice).is_some(), low == 0);
+            prop_assert_eq!(only_root(&control.map(f64::abs)), None);
         }
 
         /// The product's Bernstein form is the product.

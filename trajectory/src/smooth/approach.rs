@@ -118,6 +118,13 @@ impl Search {
             return self.reached(offset[0].norm(), interval[0])
                 || self.reached(offset[4].norm(), interval[1]);
         }
+        if let Some(root) = poly::only_root(product) {
+            // The distance falls to the root and rises after it, or the other way round.
+            let [there, _] = poly::at_share(offset, root);
+            return self.reached(offset[0].norm(), interval[0])
+                || self.reached(there.norm(), interval[0] + root * width)
+                || self.reached(offset[4].norm(), interval[1]);
+        }
         let middle = 0.5 * (interval[0] + interval[1]);
         let (low, high) = (halve(product), halve(offset));
         self.done(&low.0, &high.0, [interval[0], middle])
