@@ -23,6 +23,28 @@ pub struct JointLine<const N: usize, F> {
     tool: F,
 }
 
+impl<const N: usize, F> JointLine<N, F> {
+    /// The joints at `u`, 0 to 1.
+    pub(crate) fn joints(&self, u: f64) -> JointPoint<N> {
+        let u = u.clamp(0.0, 1.0);
+        let step = self.end - self.start;
+        let zero = SVector::zeros();
+        // The weighted mean meets both ends exactly.
+        JointPoint {
+            q: [self.start * (1.0 - u) + self.end * u, step, zero, zero],
+        }
+    }
+
+    /// The same line with another tool.
+    pub(crate) fn with_tool<G>(&self, tool: G) -> JointLine<N, G> {
+        JointLine {
+            start: self.start,
+            end: self.end,
+            tool,
+        }
+    }
+}
+
 impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> JointLine<N, F> {
     /// A line from `start` to `end` (rad). `tool` gives the controlled point and its derivatives
     /// to the parameter from the joints and theirs.
@@ -53,12 +75,6 @@ impl<const N: usize, F: Fn(&JointPoint<N>) -> ToolPoint> Path<N> for JointLine<N
     }
 
     fn joint_at(&self, u: f64) -> JointPoint<N> {
-        let u = u.clamp(0.0, 1.0);
-        let step = self.end - self.start;
-        let zero = SVector::zeros();
-        // The weighted mean meets both ends exactly.
-        JointPoint {
-            q: [self.start * (1.0 - u) + self.end * u, step, zero, zero],
-        }
+        self.joints(u)
     }
 }

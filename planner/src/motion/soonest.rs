@@ -6,11 +6,15 @@
 //! comes, until a motion is known that no bound is below. So only few motions are computed in full, and
 //! the result is the fastest of all.
 
+use std::cell::OnceCell;
+
 use nalgebra::SVector;
 use trajectory::bounds::JointsToTool;
 use trajectory::otg::{self, Otg};
 use trajectory::timing::{PathTiming, least_time};
-use trajectory::{Boundary, JointLine, JointPoint, Path, TimingOptions, ToolLimits, Trajectory};
+use trajectory::{
+    Boundary, JointLine, JointPoint, SampledLine, TimingOptions, ToolLimits, Trajectory,
+};
 
 use super::certificate::Arm;
 use super::{Draft, MotionError, Planner};
@@ -70,7 +74,8 @@ struct Search<'a, const N: usize> {
     motion: &'a Move,
     start: &'a SVector<f64, N>,
     ends: &'a [SVector<f64, N>],
-    lines: &'a [&'a dyn Path<N>],
+    /// The line to each end, once it is looked at.
+    lines: &'a [OnceCell<SampledLine<N>>],
     open: Vec<Open<'a, N>>,
     /// How many of the ends are looked at however little they gain.
     sure: usize,
@@ -91,10 +96,7 @@ impl<const N: usize> Planner<N> {
         ends: &[SVector<f64, N>],
         sure: usize,
     ) -> Result<Draft<N>, MotionError> {
-        let tool = |joint: &JointPoint<N>| Arm(self.chain()).motion(joint);
-        let lines = ends.iter().map(|end| JointLine::new(*start, *end, tool));
-        let lines: Vec<_> = lines.collect();
-        let lines: Vec<&dyn Path<N>> = lines.iter().map(|line| line as _).collect();
+        let lines = vec![OnceCell::new(); ends.len()];
         let open = ends.iter().enumerate().map(|(end, goal)| {
             let least = self.least_of_joints(start, goal);
             Open {
@@ -215,7 +217,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 let (limits, tool) = (&self.planner.limits, &self.motion.limits);
                 // With six joints it would save two percent.
                 let options = if N > 6 { &NEAR } else { &RESTING };
-                match PathTiming::new(self.lines[end], limits, tool, options) {
+                match PathTiming::new(self.line(end), limits, tool, options) {
                     Ok(timing) => {
                         let timing = if N > 6 { timing.near() } else { timing };
                         let least = least.max(timing.lower_bound());
@@ -237,6 +239,14 @@ impl<'a, const N: usize> Search<'a, N> {
             }
         }
         true
+    }
+
+    /// The line in joint space to an end.
+    fn line(&self, end: usize) -> &'a SampledLine<N> {
+        self.lines[end].get_or_init(|| {
+            let tool = |joint: &JointPoint<N>| Arm(self.planner.chain()).motion(joint);
+            SampledLine::new(&JointLine::new(*self.start, self.ends[end], tool))
+        })
     }
 
     /// Opens both ways to an end.

@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use nalgebra::SVector;
 use realtime::Piece;
+use simd::Build;
 
 use crate::extrema;
 use crate::found::Found;
+use crate::hull::{Extent, Extents, Hulls};
 use crate::limit::Limit;
 use crate::near_ends;
 use crate::poly::bernstein;
@@ -52,15 +54,6 @@ impl<const N: usize> Derivatives<N> {
         }
     }
 
-    /// Hull of each derivative, and the larger of its ends.
-    fn hulls(&self) -> [[SVector<f64, N>; 2]; 3] {
-        [
-            hull(&self.velocity),
-            hull(&self.acceleration),
-            hull(&self.jerk),
-        ]
-    }
-
     /// Adds one derivative of one joint, divided by its limit, to a search.
     fn search(&self, column: Column, limit: f64, when: Range<f64>, found: &mut Found) {
         fn one<const N: usize, const M: usize>(c: &[SVector<f64, N>; M], j: usize) -> [f64; M] {
@@ -74,15 +67,6 @@ impl<const N: usize> Derivatives<N> {
             _ => found.take(&one(&self.jerk, j), when, 0.0, size),
         }
     }
-}
-
-/// The largest magnitude of the points, and of the ends, of each joint.
-fn hull<const N: usize, const M: usize>(control: &[SVector<f64, N>; M]) -> [SVector<f64, N>; 2] {
-    let ends = control[0].abs().sup(&control[M - 1].abs());
-    let most = control[1..M - 1]
-        .iter()
-        .fold(ends, |most, c| most.sup(&c.abs()));
-    [most, ends]
 }
 
 /// Bounds position, velocity, acceleration and jerk of every joint.
@@ -102,12 +86,16 @@ pub(super) fn bound<const N: usize>(
         .collect();
     let mut found = vec![Found::default(); columns.len()];
     let mut rows = Vec::with_capacity(columns.len() * trajectory.pieces().len());
+    let (build, narrow) = (Build::detect(), values.map(|limit| limit.map(|x| 1.0 / x)));
     for piece in trajectory.pieces() {
-        let hulls = Derivatives::of(piece).hulls();
+        let hulls = build.run(Hulls {
+            piece,
+            narrow: &narrow,
+        });
         for (Column { order, joint }, found) in columns.iter().zip(&mut found) {
-            let ([most, ends], limit) = (&hulls[*order], values[*order][*joint]);
-            found.reached = found.reached.max(ends[*joint] / limit);
-            rows.push(most[*joint] / limit);
+            let hull = &hulls[*order];
+            found.reached = found.reached.max(hull.ends[*joint]);
+            rows.push(hull.most[*joint]);
         }
     }
     // Only pieces that may contain the largest value are refined.
@@ -124,6 +112,10 @@ pub(super) fn bound<const N: usize>(
             derivatives.search(*column, limit, starts[i]..starts[i + 1], found);
         }
     }
+    // A value that is reached may differ from a bound by the rounding of another formula.
+    found
+        .iter_mut()
+        .for_each(|found| found.bound = found.bound.max(found.reached));
     raise_near_ends(trajectory, limits, (&columns, &mut found, &mut rows));
     let limits = columns
         .iter()
@@ -162,20 +154,16 @@ fn raise_near_ends<const N: usize>(
 fn positions<const N: usize>(trajectory: &Trajectory<N>) -> [SVector<f64, N>; 2] {
     let mut lowest = SVector::<f64, N>::repeat(f64::INFINITY);
     let mut highest = SVector::<f64, N>::repeat(f64::NEG_INFINITY);
-    let forms = trajectory.pieces().iter();
-    let forms: Vec<[SVector<f64, N>; 6]> = forms
-        .map(|piece| bernstein(&piece.coefficients, 0.0, piece.duration))
-        .collect();
-    for form in &forms {
-        lowest = lowest.inf(&form[0]).inf(&form[5]);
-        highest = highest.sup(&form[0]).sup(&form[5]);
+    let build = Build::detect();
+    let pieces = trajectory.pieces().iter();
+    let extents: Vec<Extent<N>> = pieces.map(|piece| build.run(Extents(piece))).collect();
+    for ends in extents.iter().flat_map(|extent| extent.ends) {
+        let ends = SVector::from(ends);
+        (lowest, highest) = (lowest.inf(&ends), highest.sup(&ends));
     }
-    for (form, piece) in forms.iter().zip(trajectory.pieces()) {
+    for (extent, piece) in extents.iter().zip(trajectory.pieces()) {
         for j in 0..N {
-            let low = form.iter().fold(f64::INFINITY, |low, c| low.min(c[j]));
-            let high = form
-                .iter()
-                .fold(f64::NEG_INFINITY, |high, c| high.max(c[j]));
+            let [low, high] = [extent.hull[0][j], extent.hull[1][j]];
             if low < lowest[j] - POSITION || high > highest[j] + POSITION {
                 let (low, high) = extrema::range(piece, j);
                 lowest[j] = low.min(lowest[j]);

@@ -6,7 +6,7 @@ use realtime::Piece;
 use super::{Held, JointsToTool};
 use crate::found::{Found, TOLERANCE};
 use crate::limit::Limit;
-use crate::{JointPoint, Trajectory};
+use crate::{JointPoint, ToolPoint, Trajectory};
 
 /// The limits of the tool, in the order used in this file.
 pub(super) const LIMITS: [Limit; 6] = [
@@ -33,6 +33,16 @@ const DEPTH: u32 = 16;
 /// 3.1.1). It holds for the component of a vector along any direction, so it holds for the norm
 /// too.
 const NODES: f64 = 0.003_55;
+/// The same of `t² (t - 1/2) (1 - t)²`, for the quartic through three samples with the slopes at both ends.
+///
+/// # Source
+/// Error of Hermite interpolation (Davis 1963, theorem 3.1.1 with repeated points).
+const HERMITE: f64 = 0.008_95;
+/// The same of `t (t - 1/2) (1 - t)`: times the third Taylor coefficient, it bounds the error of the
+/// parabola through three samples.
+const PARABOLA: f64 = 0.048_12;
+/// Largest error of a ratio with which three samples are enough.
+const FINE: f64 = 1e-5;
 
 /// The tool over a stretch of time.
 #[derive(Clone, Debug)]
@@ -103,6 +113,14 @@ impl Stretch {
     }
 }
 
+/// The tool over a part of a piece, in Bernstein form.
+struct Curves {
+    /// Each quantity over its limit.
+    control: [[Vector3<f64>; 5]; 6],
+    /// The place (m).
+    place: [Vector3<f64>; 5],
+}
+
 /// Looks at the tool of one motion.
 struct Looker<'a, T, const N: usize> {
     trajectory: &'a Trajectory<N>,
@@ -122,39 +140,39 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
             width,
         } = part;
         let piece = &self.trajectory.pieces()[index];
-        let mut values = [[Vector3::zeros(); 5]; 6];
-        let mut places = [Vector3::zeros(); 5];
-        for i in 0..5 {
-            let s = piece.sample(since + width * i as f64 * 0.25);
-            let q = [s.position, s.velocity, s.acceleration, s.jerk];
-            let seen = self.tool.motion(&JointPoint { q });
-            places[i] = seen.pose.translation.vector;
-            for k in 0..3 {
-                values[k][i] = seen.linear[k] * self.narrow[k];
-                values[k + 3][i] = seen.angular[k] * self.narrow[k + 3];
-            }
-        }
         let (p, w) = self.tool.growth(&taylor(piece, since, width));
-        let [h1, h2, h3] = [1, 2, 3].map(|k| NODES / width.powi(k));
-        // The fifth coefficient of each derivative, from those of place and angular velocity.
-        let errors = [
-            6.0 * p[6] * h1,
-            42.0 * p[7] * h2,
-            336.0 * p[8] * h3,
-            w[5] * h1,
-            6.0 * w[6] * h2,
-            42.0 * w[7] * h3,
+        // Of each derivative, from the Taylor coefficients of place and angular velocity.
+        let three = [
+            6.0 * p[6],
+            42.0 * p[7],
+            120.0 * p[6],
+            w[5],
+            6.0 * w[6],
+            20.0 * w[5],
         ];
+        let factors = [HERMITE, HERMITE, PARABOLA];
+        let error = self.errors(three, factors, width);
+        let place_error = HERMITE * p[5];
+        let fine = place_error <= self.place && error.iter().all(|error| *error <= FINE);
+        let (curves, error, place_error) = if fine {
+            (self.through_three(part), error, place_error)
+        } else {
+            let five = [
+                6.0 * p[6],
+                42.0 * p[7],
+                336.0 * p[8],
+                w[5],
+                6.0 * w[6],
+                42.0 * w[7],
+            ];
+            let error = self.errors(five, [NODES; 3], width);
+            (self.through_five(part), error, NODES * p[5])
+        };
+        let Curves { control, place } = curves;
         // Not by `map` of arrays, which would be calls.
-        let (mut error, mut control, mut upper) = (errors, values, [0.0; 6]);
-        for q in 0..6 {
-            control[q] = quartic(&values[q]);
-            error[q] = if self.narrow[q] > 0.0 {
-                errors[q] * self.narrow[q]
-            } else {
-                0.0
-            };
-            upper[q] = hull(&control[q]) + error[q];
+        let mut upper = error;
+        for (upper, control) in upper.iter_mut().zip(&control) {
+            *upper += hull(control);
         }
         Stretch {
             start: self.trajectory.times()[index] + since,
@@ -162,11 +180,85 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
             upper,
             control,
             error,
-            place: quartic(&places),
-            place_error: NODES * p[5],
+            place,
+            place_error,
             piece: index,
             since,
         }
+    }
+
+    /// Errors of the ratios of interpolated derivatives, from their Taylor coefficients and the factors of
+    /// derivatives 1 to 3; 0 where the limit is infinite.
+    fn errors(&self, coefficients: [f64; 6], factors: [f64; 3], width: f64) -> [f64; 6] {
+        let mut errors = [0.0; 6];
+        let powers = [width, width.powi(2), width.powi(3)];
+        for q in (0..6).filter(|q| self.narrow[*q] > 0.0) {
+            errors[q] = coefficients[q] * factors[q % 3] / powers[q % 3] * self.narrow[q];
+        }
+        errors
+    }
+
+    /// The curves through the ends and the middle of a part, with the slopes at the ends where these are known.
+    fn through_three(&self, part: PiecePart) -> Curves {
+        let seen = [0.0, 0.5, 1.0].map(|share| self.seen(part, share));
+        let slope = 0.25 * part.width;
+        let mut control = [[Vector3::zeros(); 5]; 6];
+        for (q, control) in control.iter_mut().enumerate() {
+            let narrow = self.narrow[q];
+            let value = |i: usize, order: usize| {
+                let parts = if q < 3 {
+                    &seen[i].linear
+                } else {
+                    &seen[i].angular
+                };
+                parts[order] * narrow
+            };
+            let order = q % 3;
+            let values = [value(0, order), value(1, order), value(2, order)];
+            *control = if order == 2 {
+                parabola(values)
+            } else {
+                hermite(
+                    values,
+                    [value(0, order + 1) * slope, value(2, order + 1) * slope],
+                )
+            };
+        }
+        let [first, middle, last] = seen.each_ref().map(|seen| seen.pose.translation.vector);
+        let slopes = [seen[0].linear[0] * slope, seen[2].linear[0] * slope];
+        Curves {
+            control,
+            place: hermite([first, middle, last], slopes),
+        }
+    }
+
+    /// The curves through five places of a part.
+    fn through_five(&self, part: PiecePart) -> Curves {
+        let mut values = [[Vector3::zeros(); 5]; 6];
+        let mut places = [Vector3::zeros(); 5];
+        for i in 0..5 {
+            let seen = self.seen(part, 0.25 * i as f64);
+            places[i] = seen.pose.translation.vector;
+            for k in 0..3 {
+                values[k][i] = seen.linear[k] * self.narrow[k];
+                values[k + 3][i] = seen.angular[k] * self.narrow[k + 3];
+            }
+        }
+        let mut control = values;
+        for (control, values) in control.iter_mut().zip(&values) {
+            *control = quartic(values);
+        }
+        Curves {
+            control,
+            place: quartic(&places),
+        }
+    }
+
+    /// The tool at a share of a part of a piece.
+    fn seen(&self, part: PiecePart, share: f64) -> ToolPoint {
+        let s = self.trajectory.pieces()[part.index].sample(part.since + part.width * share);
+        let q = [s.position, s.velocity, s.acceleration, s.jerk];
+        self.tool.motion(&JointPoint { q })
     }
 
     /// Adds the intervals of a part of a piece, each short enough for its error.
@@ -300,6 +392,30 @@ fn quartic(f: &[Vector3<f64>; 5]) -> [Vector3<f64>; 5] {
         (sides + f[2] * 120.0) / 18.0,
         beside(4, 3, 2, 1, 0),
         f[4],
+    ]
+}
+
+/// Bernstein points of the quartic through the values at both ends and in the middle that has the slopes at
+/// the ends, given as a quarter of the change over the whole interval.
+fn hermite(
+    [first, middle, last]: [Vector3<f64>; 3],
+    slopes: [Vector3<f64>; 2],
+) -> [Vector3<f64>; 5] {
+    let (second, fourth) = (first + slopes[0], last - slopes[1]);
+    let third = (middle * 16.0 - first - last - (second + fourth) * 4.0) / 6.0;
+    [first, second, third, fourth, last]
+}
+
+/// The same of the parabola through these values.
+fn parabola([first, middle, last]: [Vector3<f64>; 3]) -> [Vector3<f64>; 5] {
+    let bend = middle * 2.0 - (first + last) * 0.5;
+    let third = (first + bend * 4.0 + last) / 6.0;
+    [
+        first,
+        (first + bend) * 0.5,
+        third,
+        (bend + last) * 0.5,
+        last,
     ]
 }
 

@@ -6,9 +6,9 @@ use realtime::Piece;
 use super::bound::{Precision, bound};
 use super::grid::Bounded;
 use super::gridpoints::ToolGridpoint;
-use super::hull::{FLOOR, Hulls, TOLERANCE};
 use super::pieces::Pieces;
 use crate::active::Active;
+use crate::hull::{FLOOR, Hulls, TOLERANCE};
 use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
 use crate::near_ends;
 use crate::{JointLimits, Path, ToolLimits, ToolPoint};
@@ -16,8 +16,6 @@ use simd::Build;
 
 /// A limit counts as active from this ratio on.
 const ACTIVE: f64 = 0.97;
-/// Places in a piece at which the tool is sampled, its ends included.
-const TOOL_SAMPLES: usize = 5;
 
 /// Ratios of every limit over every piece.
 #[derive(Clone, Debug)]
@@ -81,20 +79,26 @@ impl Audit {
         law: &Piece<1>,
         (tool, seen): (&[Option<(Limit, f64)>; 6], &mut Seen),
     ) {
-        let mut samples = [[0.0; 6]; TOOL_SAMPLES];
-        for (i, sample) in samples.iter_mut().enumerate() {
-            let t = law.duration * i as f64 / (TOOL_SAMPLES - 1) as f64;
-            *sample = tool_norms(path, law, t, seen);
+        let narrow = tool.map(|entry| entry.map_or(0.0, |(_, limit)| 1.0 / limit));
+        let at = |quarter: u8, seen: &mut Seen| {
+            let norms = tool_norms(path, law, 0.25 * law.duration * f64::from(quarter), seen);
+            SVector::from(norms).component_mul(&SVector::from(narrow))
+        };
+        let few = [at(0, seen), at(2, seen), at(4, seen)];
+        let mut found = peaks(&few);
+        // Far from all limits no closer look is needed.
+        if !found.iter().all(|[most, margin]| most + margin < FLOOR) {
+            let mut aside = *seen;
+            let [first, last] = [1, 3].map(|quarter| at(quarter, &mut aside));
+            found = peaks(&[few[0], first, few[1], last, few[2]]);
         }
-        for (column, entry) in tool.iter().enumerate() {
-            if let Some((_, limit)) = entry {
-                let values = samples.map(|sample| sample[column] / limit);
-                let most = values.iter().fold(0.0_f64, |most, x| most.max(*x));
-                let bend = values.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());
-                let margin = 0.125 * bend.fold(0.0, f64::max);
-                self.tool_margin = self.tool_margin.max(margin);
-                self.ratios.push(most + margin);
-            }
+        for ([most, margin], _) in found
+            .into_iter()
+            .zip(tool)
+            .filter(|(_, limit)| limit.is_some())
+        {
+            self.tool_margin = self.tool_margin.max(margin);
+            self.ratios.push(most + margin);
         }
     }
 
@@ -165,6 +169,17 @@ impl Audit {
     }
 }
 
+/// The largest of values at equal steps of time, and by how much a peak between them may be higher, as
+/// their second differences tell.
+fn peaks<const M: usize>(values: &[SVector<f64, 6>; M]) -> [[f64; 2]; 6] {
+    let (mut most, mut bend) = (values[0], SVector::<f64, 6>::zeros());
+    for three in values.windows(3) {
+        most = most.sup(&three[1]).sup(&three[2]);
+        bend = bend.sup(&(three[0] - three[1] * 2.0 + three[2]).abs());
+    }
+    std::array::from_fn(|k| [most[k], 0.125 * bend[k]])
+}
+
 /// The finite limits of the joints.
 fn joint_limits<const N: usize>(values: &[SVector<f64, N>; 3]) -> Vec<Limit> {
     let names = [
@@ -232,7 +247,7 @@ impl<const N: usize> JointBounds<N> {
         for (order, hull) in hulls.iter_mut().enumerate() {
             if hull.loose {
                 for j in 0..N {
-                    if hull.most[j] > FLOOR && hull.over[j] > TOLERANCE {
+                    if hull.most[j] > FLOOR && hull.most[j] - hull.ends[j] > TOLERANCE {
                         hull.most[j] = self.tight(piece, order, j);
                     }
                 }
@@ -272,6 +287,7 @@ impl<const N: usize> JointBounds<N> {
 
 /// The tool at the place of the path that was looked at last: a piece starts where the one before it
 /// ends.
+#[derive(Clone, Copy)]
 struct Seen {
     u: f64,
     tool: ToolPoint,

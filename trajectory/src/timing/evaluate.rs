@@ -1,6 +1,6 @@
 //! Computes values and multipliers of the rows of a problem under a law.
 
-use super::block::{LANE, Lane, combine, dot};
+use super::block::{LANE, Lane, dot, lanes, times, times_two};
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
 use super::state::{ConstraintRow, State};
@@ -53,16 +53,6 @@ impl<S: Four> Spots<S> {
             c: self.c,
         }
     }
-}
-
-/// A vector in registers.
-#[inline(always)]
-pub(super) fn vector<S: Four>(simd: S, lanes: &[Lane; 3]) -> [F4<S>; 3] {
-    [
-        F4::load(simd, &lanes[0]),
-        F4::load(simd, &lanes[1]),
-        F4::load(simd, &lanes[2]),
-    ]
 }
 
 /// Computes the value of every row for the law `x`. The time is NaN if the law is not positive
@@ -123,10 +113,11 @@ fn values<S: Four>(slot: Values<'_>, spot: Spots<S>) -> F4<S> {
         g.store(&mut row.g);
         most = (g * g).max(most);
     }
-    for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-        let g = combine([vector(simd, p), vector(simd, q)], [spot.b, spot.a]);
-        store(g, &mut norm.g);
-        most = dot(g, g).max(most);
+    for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+        let [a, b] = times_two(lanes(simd, line), [spot.a, spot.b]);
+        let square = a * spot.a + b * spot.b;
+        square.store(&mut norm.square);
+        most = square.max(most);
     }
     most
 }
@@ -140,25 +131,16 @@ fn jerks<S: Four>(slot: Jerks<'_>, spot: Spots<S>) -> F4<S> {
     let mut most = F4::splat(simd, 0.0);
     for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
         let (x, y, z) = (F4::load(simd, x), F4::load(simd, y), F4::load(simd, z));
-        let g = x * a + y * b + z * c;
+        let g = dot([x, y, z], [a, b, c]);
         g.store(&mut row.g);
         most = (g * g).max(most);
     }
-    for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-        let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-        let g = combine(line, [a, b, c]);
-        store(g, &mut norm.g);
-        most = dot(g, g).max(most);
+    for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+        let square = dot(times(lanes(simd, line), [a, b, c]), [a, b, c]);
+        square.store(&mut norm.square);
+        most = square.max(most);
     }
     most
-}
-
-/// Writes a vector to memory.
-#[inline(always)]
-fn store<S: Four>(vector: [F4<S>; 3], to: &mut [Lane; 3]) {
-    for (lane, x) in to.iter_mut().zip(vector) {
-        x.store(lane);
-    }
 }
 
 /// What happens to the multipliers.
@@ -197,8 +179,8 @@ impl Op for Multipliers<'_> {
             .iter_mut()
             .chain(&mut state.norm_jerk)
         {
-            let g = vector(simd, &row.g);
-            total += turn.take(one - dot(g, g), &mut row.multiplier, &row.change);
+            let square = F4::load(simd, &row.square);
+            total += turn.take(one - square, &mut row.multiplier, &row.change);
         }
         total.sum()
     }

@@ -9,20 +9,20 @@ pub(super) struct Lines<'a> {
     problem: &'a Problem,
     acceleration: (&'a [[Lane; 2]], &'a mut [ConstraintRow]),
     jerk: (&'a [[Lane; 3]], &'a mut [ConstraintRow]),
-    norm_acceleration: (&'a [[[Lane; 3]; 2]], &'a mut [Norm]),
-    norm_jerk: (&'a [[[Lane; 3]; 3]], &'a mut [Norm]),
+    norm_acceleration: (&'a [[Lane; 3]], &'a mut [Norm]),
+    norm_jerk: (&'a [[Lane; 6]], &'a mut [Norm]),
 }
 
 /// The rows of a slot of values.
 pub(super) struct Values<'a> {
     pub joints: (&'a [[Lane; 2]], &'a mut [ConstraintRow]),
-    pub tools: (&'a [[[Lane; 3]; 2]], &'a mut [Norm]),
+    pub tools: (&'a [[Lane; 3]], &'a mut [Norm]),
 }
 
 /// The rows of a jerk slot.
 pub(super) struct Jerks<'a> {
     pub joints: (&'a [[Lane; 3]], &'a mut [ConstraintRow]),
-    pub tools: (&'a [[[Lane; 3]; 3]], &'a mut [Norm]),
+    pub tools: (&'a [[Lane; 6]], &'a mut [Norm]),
 }
 
 /// What a block has besides its rows: how the law follows from the unknowns, share in the time and

@@ -13,7 +13,6 @@ mod certificate;
 mod evaluate;
 mod grid;
 mod gridpoints;
-mod hull;
 mod interior;
 mod joint;
 mod law;

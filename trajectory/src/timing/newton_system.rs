@@ -1,8 +1,8 @@
 //! The Newton system of a law: what each row adds to it.
 
 use super::band::Band;
-use super::block::{LANE, Lane, dot};
-use super::evaluate::{Spots, vector};
+use super::block::{LANE, Lane, dot, lanes, times, times_two};
+use super::evaluate::Spots;
 use super::lines::{Jerks, Lines, Values};
 use super::problem::{Basis, Problem};
 use super::state::{ConstraintRow, Norm, State};
@@ -31,6 +31,16 @@ fn weigh<S: Four>(simd: S, row: &ConstraintRow, mu: F4<S>) -> (F4<S>, F4<S>) {
     let pull = twice / (F4::splat(simd, 1.0) - g * g);
     let curve = F4::splat(simd, 2.0) + twice * pull;
     (F4::load(simd, &row.multiplier) * curve, mu * pull)
+}
+
+/// Weights of a row bounded in norm: of its dot products and of their squares in the matrix, and of the
+/// right side.
+#[inline(always)]
+fn norm_weights<S: Four>(simd: S, row: &Norm, mu: F4<S>) -> [F4<S>; 3] {
+    let slack = F4::splat(simd, 1.0) - F4::load(simd, &row.square);
+    let twice = F4::splat(simd, 2.0) / slack;
+    let flat = F4::load(simd, &row.multiplier) * 2.0;
+    [flat, flat * twice, mu * twice]
 }
 
 impl<S: Four> NewtonBlock<S> {
@@ -64,7 +74,7 @@ impl<S: Four> NewtonBlock<S> {
             ac: ac2,
             bb: twice * (ab2 + ab) + self.bb,
             bc: twice * ac2 + skew,
-            cc: y * ac2 + x * skew + (y * ac + x * self.bc + self.cc),
+            cc: y * (ac2 + ac) + x * (skew + self.bc) + self.cc,
             gb: twice * self.ga + self.gb,
             gc: y * self.ga + x * self.gb + self.gc,
             ..*self
@@ -103,7 +113,7 @@ impl<S: Four> NewtonBlock<S> {
     #[inline(always)]
     fn jerks(&mut self, lines: &[[Lane; 3]], rows: &[ConstraintRow], mu: F4<S>) {
         for (line, row) in lines.iter().zip(rows) {
-            let [x, y, z] = vector(self.simd, line);
+            let [x, y, z] = lanes(self.simd, line);
             let (weight, force) = weigh(self.simd, row, mu);
             let (wx, wy) = (weight * x, weight * y);
             self.aa += wx * x;
@@ -140,20 +150,20 @@ impl<S: Four> NewtonBlock<S> {
         }
     }
 
-    /// Adds a row bounded in norm, with the derivatives of its vector to `a`, `b`, `c`.
+    /// Adds a jerk row bounded in norm, `line` its dot products, where the law is `law`: `sqrt(a)` times
+    /// `a`, `b` and `c`.
     #[inline(always)]
-    fn norm(&mut self, [ra, rb, rc]: [[F4<S>; 3]; 3], row: &Norm, mu: F4<S>) {
-        let g = vector(self.simd, &row.g);
-        let twice = F4::splat(self.simd, 2.0) / (F4::splat(self.simd, 1.0) - dot(g, g));
-        let (ta, tb, tc) = (dot(g, ra), dot(g, rb), dot(g, rc));
-        let flat = F4::load(self.simd, &row.multiplier) * 2.0;
-        let (steep, force) = (flat * twice, mu * twice);
-        self.aa += flat * dot(ra, ra) + steep * ta * ta;
-        self.ab += flat * dot(ra, rb) + steep * ta * tb;
-        self.ac += flat * dot(ra, rc) + steep * ta * tc;
-        self.bb += flat * dot(rb, rb) + steep * tb * tb;
-        self.bc += flat * dot(rb, rc) + steep * tb * tc;
-        self.cc += flat * dot(rc, rc) + steep * tc * tc;
+    fn norm(&mut self, line: [F4<S>; 6], law: [F4<S>; 3], row: &Norm, mu: F4<S>) {
+        let [ta, tb, tc] = times(line, law);
+        let ([aa, ab, ac, bb, bc, cc], [flat, steep, force]) =
+            (line, norm_weights(self.simd, row, mu));
+        let (sa, sb, sc) = (steep * ta, steep * tb, steep * tc);
+        self.aa += flat * aa + sa * ta;
+        self.ab += flat * ab + sa * tb;
+        self.ac += flat * ac + sa * tc;
+        self.bb += flat * bb + sb * tb;
+        self.bc += flat * bc + sb * tc;
+        self.cc += flat * cc + sc * tc;
         self.ga += force * ta;
         self.gb += force * tb;
         self.gc += force * tc;
@@ -175,12 +185,18 @@ impl<S: Four> NewtonBlock<S> {
 
     /// Adds a slot of values.
     #[inline(always)]
-    fn values(&mut self, slot: Values<'_>, mu: F4<S>) {
-        let simd = self.simd;
+    fn values(&mut self, slot: Values<'_>, spot: Spots<S>, mu: F4<S>) {
         self.accelerations(slot.joints.0, slot.joints.1, mu);
-        for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let still = [F4::splat(simd, 0.0); 3];
-            self.norm([vector(simd, q), vector(simd, p), still], norm, mu);
+        for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let line = lanes(self.simd, line);
+            let [ta, tb] = times_two(line, [spot.a, spot.b]);
+            let ([aa, ab, bb], [flat, steep, force]) = (line, norm_weights(self.simd, norm, mu));
+            let (sa, sb) = (steep * ta, steep * tb);
+            self.aa += flat * aa + sa * ta;
+            self.ab += flat * ab + sa * tb;
+            self.bb += flat * bb + sb * tb;
+            self.ga += force * ta;
+            self.gb += force * tb;
         }
     }
 
@@ -190,9 +206,10 @@ impl<S: Four> NewtonBlock<S> {
         let simd = spot.a.build();
         let mut share = Self::zero(simd);
         share.jerks(slot.joints.0, slot.joints.1, mu);
-        for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-            share.norm(line, norm, mu);
+        let root = spot.a.sqrt();
+        let law = [root * spot.a, root * spot.b, root * spot.c];
+        for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            share.norm(lanes(simd, line), law, norm, mu);
         }
         share.rooted(spot)
     }
@@ -234,11 +251,8 @@ impl<S: Four> NewtonBlock<S> {
     /// The curvature times a column.
     #[inline(always)]
     fn times(&self, column: [F4<S>; 3]) -> [F4<S>; 3] {
-        [
-            dot([self.aa, self.ab, self.ac], column),
-            dot([self.ab, self.bb, self.bc], column),
-            dot([self.ac, self.bc, self.cc], column),
-        ]
+        let matrix = [self.aa, self.ab, self.ac, self.bb, self.bc, self.cc];
+        times(matrix, column)
     }
 }
 
@@ -269,8 +283,8 @@ impl Op for AssembleNewton<'_> {
             let (mut total, mut inner) = (NewtonBlock::zero(simd), NewtonBlock::zero(simd));
             total.value(&value[0], &cap[0], left.a, mu);
             inner.value(&value[1], &cap[1], middle.a, mu);
-            total.values(lines.values(), mu);
-            inner.values(lines.values(), mu);
+            total.values(lines.values(), left, mu);
+            inner.values(lines.values(), middle, mu);
             for share in self.problem.jerk_shares(i) {
                 let slot = lines.jerks();
                 if *share == 0.0 {
@@ -330,8 +344,7 @@ mod tests {
         }
         for norm in state.norm_acceleration.iter().chain(&state.norm_jerk) {
             for l in 0..LANE {
-                let square: f64 = norm.g.iter().map(|lane| lane[l] * lane[l]).sum();
-                logs += (1.0 - square).ln();
+                logs += (1.0 - norm.square[l]).ln();
             }
         }
         worth.time - mu * logs

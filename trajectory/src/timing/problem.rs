@@ -42,10 +42,12 @@ pub(super) struct Problem {
     /// Of both slots of values in each block: the weight in the time, over `1 / sqrt(a)` (Simpson's
     /// rule in each cell), and the reciprocal of the cap of `a`.
     pub value: Vec<[[Lane; 2]; 2]>,
-    /// Acceleration rows of the tool, bounded in norm.
-    pub norm_acceleration: Vec<[[Lane; 3]; 2]>,
-    /// Jerk rows of the tool, bounded in norm.
-    pub norm_jerk: Vec<[[Lane; 3]; 3]>,
+    /// Acceleration rows of the tool, bounded in norm, `|p b + q a| <= 1`, as the dot products
+    /// `[q q, q p, p p]`.
+    pub norm_acceleration: Vec<[Lane; 3]>,
+    /// Jerk rows of the tool, bounded in norm, `sqrt(a) |x a + y b + z c| <= 1`, as the dot products
+    /// `[x x, x y, x z, y y, y z, z z]`.
+    pub norm_jerk: Vec<[Lane; 6]>,
     /// Whether the law has to begin with `a = 1`, `b = 0`.
     pub moving: bool,
 }
@@ -98,7 +100,7 @@ impl Problem {
             tool_jerks: tools[1],
             acceleration: vec![[[0.0; LANE]; 2]; 2 * blocks * joints],
             value: vec![[[[0.0; LANE]; 2]; 2]; blocks],
-            norm_acceleration: vec![[[[0.0; LANE]; 3]; 2]; 2 * blocks * tools[0]],
+            norm_acceleration: vec![[[0.0; LANE]; 3]; 2 * blocks * tools[0]],
             basis: vec![Basis::default(); blocks],
             moving,
             ..Self::default()
@@ -111,7 +113,7 @@ impl Problem {
         }
         problem.jerk_slots.push(slots);
         problem.jerk = vec![[[0.0; LANE]; 3]; slots * joints];
-        problem.norm_jerk = vec![[[[0.0; LANE]; 3]; 3]; slots * tools[1]];
+        problem.norm_jerk = vec![[[0.0; LANE]; 6]; slots * tools[1]];
         for k in 0..blocks * LANE {
             problem.fill_basis(k);
         }
@@ -212,7 +214,7 @@ impl Problem {
         rows.for_each(|x| *x *= narrow);
         let vectors = wide.norm_acceleration.iter_mut().flatten().flatten();
         let vectors = vectors.chain(wide.norm_jerk.iter_mut().flatten().flatten());
-        vectors.flatten().for_each(|x| *x *= narrow);
+        vectors.for_each(|x| *x *= narrow * narrow);
         for [_, cap] in wide.value.iter_mut().flatten() {
             cap.iter_mut().for_each(|cap| *cap *= narrow * narrow);
         }
@@ -226,15 +228,17 @@ impl Problem {
         for slot in [false, true].map(|middle| Self::value_slot(k, middle)) {
             let rows = self.acceleration[slot * joints..][..joints].iter_mut();
             let tools = self.norm_acceleration[slot * accelerations..][..accelerations].iter_mut();
-            let lanes = rows.flatten().chain(tools.flatten().flatten());
-            lanes.for_each(|lane| lane[l] *= factor);
+            rows.flatten().for_each(|lane| lane[l] *= factor);
+            let squares = tools.flatten();
+            squares.for_each(|lane| lane[l] *= factor * factor);
             self.value[slot / 2][slot % 2][1][l] *= factor * factor;
         }
         for slot in self.jerk_slots(k) {
             let rows = self.jerk[slot * joints..][..joints].iter_mut();
             let tools = self.norm_jerk[slot * jerks..][..jerks].iter_mut();
-            let lanes = rows.flatten().chain(tools.flatten().flatten());
-            lanes.for_each(|lane| lane[l] *= factor);
+            rows.flatten().for_each(|lane| lane[l] *= factor);
+            let squares = tools.flatten();
+            squares.for_each(|lane| lane[l] *= factor * factor);
         }
     }
 
@@ -244,7 +248,7 @@ impl Problem {
             row[0] = 0.0;
         }
         let norms = self.norm_acceleration[..self.tool_accelerations].iter_mut();
-        for lane in norms.flatten().flatten() {
+        for lane in norms.flatten() {
             lane[0] = 0.0;
         }
         self.value[0][0][1][0] = 1e-6;

@@ -62,16 +62,23 @@ impl ReachGrid {
     /// Adds the next point, at `u`, with the cap of `a` and rows `(p, q)`. Rows beyond the number
     /// given to [`ReachGrid::new`] are not taken.
     pub fn push(&mut self, u: f64, cap: f64, rows: impl Iterator<Item = (f64, f64)>) {
-        self.newest.fill([[0.0; LANE]; 2]);
-        for (i, (p, q)) in rows.take(LANE * self.width).enumerate() {
-            let group = &mut self.newest[i / LANE];
-            (group[0][i % LANE], group[1][i % LANE]) = (p, q);
+        let mut newest = std::mem::take(&mut self.newest);
+        newest.fill([[0.0; LANE]; 2]);
+        let lanes = newest.iter_mut().flat_map(|[p, q]| p.iter_mut().zip(q));
+        for ((p, q), row) in lanes.zip(rows) {
+            (*p, *q) = row;
         }
+        self.push_groups(u, cap, &newest);
+        self.newest = newest;
+    }
+
+    /// The same with the rows in groups.
+    pub(super) fn push_groups(&mut self, u: f64, cap: f64, groups: &[[Lane; 2]]) {
         let (width, first) = (self.width, self.lines.len());
         if let Some(before) = self.at.last() {
             // At the end of the cell before, a = a_before + 2 h b.
             let twice = 2.0 * (u - before);
-            for (line, [p, q]) in self.lines[first - width..].iter_mut().zip(&self.newest) {
+            for (line, [p, q]) in self.lines[first - width..].iter_mut().zip(groups) {
                 let mut seen = *p;
                 for (p, q) in seen.iter_mut().zip(q) {
                     *p += twice * q;
@@ -79,12 +86,14 @@ impl ReachGrid {
                 fill(line, &[seen, *q]);
             }
         }
-        let none = [[f64::MAX; LANE], [0.0; LANE]];
-        self.lines.resize(first + 2 * width, none);
         let mut flat = 0.0_f64;
-        for (line, row) in self.lines[first..].iter_mut().zip(&self.newest) {
-            flat = flat.max(fill(line, row));
-        }
+        let none = [[f64::MAX; LANE], [0.0; LANE]];
+        self.lines.extend(groups.iter().map(|row| {
+            let mut line = none;
+            flat = flat.max(fill(&mut line, row));
+            line
+        }));
+        self.lines.resize(first + 2 * width, none);
         self.at.push(u);
         self.cap.push(cap.min(1.0 / flat));
     }

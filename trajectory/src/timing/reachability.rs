@@ -3,6 +3,7 @@
 
 use nalgebra::{SVector, Vector3};
 
+use super::block::{LANE, Lane};
 use super::reach::{self, ReachGrid};
 use super::rise::{Rise, joint_ratio, speed_ratio};
 use super::{Boundary, TimingOptions};
@@ -70,7 +71,8 @@ impl ReachabilityPass {
             corners(path, bends.sizes)?;
         }
         let caps = rows.caps(&bends);
-        let grid = rows.grid(&at, (&bends, &caps), 1);
+        let groups = rows.groups(&bends);
+        let grid = rows.grid(&at, (&caps, &groups), 1);
         let first = first_value(options);
         let last = if options.end == Boundary::Rest {
             0.0
@@ -90,7 +92,7 @@ impl ReachabilityPass {
             return Err(TimingError::Unbounded);
         }
         // The difference from a grid of half the points estimates the error of this one.
-        let coarse = rows.grid(&at, (&bends, &caps), 2);
+        let coarse = rows.grid(&at, (&caps, &groups), 2);
         let slow = coarse.solve(first, last);
         let both = [(&at[..], &a[..]), (coarse.at(), &slow[..])];
         let [fine, coarse] = match bends.rise(joint, options) {
@@ -301,19 +303,29 @@ impl<const N: usize> Rows<'_, N> {
         caps
     }
 
-    /// The grid at every `step`-th of the places `at`, and at the last, with the caps there.
-    fn grid(&self, at: &[f64], (bends, caps): (&Bends<N>, &[f64]), step: usize) -> ReachGrid {
-        let tool = [self.tool.acceleration, self.tool.angular_acceleration];
-        let tools = tool.iter().filter(|limit| limit.is_finite()).count();
-        let joints = if self.leading.is_some() { 1 } else { N };
-        let mut grid = ReachGrid::with_room(joints + 3 * tools, at.len() / step + 2);
-        let narrow = self.joint.acceleration.map(|x| 1.0 / x);
-        for (i, cap) in caps.iter().enumerate() {
+    /// The grid at every `step`-th of the places `at`, and at the last, with the caps and rows there.
+    fn grid(&self, at: &[f64], (caps, groups): (&[f64], &[[Lane; 2]]), step: usize) -> ReachGrid {
+        let mut grid = ReachGrid::with_room(self.count(), at.len() / step + 2);
+        let places = at.iter().zip(caps).zip(groups.chunks(self.width()));
+        for (i, ((u, cap), groups)) in places.enumerate() {
             if i % step == 0 || i + 1 == at.len() {
-                grid.push(at[i], *cap, self.rows(bends, i, &narrow));
+                grid.push_groups(*u, *cap, groups);
             }
         }
         grid
+    }
+
+    /// Rows at a place.
+    fn count(&self) -> usize {
+        let tool = [self.tool.acceleration, self.tool.angular_acceleration];
+        let tools = tool.iter().filter(|limit| limit.is_finite()).count();
+        let joints = if self.leading.is_some() { 1 } else { N };
+        joints + 3 * tools
+    }
+
+    /// Groups of rows at a place.
+    fn width(&self) -> usize {
+        self.count().div_ceil(LANE)
     }
 
     /// The cap from speeds at place `i`. Jerk limits are used as if the rate were constant there.
@@ -328,27 +340,35 @@ impl<const N: usize> Rows<'_, N> {
         speed_cap::<N>(speeds, self.tool, rate)
     }
 
-    /// Acceleration rows `(p, q)` at place `i`, those of joints times `narrow`; those of the tool
-    /// for each axis, which bounds a little less than the norm does.
-    fn rows(
-        &self,
-        bends: &Bends<N>,
-        i: usize,
-        narrow: &SVector<f64, N>,
-    ) -> impl Iterator<Item = (f64, f64)> {
-        let [first, second] = bends.joints[i];
-        let narrow = *narrow;
-        let all = self.leading.map_or(0..N, |j| j..j + 1);
-        let joints = all.map(move |j| (first[j] * narrow[j], second[j] * narrow[j]));
-        let axes = |[p, q]: [Vector3<f64>; 2], limit: f64| {
-            let count = if limit.is_finite() { 3 } else { 0 };
-            (0..count).map(move |i| (p[i] / limit, q[i] / limit))
-        };
-        let [linear, angular] = bends.tool(i);
-        let linear = axes(linear, self.tool.acceleration);
-        joints
-            .chain(linear)
-            .chain(axes(angular, self.tool.angular_acceleration))
+    /// Acceleration rows `(p, q)` at all places, in groups; those of the tool for each axis, which bounds
+    /// a little less than the norm does.
+    fn groups(&self, bends: &Bends<N>) -> Vec<[Lane; 2]> {
+        let (narrow, width) = (self.joint.acceleration.map(|x| 1.0 / x), self.width());
+        let joints = self.leading.map_or(0..N, |j| j..j + 1);
+        let mut all = vec![[[0.0; LANE]; 2]; width * bends.joints.len()];
+        for (i, groups) in all.chunks_mut(width).enumerate() {
+            let mut row = 0;
+            let mut put = |p: f64, q: f64| {
+                let group = &mut groups[row / LANE];
+                (group[0][row % LANE], group[1][row % LANE]) = (p, q);
+                row += 1;
+            };
+            let [first, second] = &bends.joints[i];
+            for j in joints.clone() {
+                put(first[j] * narrow[j], second[j] * narrow[j]);
+            }
+            let [linear, angular] = bends.tool(i);
+            let tools = [
+                (linear, self.tool.acceleration),
+                (angular, self.tool.angular_acceleration),
+            ];
+            for ([p, q], limit) in tools.into_iter().filter(|(_, limit)| limit.is_finite()) {
+                for axis in 0..3 {
+                    put(p[axis] / limit, q[axis] / limit);
+                }
+            }
+        }
+        all
     }
 }
 

@@ -145,8 +145,7 @@ impl<const N: usize> Rows<'_, N> {
         let count = problem.tool_accelerations;
         let rows = problem.norm_acceleration[slot * count..].iter_mut();
         for (row, ([p, q, _], limit)) in rows.zip(finite) {
-            set(&mut row[0], l, p / *limit);
-            set(&mut row[1], l, q / *limit);
+            set(row, l, [q / *limit, p / *limit]);
         }
         let speeds = [
             speed_ratio(&gridpoint.position, first, self.joint),
@@ -182,17 +181,19 @@ impl<const N: usize> Rows<'_, N> {
         let finite = tools.iter().filter(|(_, limit)| limit.is_finite());
         let rows = problem.norm_jerk[slot * problem.tool_jerks..].iter_mut();
         for (row, ([p, q, r], limit)) in rows.zip(finite) {
-            set(&mut row[0], l, r / *limit);
-            set(&mut row[1], l, q * (3.0 / limit));
-            set(&mut row[2], l, p / *limit);
+            set(row, l, [r / *limit, q * (3.0 / limit), p / *limit]);
         }
     }
 }
 
-/// Sets the vector of one cell.
-fn set(to: &mut [Lane; 3], l: usize, vector: Vector3<f64>) {
-    for (lane, x) in to.iter_mut().zip(vector.iter()) {
-        lane[l] = *x;
+/// Sets the dot products of the vectors of one cell.
+#[inline]
+fn set<const M: usize, const P: usize>(to: &mut [Lane; P], l: usize, vectors: [Vector3<f64>; M]) {
+    let mut lanes = to.iter_mut();
+    for i in 0..M {
+        for (k, lane) in (i..M).zip(&mut lanes) {
+            lane[l] = vectors[i].dot(&vectors[k]);
+        }
     }
 }
 

@@ -11,10 +11,10 @@ pub(super) struct ConstraintRow {
     pub change: Lane,
 }
 
-/// The same of a row bounded in norm.
+/// The same of a row bounded in norm: the square of the norm, multipliers and their steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Norm {
-    pub g: [Lane; 3],
+    pub square: Lane,
     pub multiplier: Lane,
     pub change: Lane,
 }

@@ -1,7 +1,7 @@
 //! How far a Newton step may go.
 
-use super::block::{LANE, Lane, combine, dot};
-use super::evaluate::{Spots, vector};
+use super::block::{LANE, Lane, dot, lanes, times, times_two};
+use super::evaluate::Spots;
 use super::lines::{Jerks, Lines, Values};
 use super::problem::Problem;
 use super::state::{ConstraintRow, Norm, State};
@@ -45,19 +45,19 @@ impl<S: Four> Strides<S> {
 
     /// Takes in a row bounded in norm that changes by `d`.
     #[inline(always)]
-    fn norm(&mut self, row: &mut Norm, d: [F4<S>; 3]) {
-        let one = F4::splat(self.simd, 1.0);
-        let g = vector(self.simd, &row.g);
+    fn norm(&mut self, row: &mut Norm, [half, square]: [F4<S>; 2]) {
+        let (zero, one) = (F4::splat(self.simd, 0.0), F4::splat(self.simd, 1.0));
         let m = F4::load(self.simd, &row.multiplier);
-        let slack = one - dot(g, g);
-        let (half, square) = (dot(g, d), dot(d, d));
-        let inverse = slack.inverse();
+        let slack = one - F4::load(self.simd, &row.square);
+        // One division for both reciprocals.
+        let both = (slack * m).inverse();
+        let inverse = both * m;
         // |g + t d| = 1, for 1 / t: slack r² - 2 half r - square = 0.
-        let ratio = (half + (half * half + slack * square).sqrt()) * inverse;
+        let ratio = (half + (half * half + slack * square).max(zero).sqrt()) * inverse;
         self.primal = ratio.max(self.primal);
         let new = (self.mu + (m + m) * half) * inverse;
         (new - m).store(&mut row.change);
-        self.dual = (one - new / m).max(self.dual);
+        self.dual = (one - new * (both * slack)).max(self.dual);
     }
 
     /// Takes in a cap of `a`, which changes by `da`.
@@ -76,14 +76,16 @@ impl<S: Four> Strides<S> {
 
     /// Takes in the rows of a slot of values.
     #[inline(always)]
-    fn values(&mut self, slot: Values<'_>, d: Spots<S>) {
+    fn values(&mut self, slot: Values<'_>, at: Spots<S>, d: Spots<S>) {
         let simd = self.simd;
         for ([p, q], row) in slot.joints.0.iter().zip(slot.joints.1) {
             self.row(row, F4::load(simd, p) * d.b + F4::load(simd, q) * d.a);
         }
-        for ([p, q], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let d = combine([vector(simd, p), vector(simd, q)], [d.b, d.a]);
-            self.norm(norm, d);
+        for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let [ta, tb] = times_two(lanes(simd, line), [d.a, d.b]);
+            let half = ta * at.a + tb * at.b;
+            let square = ta * d.a + tb * d.b;
+            self.norm(norm, [half, square]);
         }
     }
 
@@ -98,11 +100,12 @@ impl<S: Four> Strides<S> {
         let c = root * (d.c + half * at.c);
         for ([x, y, z], row) in slot.joints.0.iter().zip(slot.joints.1) {
             let (x, y, z) = (F4::load(simd, x), F4::load(simd, y), F4::load(simd, z));
-            self.row(row, x * a + y * b + z * c);
+            self.row(row, dot([x, y, z], [a, b, c]));
         }
-        for ([x, y, z], norm) in slot.tools.0.iter().zip(slot.tools.1) {
-            let line = [vector(simd, x), vector(simd, y), vector(simd, z)];
-            self.norm(norm, combine(line, [a, b, c]));
+        let law = [root * at.a, root * at.b, root * at.c];
+        for (line, norm) in slot.tools.0.iter().zip(slot.tools.1) {
+            let t = times(lanes(simd, line), [a, b, c]);
+            self.norm(norm, [dot(t, law), dot(t, [a, b, c])]);
         }
     }
 }
@@ -138,8 +141,8 @@ impl Op for Measure<'_> {
             let (middle, further) = (left.moved(half), change.moved(half));
             step_lengths.value(&value[0][1], &mut cap[0], left.a, change.a);
             step_lengths.value(&value[1][1], &mut cap[1], middle.a, further.a);
-            step_lengths.values(lines.values(), change);
-            step_lengths.values(lines.values(), further);
+            step_lengths.values(lines.values(), left, change);
+            step_lengths.values(lines.values(), middle, further);
             for share in self.problem.jerk_shares(i) {
                 let x = width * *share;
                 step_lengths.jerks(lines.jerks(), left.moved(x), change.moved(x));

@@ -112,15 +112,14 @@ fn scale(problem: &mut Problem, k: usize, tools: &Tools, limit: Limit, factor: f
             let second = limit == Limit::AngularAcceleration && tools.linear_acceleration;
             for (slot, l) in values {
                 let row = slot * problem.tool_accelerations + usize::from(second);
-                let vectors = &mut problem.norm_acceleration[row];
-                vectors.iter_mut().for_each(|x| widen(x, l, factor));
+                widen(&mut problem.norm_acceleration[row], l, factor * factor);
             }
         }
         Limit::ToolJerk | Limit::AngularJerk => {
             let second = limit == Limit::AngularJerk && tools.linear_jerk;
             for slot in jerks {
-                let vectors = &mut problem.norm_jerk[slot * tool_jerks + usize::from(second)];
-                vectors.iter_mut().for_each(|x| widen(x, l, factor));
+                let row = slot * tool_jerks + usize::from(second);
+                widen(&mut problem.norm_jerk[row], l, factor * factor);
             }
         }
         _ => {

@@ -1,21 +1,21 @@
-//! Bernstein hulls of the derivatives of a piece, all joints at once.
+//! Bernstein hulls of a piece and its derivatives, all joints at once.
 
 use nalgebra::SVector;
 use realtime::Piece;
 use simd::{F4, Four, Op, groups};
 
 /// Ratios below this need no better bound than the hull: they are far from the limit.
-pub(super) const FLOOR: f64 = 0.9;
+pub(crate) const FLOOR: f64 = 0.9;
 /// Largest distance of a hull from a ratio that is reached.
-pub(super) const TOLERANCE: f64 = 1e-7;
+pub(crate) const TOLERANCE: f64 = 1e-7;
 
 /// Of one derivative of each joint over a piece, over its limit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hull<const N: usize> {
+pub(crate) struct Hull<const N: usize> {
     /// The largest magnitude of its Bernstein points, which bounds it over the piece.
     pub most: [f64; N],
-    /// The excess of that over the values at the ends.
-    pub over: [f64; N],
+    /// The larger of the values at both ends.
+    pub ends: [f64; N],
     /// Whether for some joint the bound may be too high by more than the tolerance, above the
     /// floor.
     pub loose: bool,
@@ -26,7 +26,7 @@ pub(super) struct Hull<const N: usize> {
 /// # Source
 /// Convex hull property of the Bernstein form (Farin, Curves and Surfaces for CAGD, 2002,
 /// chapter 5).
-pub(super) struct Hulls<'a, const N: usize> {
+pub(crate) struct Hulls<'a, const N: usize> {
     pub piece: &'a Piece<N>,
     pub narrow: &'a [SVector<f64, N>; 3],
 }
@@ -38,7 +38,7 @@ impl<const N: usize> Op for Hulls<'_, N> {
     fn run<S: Four>(self, simd: S) -> [Hull<N>; 3] {
         let mut hulls = [Hull {
             most: [0.0; N],
-            over: [0.0; N],
+            ends: [0.0; N],
             loose: false,
         }; 3];
         let [velocity, acceleration, jerk] = &mut hulls;
@@ -88,18 +88,72 @@ impl<const N: usize> Hull<N> {
         for point in &points[1..M - 1] {
             most = point.abs().max(most);
         }
-        let (most, over) = (most * narrow, (most - ends) * narrow);
+        let (most, ends) = (most * narrow, ends * narrow);
         most.put(&mut self.most, at);
-        over.put(&mut self.over, at);
+        ends.put(&mut self.ends, at);
         let below = F4::splat(simd, FLOOR) - most;
-        let exact = F4::splat(simd, TOLERANCE) - over;
+        let exact = F4::splat(simd, TOLERANCE) - (most - ends);
         self.loose |= below.max(exact).least() < 0.0;
+    }
+}
+
+/// The hull of the positions over a piece.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent<const N: usize> {
+    /// Where it begins and ends.
+    pub ends: [[f64; N]; 2],
+    /// The lowest and the highest of its Bernstein points, which bound it over the piece.
+    pub hull: [[f64; N]; 2],
+}
+
+/// The hull of the positions over a piece.
+///
+/// # Source
+/// As [`Hulls`].
+pub(crate) struct Extents<'a, const N: usize>(pub &'a Piece<N>);
+
+impl<const N: usize> Op for Extents<'_, N> {
+    type Output = Extent<N>;
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> Extent<N> {
+        let mut extent = Extent {
+            ends: [[0.0; N]; 2],
+            hull: [[0.0; N]; 2],
+        };
+        let t = F4::splat(simd, self.0.duration);
+        let t2 = t * t;
+        let powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t];
+        for at in groups(N) {
+            let [c0, rest @ ..] = self.0.coefficients.each_ref();
+            let first = F4::some(simd, c0.as_slice(), at);
+            let term = |k: usize| F4::some(simd, rest[k].as_slice(), at) * powers[k];
+            let (a, b, c, d, e) = (term(0), term(1), term(2), term(3), term(4));
+            let points = [
+                first,
+                first + a * 0.2,
+                first + a * 0.4 + b * 0.1,
+                first + a * 0.6 + b * 0.3 + c * 0.1,
+                first + a * 0.8 + b * 0.6 + c * 0.4 + d * 0.2,
+                first + a + b + c + d + e,
+            ];
+            let (mut low, mut high) = (first, first);
+            for point in &points[1..] {
+                (low, high) = (point.min(low), point.max(high));
+            }
+            first.put(&mut extent.ends[0], at);
+            points[5].put(&mut extent.ends[1], at);
+            low.put(&mut extent.hull[0], at);
+            high.put(&mut extent.hull[1], at);
+        }
+        extent
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::poly::bernstein;
     use simd::Build;
 
     /// Against the derivatives at many places: bounded everywhere, met at the ends; the same in
@@ -111,6 +165,20 @@ mod tests {
             duration: 0.7,
             coefficients,
         };
+        let extents = |build: Build| build.run(Extents(&piece));
+        let (extent, plain) = (extents(Build::detect()), extents(Build::Plain));
+        assert_eq!((extent.ends, extent.hull), (plain.ends, plain.hull));
+        let form = bernstein(&coefficients, 0.0, 0.7);
+        for j in 0..N {
+            let [low, high] = [extent.hull[0][j], extent.hull[1][j]];
+            let points = form.map(|point| point[j]);
+            let ends = [points[0] - extent.ends[0][j], points[5] - extent.ends[1][j]];
+            let hull = [
+                points.iter().copied().fold(f64::INFINITY, f64::min) - low,
+                points.iter().copied().fold(f64::NEG_INFINITY, f64::max) - high,
+            ];
+            assert!(ends.iter().chain(&hull).all(|off| off.abs() < 1e-14));
+        }
         let narrow = [0.5, 0.1, 0.02].map(SVector::repeat);
         let hulls = |build: Build| {
             build.run(Hulls {
@@ -125,15 +193,15 @@ mod tests {
             .collect();
         for order in 0..3 {
             let (hull, plain) = (&hulls[order], &plain[order]);
-            assert_eq!((hull.most, hull.over), (plain.most, plain.over));
+            assert_eq!((hull.most, hull.ends), (plain.most, plain.ends));
             let mut loose = false;
             for j in 0..N {
                 let ratio = |i: usize| (samples[i][order][j] * narrow[order][j]).abs();
                 let most = (0..=1000).map(ratio).fold(0.0, f64::max);
                 let ends = ratio(0).max(ratio(1000));
                 assert!(most <= hull.most[j] * (1.0 + 1e-12));
-                assert!((hull.most[j] - hull.over[j] - ends).abs() < 1e-12 * (1.0 + ends));
-                loose |= hull.most[j] > FLOOR && hull.over[j] > TOLERANCE;
+                assert!((hull.ends[j] - ends).abs() < 1e-12 * (1.0 + ends));
+                loose |= hull.most[j] > FLOOR && hull.most[j] - hull.ends[j] > TOLERANCE;
             }
             assert_eq!((hull.loose, plain.loose), (loose, loose));
         }
