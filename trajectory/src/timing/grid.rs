@@ -5,10 +5,7 @@ use super::reparametrization::Reparametrization;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, ToolLimits};
 
-/// Cells over the time in which accelerations build up.
-const CELLS_PER_RAMP: f64 = 5.0;
-
-/// Finer cells give no better law and a slower search.
+/// Finer cells, over the time in which accelerations build up, give no better law and a slower search.
 const MOST_CELLS_PER_RAMP: f64 = 40.0;
 /// The grid of a law: where its nodes lie.
 #[derive(Clone, Debug)]
@@ -90,7 +87,9 @@ impl Grid {
         );
         let lead = if start_rest { 0.5 * ramp } else { 0.0 };
         let total = fast + lead + if end_rest { 0.5 * ramp } else { 0.0 };
-        let wanted = (CELLS_PER_RAMP * total / ramp).ceil().clamp(40.0, 20_000.0);
+        let wanted = (options.cells_per_ramp * total / ramp)
+            .ceil()
+            .clamp(40.0, 20_000.0);
         let most = (MOST_CELLS_PER_RAMP * total / ramp).ceil() as usize;
         let cells = options
             .cells

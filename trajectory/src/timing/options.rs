@@ -32,6 +32,8 @@ pub struct TimingOptions {
     /// Number of cells of the law; `None` chooses it from the duration and the path. At most forty
     /// are used for the time in which accelerations build up.
     pub cells: Option<usize>,
+    /// Cells over that time where `cells` is `None`: fewer cost less, and a little of the speed.
+    pub cells_per_ramp: f64,
     /// Largest distance (rad) of a joint from the path between the knots of the motion.
     pub fit: f64,
     /// Relative gap of the duration at which the search stops.
@@ -49,6 +51,7 @@ impl Default for TimingOptions {
             end: Boundary::Rest,
             rate_cap: None,
             cells: None,
+            cells_per_ramp: 5.0,
             fit: 1e-8,
             gap: 1e-3,
             reserve: 0.0,
@@ -62,7 +65,11 @@ impl TimingOptions {
     /// # Errors
     /// [`TimingError::BadOption`] with the first that is not.
     pub fn check(&self) -> Result<(), TimingError> {
-        let mut rows = vec![("fit", self.fit), ("gap", self.gap)];
+        let mut rows = vec![
+            ("fit", self.fit),
+            ("gap", self.gap),
+            ("cells_per_ramp", self.cells_per_ramp),
+        ];
         rows.extend(self.rate_cap.map(|cap| ("rate_cap", cap)));
         rows.extend(self.cells.map(|cells| ("cells", cells as f64)));
         if let Boundary::Moving { rate, .. } = self.start {
