@@ -56,6 +56,7 @@ impl<const N: usize> Planner<N> {
             start: Boundary::Rest,
             end: Boundary::Rest,
             gap: GAP,
+            widest: 8,
             ..Default::default()
         };
         let path = joint_path(curve, &points)?;

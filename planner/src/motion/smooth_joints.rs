@@ -21,7 +21,7 @@ const ALONG: TimingOptions = TimingOptions {
     end: Boundary::Free,
     rate_cap: Some(1.0),
     cells: None,
-    cells_per_ramp: 5.0,
+    widest: 8,
     fit: 1e-8,
     gap: 1e-3,
     reserve: 0.0,

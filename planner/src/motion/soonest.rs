@@ -32,16 +32,10 @@ pub(super) const RESTING: TimingOptions = TimingOptions {
     end: Boundary::Rest,
     rate_cap: None,
     cells: None,
-    cells_per_ramp: 5.0,
+    widest: 8,
     fit: 1e-8,
     gap: 4e-4,
     reserve: 0.0,
-};
-
-/// The same of an arm with up to six joints: fewer cells cost less than the gap.
-const COARSE: TimingOptions = TimingOptions {
-    cells_per_ramp: 4.0,
-    ..RESTING
 };
 
 /// The same of an arm with seven joints, whose laws are searched from near the limits. The gap is so small that
@@ -223,7 +217,7 @@ impl<'a, const N: usize> Search<'a, N> {
             Stage::Line => {
                 let (limits, tool) = (&self.planner.limits, &self.motion.limits);
                 // With six joints it would save two percent.
-                let options = if N > 6 { &NEAR } else { &COARSE };
+                let options = if N > 6 { &NEAR } else { &RESTING };
                 match PathTiming::new(self.line(end), limits, tool, options) {
                     Ok(timing) => {
                         let timing = if N > 6 { timing.near() } else { timing };

@@ -5,8 +5,19 @@ use super::reparametrization::Reparametrization;
 use super::{Boundary, TimingOptions};
 use crate::{JointLimits, Path, ToolLimits};
 
-/// Finer cells, over the time in which accelerations build up, give no better law and a slower search.
+/// Cells over the time in which accelerations build up.
+const CELLS_PER_RAMP: f64 = 5.0;
+
+/// Finer cells give no better law and a slower search.
 const MOST_CELLS_PER_RAMP: f64 = 40.0;
+/// Joined cells are that far from switches: times the time in which accelerations build up, two cells and each
+/// further one.
+const CLEAR: f64 = 2.0;
+/// See [`CLEAR`].
+const GRADE: f64 = 0.5;
+/// A joined cell is at most one in so many of the law.
+const LEAST_CELLS: f64 = 60.0;
+
 /// The grid of a law: where its nodes lie.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
@@ -87,9 +98,7 @@ impl Grid {
         );
         let lead = if start_rest { 0.5 * ramp } else { 0.0 };
         let total = fast + lead + if end_rest { 0.5 * ramp } else { 0.0 };
-        let wanted = (options.cells_per_ramp * total / ramp)
-            .ceil()
-            .clamp(40.0, 20_000.0);
+        let wanted = (CELLS_PER_RAMP * total / ramp).ceil().clamp(40.0, 20_000.0);
         let most = (MOST_CELLS_PER_RAMP * total / ramp).ceil() as usize;
         let cells = options
             .cells
@@ -117,11 +126,45 @@ impl Grid {
             let even = vec![end / total; spans + 1];
             Reparametrization::new(&even, span, end, [options.start, options.end])
         };
-        let grid = Self::with_reparametrization(reparametrization, knots, end, cells);
-        Self {
-            straight: reachability.straight,
-            ..grid
+        let mut grid = Self::with_reparametrization(reparametrization, knots, end, cells);
+        grid.straight = reachability.straight;
+        if options.cells.is_none() && options.widest > 1 {
+            let switches: Vec<f64> = reachability.switches.iter().map(|t| t + lead).collect();
+            grid.widen(&switches, ramp, options.widest);
         }
+        grid
+    }
+
+    /// Joins cells that are far from all switches (s), at most `widest`.
+    fn widen(&mut self, switches: &[f64], ramp: f64, widest: usize) {
+        let last = self.nodes.len() - 1;
+        let total = self.nodes[last];
+        let far = |i: usize, k: usize| {
+            let (from, to) = (self.nodes[i], self.nodes[k]);
+            let next = switches.partition_point(|switch| *switch < from);
+            let before = next
+                .checked_sub(1)
+                .map_or(f64::INFINITY, |p| from - switches[p]);
+            let after = switches
+                .get(next)
+                .map_or(f64::INFINITY, |switch| (switch - to).max(0.0));
+            before.min(after)
+        };
+        let fits = |i: usize, m: usize| {
+            let k = i + m;
+            k <= last
+                && !self.knot[i + 1..k].contains(&true)
+                && self.nodes[k] - self.nodes[i] <= total / LEAST_CELLS
+                && far(i, k) >= ramp * (CLEAR + GRADE * (m - 1) as f64)
+        };
+        let mut kept = vec![0];
+        let mut i = 0;
+        while i < last {
+            i += (2..=widest).rev().find(|m| fits(i, *m)).unwrap_or(1);
+            kept.push(i);
+        }
+        self.nodes = kept.iter().map(|i| self.nodes[*i]).collect();
+        self.knot = kept.iter().map(|i| self.knot[*i]).collect();
     }
 
     /// The grid of about `cells` cells over `reparametrization`, with nodes on the knots.

@@ -15,6 +15,8 @@ const CELLS: usize = 256;
 const FREE: f64 = 1e100;
 /// Least number of cells from one knot to the next.
 const PER_KNOT: f64 = 4.0;
+/// A share of a limit of acceleration by which it jumps where another limit rules from there on.
+const JUMP: f64 = 0.05;
 /// Distance of one-sided values from a knot, as a fraction of the path parameter.
 pub(super) const ASIDE: f64 = 1e-9;
 
@@ -34,6 +36,8 @@ pub(super) struct ReachabilityPass {
     pub bound: f64,
     /// Whether the joints move on a straight line, evenly in the path parameter.
     pub straight: bool,
+    /// When (s) its accelerations jump, as another limit rules from there on; both ends too.
+    pub switches: Vec<f64>,
 }
 
 /// The cap of `(du/dt)^2` from speeds: joints, tool and the rate itself.
@@ -102,6 +106,7 @@ impl ReachabilityPass {
         let bound = (fine - 2.0 * (coarse - fine).abs()).max(0.0);
         let ramp = ramp(joint, tool, &at, &a, &bends);
         let times = clock(&at, &a);
+        let switches = switches((joint, tool), (&at, &a, &times), &bends);
         let rate = a.into_iter().map(f64::sqrt).collect();
         Ok(Self {
             at,
@@ -110,6 +115,7 @@ impl ReachabilityPass {
             ramp,
             bound,
             straight: bends.step().is_some(),
+            switches,
         })
     }
 }
@@ -392,6 +398,26 @@ fn ramp<const N: usize>(
         ramp = ramp.max(angular.min(tool.angular_acceleration) / tool.angular_jerk);
     }
     ramp
+}
+
+/// When the accelerations of the law `a` jump, and both ends.
+fn switches<const N: usize>(
+    (joint, tool): (&JointLimits<N>, &ToolLimits),
+    (at, a, times): (&[f64], &[f64], &[f64]),
+    bends: &Bends<N>,
+) -> Vec<f64> {
+    let slope = |k: usize| 0.5 * (a[k + 1] - a[k]) / (at[k + 1] - at[k]);
+    let jumps = |k: &usize| {
+        let jump = (slope(*k) - slope(k - 1)).abs();
+        let [linear, angular] = bends.tool(*k).map(|[first, _]| first.norm());
+        let joints = joint_ratio(&bends.joints[*k][0], &joint.acceleration);
+        let tools = (linear / tool.acceleration).max(angular / tool.angular_acceleration);
+        jump * joints.max(tools) > JUMP
+    };
+    let last = at.len() - 1;
+    let between = (1..last).filter(jumps);
+    let places = [0].into_iter().chain(between).chain([last]);
+    places.map(|k| times[k]).collect()
 }
 
 impl ReachabilityPass {
