@@ -1,14 +1,16 @@
 //! The iceoryx2 node of this process: configuration, services, left-overs of dead processes.
 
 use core::fmt::Debug;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::builder::request_response::{
-    RequestResponseOpenError, RequestResponseOpenOrCreateError,
+    RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::{publish_subscribe, request_response};
 
@@ -22,6 +24,10 @@ pub(crate) type TextExchange = request_response::PortFactory<Shared, [u8], (), [
 
 /// How many messages wait for a slow reader before the oldest is overwritten.
 const BUFFER: usize = 16;
+
+/// How long another process may take to make a service or to remove it, and the pause between two looks.
+const SETTLING: Duration = Duration::from_secs(3);
+const PAUSE: Duration = Duration::from_millis(5);
 
 /// iceoryx2's configuration for a domain: its directory for what is found by name, its prefix for
 /// the segments.
@@ -176,20 +182,21 @@ where
     T: Debug + ZeroCopySend,
 {
     let (service, name) = service_name(arm, kind)?;
-    let mut builder = node.service_builder(&name).publish_subscribe::<T>();
-    if let Some(line) = Alignment::new(64) {
-        builder = builder.payload_alignment(line);
-    }
-    builder
-        .enable_safe_overflow(true)
-        .history_size(0)
-        .subscriber_max_buffer_size(BUFFER)
-        .subscriber_max_borrowed_samples(2)
-        .max_publishers(1)
-        .max_subscribers(8)
-        .max_nodes(16)
-        .open_or_create()
-        .map_err(|error| Cause::from(error).error(service))
+    settled(service, || {
+        let mut builder = node.service_builder(&name).publish_subscribe::<T>();
+        if let Some(line) = Alignment::new(64) {
+            builder = builder.payload_alignment(line);
+        }
+        let builder = builder
+            .enable_safe_overflow(true)
+            .history_size(0)
+            .subscriber_max_buffer_size(BUFFER)
+            .subscriber_max_borrowed_samples(2)
+            .max_publishers(1)
+            .max_subscribers(8)
+            .max_nodes(16);
+        Ok(builder.open_or_create()?)
+    })
 }
 
 /// The same as [`topic`] for texts of any length.
@@ -199,17 +206,18 @@ pub(crate) fn text_topic(
     kind: &str,
 ) -> Result<publish_subscribe::PortFactory<Shared, [u8], ()>, IpcError> {
     let (service, name) = service_name(arm, kind)?;
-    node.service_builder(&name)
-        .publish_subscribe::<[u8]>()
-        .enable_safe_overflow(true)
-        .history_size(0)
-        .subscriber_max_buffer_size(2)
-        .subscriber_max_borrowed_samples(2)
-        .max_publishers(1)
-        .max_subscribers(16)
-        .max_nodes(24)
-        .open_or_create()
-        .map_err(|error| Cause::from(error).error(service))
+    settled(service, || {
+        let builder = node.service_builder(&name).publish_subscribe::<[u8]>();
+        let builder = builder
+            .enable_safe_overflow(true)
+            .history_size(0)
+            .subscriber_max_buffer_size(2)
+            .subscriber_max_borrowed_samples(2)
+            .max_publishers(1)
+            .max_subscribers(16)
+            .max_nodes(24);
+        Ok(builder.open_or_create()?)
+    })
 }
 
 /// Opens or creates the handshake `kind` of `arm`: one server, a few clients.
@@ -251,17 +259,18 @@ where
     A: Debug + ZeroCopySend,
 {
     let (service, name) = service_name(arm, kind)?;
-    node.service_builder(&name)
-        .request_response::<Q, A>()
-        .enable_safe_overflow_for_requests(true)
-        .enable_safe_overflow_for_responses(true)
-        .max_active_requests_per_client(2)
-        .max_response_buffer_size(2)
-        .max_servers(1)
-        .max_clients(clients)
-        .max_nodes(nodes)
-        .open_or_create()
-        .map_err(|error| Cause::from(error).error(service))
+    settled(service, || {
+        let builder = node.service_builder(&name).request_response::<Q, A>();
+        let builder = builder
+            .enable_safe_overflow_for_requests(true)
+            .enable_safe_overflow_for_responses(true)
+            .max_active_requests_per_client(2)
+            .max_response_buffer_size(2)
+            .max_servers(1)
+            .max_clients(clients)
+            .max_nodes(nodes);
+        Ok(builder.open_or_create()?)
+    })
 }
 
 /// The same as [`exchange`] for texts of any length.
@@ -271,17 +280,18 @@ pub(crate) fn text_exchange(
     kind: &str,
 ) -> Result<TextExchange, IpcError> {
     let (service, name) = service_name(arm, kind)?;
-    node.service_builder(&name)
-        .request_response::<[u8], [u8]>()
-        .enable_safe_overflow_for_requests(true)
-        .enable_safe_overflow_for_responses(true)
-        .max_active_requests_per_client(2)
-        .max_response_buffer_size(2)
-        .max_servers(1)
-        .max_clients(16)
-        .max_nodes(24)
-        .open_or_create()
-        .map_err(|error| Cause::from(error).error(service))
+    settled(service, || {
+        let builder = node.service_builder(&name).request_response::<[u8], [u8]>();
+        let builder = builder
+            .enable_safe_overflow_for_requests(true)
+            .enable_safe_overflow_for_responses(true)
+            .max_active_requests_per_client(2)
+            .max_response_buffer_size(2)
+            .max_servers(1)
+            .max_clients(16)
+            .max_nodes(24);
+        Ok(builder.open_or_create()?)
+    })
 }
 
 /// The other processes that use a service: names and process numbers.
@@ -309,8 +319,21 @@ where
     }
 }
 
+/// Opens or creates a service, again and again while another process is about to make it or to remove it.
+fn settled<F>(service: String, attempt: impl Fn() -> Result<F, Cause>) -> Result<F, IpcError> {
+    let end = Instant::now() + SETTLING;
+    loop {
+        match attempt() {
+            Err(Cause::InFlux(_)) if Instant::now() < end => sleep(PAUSE),
+            result => return result.map_err(|cause| cause.error(service)),
+        }
+    }
+}
+
 /// Why a service was neither opened nor created.
 enum Cause {
+    /// Another process is about to make it or to remove it.
+    InFlux(String),
     /// It exists with other types or settings.
     Incompatible,
     /// It exists and is damaged, or another version of iceoryx2 made it.
@@ -340,7 +363,7 @@ impl Cause {
                     operation: "opening the service",
                 };
             }
-            Self::Open(cause) => ("opening the service", cause),
+            Self::Open(cause) | Self::InFlux(cause) => ("opening the service", cause),
             Self::Create(cause) => ("creating the service", cause),
         };
         IpcError::Failed {
@@ -353,17 +376,28 @@ impl Cause {
 
 impl From<PublishSubscribeOpenOrCreateError> for Cause {
     fn from(error: PublishSubscribeOpenOrCreateError) -> Self {
+        use PublishSubscribeCreateError as Create;
         use PublishSubscribeOpenError as Open;
+        use PublishSubscribeOpenOrCreateError as OpenOrCreate;
         match error {
-            PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) => match open {
+            OpenOrCreate::PublishSubscribeOpenError(open) => match open {
                 Open::IncompatibleTypes
                 | Open::IncompatibleMessagingPattern
                 | Open::IncompatibleOverflowBehavior
                 | Open::DoesNotSupportRequestedMinBufferSize => Self::Incompatible,
                 Open::ServiceInCorruptedState => Self::Corrupted,
                 Open::InsufficientPermissions => Self::Permission,
+                Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction => {
+                    Self::InFlux(format!("{open:?}"))
+                }
                 other => Self::Open(format!("{other:?}")),
             },
+            OpenOrCreate::PublishSubscribeCreateError(
+                Create::AlreadyExists
+                | Create::IsBeingCreatedByAnotherInstance
+                | Create::HangsInCreation,
+            )
+            | OpenOrCreate::SystemInFlux => Self::InFlux(format!("{error:?}")),
             other => Self::Create(format!("{other:?}")),
         }
     }
@@ -371,17 +405,55 @@ impl From<PublishSubscribeOpenOrCreateError> for Cause {
 
 impl From<RequestResponseOpenOrCreateError> for Cause {
     fn from(error: RequestResponseOpenOrCreateError) -> Self {
+        use RequestResponseCreateError as Create;
         use RequestResponseOpenError as Open;
+        use RequestResponseOpenOrCreateError as OpenOrCreate;
         match error {
-            RequestResponseOpenOrCreateError::RequestResponseOpenError(open) => match open {
+            OpenOrCreate::RequestResponseOpenError(open) => match open {
                 Open::IncompatibleRequestType
                 | Open::IncompatibleResponseType
                 | Open::IncompatibleMessagingPattern => Self::Incompatible,
                 Open::ServiceInCorruptedState => Self::Corrupted,
                 Open::InsufficientPermissions => Self::Permission,
+                Open::DoesNotExist | Open::HangsInCreation | Open::IsMarkedForDestruction => {
+                    Self::InFlux(format!("{open:?}"))
+                }
                 other => Self::Open(format!("{other:?}")),
             },
+            OpenOrCreate::RequestResponseCreateError(
+                Create::AlreadyExists
+                | Create::IsBeingCreatedByAnotherInstance
+                | Create::HangsInCreation,
+            )
+            | OpenOrCreate::SystemInFlux => Self::InFlux(format!("{error:?}")),
             other => Self::Create(format!("{other:?}")),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::thread;
+
+    /// Processes that look at an arm make its services for a moment when no engine has: an engine that starts at
+    /// that moment gets them all the same.
+    #[test]
+    fn services_are_opened_while_others_make_and_leave_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let domain = Domain::open(&folder.path().join("domain")).unwrap();
+        let arm = domain.arm("cell/arm").unwrap();
+        let look = || {
+            for _ in 0..100 {
+                let node = join(&arm, "visitor").unwrap();
+                exchange::<u64, u64>(&node, &arm, "client").unwrap();
+                topic::<u64>(&node, &arm, "state").unwrap();
+            }
+        };
+        thread::scope(|scope| {
+            for visitor in [(); 4].map(|()| scope.spawn(look)) {
+                visitor.join().unwrap();
+            }
+        });
     }
 }
