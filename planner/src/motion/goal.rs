@@ -12,6 +12,8 @@ const TRIED: usize = 4;
 const TRIED_REDUNDANT: usize = 12;
 /// Number of values of the free parameter of a seven-joint arm that are tried.
 const SWEEP: usize = 48;
+/// How much the ways of all joints count beside the longest one, so that of equal goals the nearer one comes first.
+const OTHERS: f64 = 1e-4;
 /// Configurations with no joint farther apart are the same, rad or m.
 const SAME: f64 = 1e-6;
 /// Configurations of a seven-joint arm count as equal if no joint differs by more, rad.
@@ -62,9 +64,11 @@ impl<const N: usize> Planner<N> {
         mut goals: Vec<SVector<f64, N>>,
         start: &SVector<f64, N>,
     ) -> Vec<SVector<f64, N>> {
-        let way =
-            |goal: &SVector<f64, N>| (goal - start).abs().component_div(&self.limits.velocity);
-        goals.sort_by(|a, b| way(a).max().total_cmp(&way(b).max()));
+        let least = |goal: &SVector<f64, N>| {
+            let way = (goal - start).abs().component_div(&self.limits.velocity);
+            way.max() + OTHERS * way.sum()
+        };
+        goals.sort_by(|a, b| least(a).total_cmp(&least(b)));
         apart(Vec::new(), goals.into_iter(), (TRIED, SAME))
     }
 

@@ -7,6 +7,7 @@
 //! the result is the fastest of all.
 
 use std::cell::OnceCell;
+use std::cmp::Ordering;
 
 use nalgebra::SVector;
 use trajectory::bounds::JointsToTool;
@@ -25,6 +26,10 @@ const CHORDS: usize = 8;
 
 /// The least gain of time for which an additional end is looked at.
 const GAIN: f64 = 0.014;
+
+/// Times that differ by less than this share are equal: laws are known to about so much. Of equal ways that to the
+/// first end is taken.
+const EQUAL: f64 = 5e-4;
 
 /// A line in joint space is timed from rest to rest.
 pub(super) const RESTING: TimingOptions = TimingOptions {
@@ -80,7 +85,8 @@ struct Search<'a, const N: usize> {
     open: Vec<Open<'a, N>>,
     /// How many of the ends are looked at however little they gain.
     sure: usize,
-    best: Option<Draft<N>>,
+    /// The fastest motion so far and its end.
+    best: Option<(Draft<N>, usize)>,
     refusal: Option<MotionError>,
 }
 
@@ -120,7 +126,7 @@ impl<const N: usize> Planner<N> {
         };
         while search.look() {}
         let none = search.refusal.unwrap_or(MotionError::NoWay);
-        search.best.ok_or(none)
+        search.best.map(|(draft, _)| draft).ok_or(none)
     }
 
     /// The fastest motion from rest to rest that the joints alone allow.
@@ -194,9 +200,16 @@ impl<'a, const N: usize> Search<'a, N> {
     /// Looks closer at the way whose turn it is; false if no way can be faster than the best motion so
     /// far.
     fn look(&mut self) -> bool {
-        let (sure, limit) = (self.sure, self.limit());
+        let (sure, best) = (self.sure, self.best.as_ref());
+        let limits = self
+            .ends
+            .iter()
+            .enumerate()
+            .map(|(end, _)| limit(best, end));
+        let limits: Vec<f64> = limits.collect();
         let worth = |end: usize, time: f64| time * (1.0 + if end < sure { 0.0 } else { GAIN });
-        self.open.retain(|way| worth(way.end, way.least) < limit);
+        self.open
+            .retain(|way| worth(way.end, way.least) < limits[way.end]);
         let turns = self.open.iter().map(|way| worth(way.end, way.turn));
         // The first of equal ways, so that the order of the ends decides.
         let Some((index, _)) = turns.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
@@ -213,7 +226,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 let slower = free.duration() * (stretch * (1.0 - 1e-9)).max(1.0);
                 self.push(slower, end, Stage::Slower(free));
             }
-            Stage::Slower(free) => self.keep(Draft::of(free)),
+            Stage::Slower(free) => self.keep(Draft::of(free), end),
             Stage::Line => {
                 let (limits, tool) = (&self.planner.limits, &self.motion.limits);
                 // With six joints it would save two percent.
@@ -234,8 +247,8 @@ impl<'a, const N: usize> Search<'a, N> {
                 }
             }
             Stage::Timed(timing) => {
-                if let Ok(Some(timed)) = timing.solve_below(self.limit()) {
-                    self.keep(Draft::of(timed.trajectory));
+                if let Ok(Some(timed)) = timing.solve_below(limits[end]) {
+                    self.keep(Draft::of(timed.trajectory), end);
                 }
             }
         }
@@ -276,20 +289,28 @@ impl<'a, const N: usize> Search<'a, N> {
         });
     }
 
-    /// The time of the best motion so far, s.
-    fn limit(&self) -> f64 {
-        let time = |draft: &Draft<N>| draft.trajectory.duration();
-        self.best.as_ref().map_or(f64::INFINITY, time)
-    }
-
-    /// Slows a motion down until it keeps the limits, and keeps it if it is the fastest.
-    fn keep(&mut self, draft: Draft<N>) {
-        if draft.trajectory.duration() >= self.limit() {
+    /// Slows a motion to an end down until it keeps the limits, and keeps it if it is the fastest.
+    fn keep(&mut self, draft: Draft<N>, end: usize) {
+        let limit = limit(self.best.as_ref(), end);
+        if draft.trajectory.duration() >= limit {
             return;
         }
         let slowed = self.planner.slowed(draft, self.motion);
-        if self.best.is_none() || slowed.trajectory.duration() < self.limit() {
-            self.best = Some(slowed);
+        if self.best.is_none() || slowed.trajectory.duration() < limit {
+            self.best = Some((slowed, end));
         }
     }
+}
+
+/// How long a motion to an end may take to be better than the best one so far, s.
+fn limit<const N: usize>(best: Option<&(Draft<N>, usize)>, end: usize) -> f64 {
+    let Some((draft, taken)) = best else {
+        return f64::INFINITY;
+    };
+    let equal = match end.cmp(taken) {
+        Ordering::Less => EQUAL,
+        Ordering::Equal => 0.0,
+        Ordering::Greater => -EQUAL,
+    };
+    draft.trajectory.duration() * (1.0 + equal)
 }
