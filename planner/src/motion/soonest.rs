@@ -200,13 +200,8 @@ impl<'a, const N: usize> Search<'a, N> {
     /// Looks closer at the way whose turn it is; false if no way can be faster than the best motion so
     /// far.
     fn look(&mut self) -> bool {
-        let (sure, best) = (self.sure, self.best.as_ref());
-        let limits = self
-            .ends
-            .iter()
-            .enumerate()
-            .map(|(end, _)| limit(best, end));
-        let limits: Vec<f64> = limits.collect();
+        let sure = self.sure;
+        let limits: Vec<f64> = (0..self.ends.len()).map(|end| self.limit(end)).collect();
         let worth = |end: usize, time: f64| time * (1.0 + if end < sure { 0.0 } else { GAIN });
         self.open
             .retain(|way| worth(way.end, way.least) < limits[way.end]);
@@ -291,7 +286,7 @@ impl<'a, const N: usize> Search<'a, N> {
 
     /// Slows a motion to an end down until it keeps the limits, and keeps it if it is the fastest.
     fn keep(&mut self, draft: Draft<N>, end: usize) {
-        let limit = limit(self.best.as_ref(), end);
+        let limit = self.limit(end);
         if draft.trajectory.duration() >= limit {
             return;
         }
@@ -300,17 +295,18 @@ impl<'a, const N: usize> Search<'a, N> {
             self.best = Some((slowed, end));
         }
     }
-}
 
-/// How long a motion to an end may take to be better than the best one so far, s.
-fn limit<const N: usize>(best: Option<&(Draft<N>, usize)>, end: usize) -> f64 {
-    let Some((draft, taken)) = best else {
-        return f64::INFINITY;
-    };
-    let equal = match end.cmp(taken) {
-        Ordering::Less => EQUAL,
-        Ordering::Equal => 0.0,
-        Ordering::Greater => -EQUAL,
-    };
-    draft.trajectory.duration() * (1.0 + equal)
+    /// How long a motion to an end may take to be better than the best one so far, s.
+    fn limit(&self, end: usize) -> f64 {
+        let Some((draft, taken)) = &self.best else {
+            return f64::INFINITY;
+        };
+        let equal = match end.cmp(taken) {
+            Ordering::Less => EQUAL,
+            // Others have to gain more in any case.
+            Ordering::Greater if end < self.sure => -EQUAL,
+            _ => 0.0,
+        };
+        draft.trajectory.duration() * (1.0 + equal)
+    }
 }
