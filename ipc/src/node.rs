@@ -10,7 +10,8 @@ use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::builder::request_response::{
-    RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
+    Builder as RequestResponseBuilder, RequestResponseCreateError, RequestResponseOpenError,
+    RequestResponseOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::{publish_subscribe, request_response};
 
@@ -261,15 +262,7 @@ where
     let (service, name) = service_name(arm, kind)?;
     settled(service, || {
         let builder = node.service_builder(&name).request_response::<Q, A>();
-        let builder = builder
-            .enable_safe_overflow_for_requests(true)
-            .enable_safe_overflow_for_responses(true)
-            .max_active_requests_per_client(2)
-            .max_response_buffer_size(2)
-            .max_servers(1)
-            .max_clients(clients)
-            .max_nodes(nodes);
-        Ok(builder.open_or_create()?)
+        Ok(one_server(builder, clients, nodes).open_or_create()?)
     })
 }
 
@@ -282,16 +275,28 @@ pub(crate) fn text_exchange(
     let (service, name) = service_name(arm, kind)?;
     settled(service, || {
         let builder = node.service_builder(&name).request_response::<[u8], [u8]>();
-        let builder = builder
-            .enable_safe_overflow_for_requests(true)
-            .enable_safe_overflow_for_responses(true)
-            .max_active_requests_per_client(2)
-            .max_response_buffer_size(2)
-            .max_servers(1)
-            .max_clients(16)
-            .max_nodes(24);
-        Ok(builder.open_or_create()?)
+        Ok(one_server(builder, 16, 24).open_or_create()?)
     })
+}
+
+/// The settings of an exchange: one server, for so many clients in so many processes.
+fn one_server<Q, A>(
+    builder: RequestResponseBuilder<Q, (), A, (), Shared>,
+    clients: usize,
+    nodes: usize,
+) -> RequestResponseBuilder<Q, (), A, (), Shared>
+where
+    Q: Debug + ZeroCopySend + ?Sized,
+    A: Debug + ZeroCopySend + ?Sized,
+{
+    builder
+        .enable_safe_overflow_for_requests(true)
+        .enable_safe_overflow_for_responses(true)
+        .max_active_requests_per_client(2)
+        .max_response_buffer_size(2)
+        .max_servers(1)
+        .max_clients(clients)
+        .max_nodes(nodes)
 }
 
 /// The other processes that use a service: names and process numbers.

@@ -7,10 +7,9 @@ use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
 use trajectory::timing::PathTiming;
-use trajectory::{
-    Boundary, HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
-};
+use trajectory::{HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory};
 
+use super::soonest::RESTING;
 use super::{BlockedCause, Draft, MotionError, Planner};
 use crate::task::Move;
 
@@ -53,11 +52,8 @@ impl<const N: usize> Planner<N> {
             .followed(&Way::along(curve), start)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
         let options = TimingOptions {
-            start: Boundary::Rest,
-            end: Boundary::Rest,
             gap: GAP,
-            widest: 8,
-            ..Default::default()
+            ..RESTING
         };
         let path = joint_path(curve, &points)?;
         let timing = PathTiming::new(&path, &self.limits, &motion.limits, &options)?;

@@ -7,6 +7,7 @@ use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, sm
 
 use super::cartesian::{Way, is_still, joint_path, pieces};
 use super::draft::{Crossing, Draft};
+use super::soonest::RESTING;
 use super::{Blend, MotionError, Planner, ROUNDING};
 use crate::task::Move;
 
@@ -20,11 +21,8 @@ const ALONG: TimingOptions = TimingOptions {
     start: Boundary::Free,
     end: Boundary::Free,
     rate_cap: Some(1.0),
-    cells: None,
-    widest: 8,
-    fit: 1e-8,
     gap: 1e-3,
-    reserve: 0.0,
+    ..RESTING
 };
 
 impl<const N: usize> Planner<N> {

@@ -31,7 +31,7 @@ const GAIN: f64 = 0.014;
 /// first end is taken.
 const EQUAL: f64 = 5e-4;
 
-/// A line in joint space is timed from rest to rest.
+/// A path is timed from rest to rest, with wider cells where no limit takes the place of another.
 pub(super) const RESTING: TimingOptions = TimingOptions {
     start: Boundary::Rest,
     end: Boundary::Rest,
@@ -201,10 +201,10 @@ impl<'a, const N: usize> Search<'a, N> {
     /// far.
     fn look(&mut self) -> bool {
         let sure = self.sure;
-        let limits: Vec<f64> = (0..self.ends.len()).map(|end| self.limit(end)).collect();
         let worth = |end: usize, time: f64| time * (1.0 + if end < sure { 0.0 } else { GAIN });
-        self.open
-            .retain(|way| worth(way.end, way.least) < limits[way.end]);
+        let open = std::mem::take(&mut self.open).into_iter();
+        let open = open.filter(|way| worth(way.end, way.least) < self.limit(way.end));
+        self.open = open.collect();
         let turns = self.open.iter().map(|way| worth(way.end, way.turn));
         // The first of equal ways, so that the order of the ends decides.
         let Some((index, _)) = turns.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)) else {
@@ -242,7 +242,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 }
             }
             Stage::Timed(timing) => {
-                if let Ok(Some(timed)) = timing.solve_below(limits[end]) {
+                if let Ok(Some(timed)) = timing.solve_below(self.limit(end)) {
                     self.keep(Draft::of(timed.trajectory), end);
                 }
             }

@@ -141,15 +141,18 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
         } = part;
         let piece = &self.trajectory.pieces()[index];
         let (p, w) = self.tool.growth(&taylor(piece, since, width));
-        // Of each derivative, from the Taylor coefficients of place and angular velocity.
-        let three = [
+        // The fifth coefficient of each derivative, from those of place and angular velocity; for three samples
+        // the third of the highest.
+        let five = [
             6.0 * p[6],
             42.0 * p[7],
-            120.0 * p[6],
+            336.0 * p[8],
             w[5],
             6.0 * w[6],
-            20.0 * w[5],
+            42.0 * w[7],
         ];
+        let mut three = five;
+        (three[2], three[5]) = (120.0 * p[6], 20.0 * w[5]);
         let factors = [HERMITE, HERMITE, PARABOLA];
         let error = self.errors(three, factors, width);
         let place_error = HERMITE * p[5];
@@ -157,14 +160,6 @@ impl<T: JointsToTool<N>, const N: usize> Looker<'_, T, N> {
         let (curves, error, place_error) = if fine {
             (self.through_three(part), error, place_error)
         } else {
-            let five = [
-                6.0 * p[6],
-                42.0 * p[7],
-                336.0 * p[8],
-                w[5],
-                6.0 * w[6],
-                42.0 * w[7],
-            ];
             let error = self.errors(five, [NODES; 3], width);
             (self.through_five(part), error, NODES * p[5])
         };

@@ -238,15 +238,15 @@ impl<'a> List<'a> {
 
     /// The motion with which searches end that start from the one found and from each other, as far as they are faster.
     fn refined(&self, form: &NormalForm, mut found: Found) -> Found {
-        let other =
-            (found.backwards != form.backwards).then(|| form.turned(self.poses, self.options));
-        let form = other.as_ref().unwrap_or(form);
         // A search with orientations is dear, and finds little that a good fit has not.
         let good = found.plan.method() == Method::Fit && found.suffices();
         // A look for a faster law along the way of such a fit finds little, and no search starts from a long motion.
         if good && self.is_long() && !self.is_slow(&found) {
             return found;
         }
+        let other =
+            (found.backwards != form.backwards).then(|| form.turned(self.poses, self.options));
+        let form = other.as_ref().unwrap_or(form);
         for _ in 0..ROUNDS {
             let before = found.plan.duration();
             let others = self.improved(form, &found.motion, !good);

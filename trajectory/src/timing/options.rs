@@ -66,8 +66,8 @@ impl TimingOptions {
     /// # Errors
     /// [`TimingError::BadOption`] with the first that is not.
     pub fn check(&self) -> Result<(), TimingError> {
-        let mut rows = vec![("fit", self.fit), ("gap", self.gap)];
-        rows.push(("widest", self.widest as f64));
+        let widest = ("widest", self.widest as f64);
+        let mut rows = vec![("fit", self.fit), ("gap", self.gap), widest];
         rows.extend(self.rate_cap.map(|cap| ("rate_cap", cap)));
         rows.extend(self.cells.map(|cells| ("cells", cells as f64)));
         if let Boundary::Moving { rate, .. } = self.start {
