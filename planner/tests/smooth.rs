@@ -73,3 +73,56 @@ fn what_straight_moves_reach_is_never_refused() {
 
 /// Moves that are tried.
 const ROUNDS: usize = 60;
+
+/// Where the joints rule, a rounder curve is taken before one on which the tool has to rest: between poses that are close together and
+/// turn the tool the fastest curve misses one of them (`measure::RandomMoves`, seed 12, number 62).
+#[test]
+fn where_joints_rule_a_rounder_curve_does_not_rest() {
+    let robot = load("panda").unwrap();
+    let planner = Planner::new(
+        &robot.chain::<7>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<7>(),
+        robot.joint_names(),
+    );
+    let start = [
+        -1.2957, -1.23366, -1.04046, -2.96238, -2.64457, 1.74466, 1.93886,
+    ];
+    let poses = [
+        (
+            [-0.255104, -0.108656, 0.525611],
+            [0.132132, -1.21496, -0.0118806],
+        ),
+        (
+            [-0.208001, -0.19063, 0.580008],
+            [0.342691, -1.16099, -0.164683],
+        ),
+        (
+            [-0.122054, -0.336877, 0.437165],
+            [0.280737, -1.3788, -0.387421],
+        ),
+        (
+            [-0.113997, -0.343526, 0.421662],
+            [-0.246812, -1.44853, -0.316611],
+        ),
+        (
+            [-0.192637, -0.364792, 0.446104],
+            [0.0782287, -1.34706, -0.43844],
+        ),
+    ];
+    let pose = |(place, turn): ([f64; 3], [f64; 3])| {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
+        Isometry3::from_parts(Vector3::from(place).into(), turn)
+    };
+    let smooth = Move {
+        shape: Shape::Smooth,
+        poses: poses.map(pose).to_vec(),
+        tolerance: 0.01,
+        limits: robot.motion_limits(),
+    };
+    let planned = planner.plan(&smooth, &SVector::from(start)).unwrap();
+    let blend = planned.blend.unwrap();
+    assert_eq!(blend.fallbacks, 0, "{blend:?}");
+    let time = planned.trajectory.duration();
+    assert!(time < 1.5, "{time} s, along the fastest curve 1.68 s");
+}

@@ -22,6 +22,7 @@ mod legs;
 mod motion_error;
 mod moving;
 mod reach;
+mod rounder;
 mod screw;
 mod singular;
 mod smooth;

@@ -14,20 +14,6 @@ use crate::task::{Move, Shape};
 
 /// Share of the tolerance that is tried where all of it fails with the joints.
 const QUARTER: f64 = 0.25;
-/// Time of the motion over that of the tool alone from which on the joints rule.
-const RULED: f64 = 1.3;
-/// Other curves tried then: shares of the linear and of the angular limits under which each is planned.
-const OTHERS: [[f64; 2]; 4] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6]];
-/// The same where the joints cannot follow the first curve: also one that differs only in that it is rounder.
-const INSTEAD: [[f64; 2]; 5] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]];
-/// Gap to the optimum at which their searches end: far from its optimum a curve is rounder, which the joints follow
-/// faster.
-const GAP: f64 = 1.0;
-/// Share by which the joints may be faster along another curve than their bound along it foretells.
-const SPREAD: f64 = 4e-3;
-/// Most spans of a curve that is cheap enough for that.
-const CHEAP: usize = 400;
-
 /// Whether a curve may be possible for the tool, and only the joints fail on it.
 fn is_of_the_joints(error: &MotionError) -> bool {
     matches!(
@@ -36,8 +22,23 @@ fn is_of_the_joints(error: &MotionError) -> bool {
     )
 }
 
+/// How a curve of the tool is searched for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    /// Gap to the optimum at which it ends, if not the usual one.
+    pub(super) gap: Option<f64>,
+    /// Time from which on a motion of the tool is of no use, s.
+    pub(super) most: f64,
+}
+
+/// The search of the curve of a motion.
+const FULL: Search = Search {
+    gap: None,
+    most: f64::INFINITY,
+};
+
 /// Why there is no motion along a smooth curve of the tool.
-struct Failure {
+pub(super) struct Failure {
     error: MotionError,
     /// Spans of the curve; none if there is no curve.
     spans: usize,
@@ -49,22 +50,13 @@ impl From<MotionError> for Failure {
     }
 }
 
-/// What is known before other curves are tried.
-#[derive(Clone, Copy)]
-struct Known {
-    /// Time of the fastest motion, s.
-    time: f64,
-    /// That time over the bound of the time along its curve.
-    over: f64,
-}
-
 /// A motion along a smooth curve of the tool.
-struct Along<const N: usize> {
-    planned: PlannedMove<N>,
+pub(super) struct Along<const N: usize> {
+    pub(super) planned: PlannedMove<N>,
     /// Time of the tool alone, s.
-    tool: f64,
+    pub(super) tool: f64,
     /// Spans of the curve.
-    spans: usize,
+    pub(super) spans: usize,
 }
 
 impl<const N: usize> Planner<N> {
@@ -80,6 +72,9 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(Cow::Borrowed(motion), start) {
             return self.all_windows(windowed);
         }
+        if let Some(rounder) = self.rounder(motion, start) {
+            return self.or_straight(motion, start, rounder);
+        }
         let planned = match self.blended(motion, start, motion) {
             Ok((first, curve)) => self.for_the_joints(motion, start, (first, &curve)),
             Err(Failure { error, spans }) => {
@@ -87,13 +82,7 @@ impl<const N: usize> Planner<N> {
                 if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
                     return Err(error);
                 }
-                let cheap = spans <= CHEAP;
-                let none = Known {
-                    time: f64::INFINITY,
-                    over: 1.0,
-                };
-                let other = cheap.then(|| self.otherwise(motion, start, (none, &INSTEAD)));
-                match other.flatten() {
+                match self.instead(motion, start, spans) {
                     Some(other) => other,
                     None => self.nearer(motion, start, error)?,
                 }
@@ -139,75 +128,6 @@ impl<const N: usize> Planner<N> {
         })
     }
 
-    /// The fastest of the motion found and of those along curves planned for less speed along or about,
-    /// where the joints rule: the fastest curve of the tool is not the fastest one for the joints. Only where
-    /// a curve is cheap to plan.
-    fn for_the_joints(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (first, curve): (Along<N>, &Followed<N>),
-    ) -> PlannedMove<N> {
-        let time = first.planned.trajectory.duration();
-        let ruled = time > RULED * first.tool;
-        if !ruled || motion.tolerance <= 0.0 || first.spans > CHEAP {
-            return first.planned;
-        }
-        let least = self.least_along(curve, motion).unwrap_or(time);
-        let known = Known {
-            time,
-            over: time / least,
-        };
-        let other = self.otherwise(motion, start, (known, &OTHERS));
-        other.unwrap_or(first.planned)
-    }
-
-    /// The fastest motion along another curve that is faster than the one that is known. The joints follow all of
-    /// them; the curves whose bounds of the time are least are timed, as long as one may be faster.
-    fn otherwise(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (mut known, others): (Known, &[[f64; 2]]),
-    ) -> Option<PlannedMove<N>> {
-        let mut tried = Vec::with_capacity(others.len());
-        for &[along, about] in others {
-            let slower = Move {
-                limits: motion.limits.scaled(along, about),
-                ..motion.clone()
-            };
-            let followed = self.curve(start, (&slower, Some(known.time)), true);
-            let Ok(followed) = followed else {
-                continue;
-            };
-            if let Ok(least) = self.least_along(&followed, motion) {
-                tried.push((least, followed));
-            }
-        }
-        tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        let mut best = None;
-        for (least, followed) in tried {
-            if least * known.over * (1.0 - SPREAD) >= known.time {
-                break;
-            }
-            let Ok(other) = self.on(&followed, motion, (start, known.time)) else {
-                continue;
-            };
-            let time = other.planned.trajectory.duration();
-            if time < known.time {
-                // No more is foretold than what was seen.
-                let over = time / least;
-                known.over = if best.is_some() || known.time.is_finite() {
-                    known.over.min(over)
-                } else {
-                    over
-                };
-                (known.time, best) = (time, Some(other.planned));
-            }
-        }
-        best
-    }
-
     /// A smooth motion, or straight moves to each pose in turn if these are faster.
     fn or_straight(
         &self,
@@ -219,11 +139,10 @@ impl<const N: usize> Planner<N> {
         if planned.trajectory.duration() <= least {
             return Ok(planned);
         }
-        let straights = self.straight_moves(motion, start);
-        let faster = |straights: &PlannedMove<N>| {
-            straights.trajectory.duration() < planned.trajectory.duration()
-        };
-        Ok(match straights.ok().filter(faster) {
+        let most = planned.trajectory.duration();
+        let straights = self.straight_moves(motion, (start, most)).ok();
+        let faster = straights.filter(|straights| straights.trajectory.duration() < most);
+        Ok(match faster {
             Some(straights) => PlannedMove {
                 blend: planned.blend.map(|blend| Blend {
                     tolerance: 0.0,
@@ -245,7 +164,6 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         planned: &PlannedMove<N>,
     ) -> f64 {
-        let options = SmoothOptions::new(0.0, motion.limits);
         let passes = planned.certificate.poses.iter();
         let near = passes.map(|pass| planned.trajectory.sample(pass.time_s).position);
         // The joints of a seven-joint arm may be elsewhere at the same poses.
@@ -253,17 +171,27 @@ impl<const N: usize> Planner<N> {
             let reached = (N <= 6).then(|| self.solver.nearest(pose, near).ok());
             reached.flatten().map(|solution| solution.q)
         };
-        let (mut from, mut pose) = (Some(*start), self.chain().forward(start));
-        let mut sum = 0.0;
-        for (near, next) in near.chain([planned.end]).zip(&motion.poses) {
+        let (mut from, mut sum) = (Some(*start), 0.0);
+        let legs = motion.poses.iter().zip(self.least_of_legs(motion, start));
+        for (near, (next, tool)) in near.chain([planned.end]).zip(legs) {
             let to = joints(next, &near);
-            let tool = least_time(&[pose, *next], &options).unwrap_or(0.0);
             let both = from.zip(to);
             let joint = both.map_or(0.0, |(from, to)| self.least_of_joints(&from, &to));
             sum += tool.max(joint);
-            (from, pose) = (to, *next);
+            from = to;
         }
         sum
+    }
+
+    /// A lower bound of the time of a straight move to each pose in turn, s: from the tool.
+    pub(super) fn least_of_legs(&self, motion: &Move, start: &SVector<f64, N>) -> Vec<f64> {
+        let options = SmoothOptions::new(0.0, motion.limits);
+        let mut from = self.chain().forward(start);
+        let least = |to: &Isometry3<f64>| {
+            let leg = [std::mem::replace(&mut from, *to), *to];
+            least_time(&leg, &options).unwrap_or(0.0)
+        };
+        motion.poses.iter().map(least).collect()
     }
 
     /// The motion along the curve of another move through the same poses, of at most the tolerance and the
@@ -275,10 +203,10 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         curve: &Move,
     ) -> Result<(Along<N>, Followed<N>), Failure> {
-        let first = self.curve(start, (curve, None), true)?;
+        let first = self.curve(start, (curve, FULL), true)?;
         match self.on(&first, motion, (start, f64::INFINITY)) {
             Err(_) if first.path.is_fitted() => {
-                let spline = self.curve(start, (curve, None), false)?;
+                let spline = self.curve(start, (curve, FULL), false)?;
                 let along = self.on(&spline, motion, (start, f64::INFINITY))?;
                 Ok((along, spline))
             }
@@ -286,26 +214,26 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The joints along that curve; along a rough one only if the tool alone takes less than `most` (s) on it.
-    fn curve(
+    /// The joints along that curve, if the tool alone takes less time than is useful on it.
+    pub(super) fn curve(
         &self,
         start: &SVector<f64, N>,
-        (curve, most): (&Move, Option<f64>),
+        (curve, search): (&Move, Search),
         fit: bool,
     ) -> Result<Followed<N>, Failure> {
-        let path = self.smooth_path(curve, start, (fit, most.map(|_| GAP)))?;
-        if most.is_some_and(|most| path.plan.duration() >= most) {
+        let path = self.smooth_path(curve, start, (fit, search.gap))?;
+        if path.plan.duration() >= search.most {
             return Err(MotionError::NoWay.into());
         }
         let (spans, fitted) = (path.plan.spans(), path.is_fitted());
         match self.joints_on(path, start) {
-            Err(_) if fitted => self.curve(start, (curve, most), false),
+            Err(_) if fitted => self.curve(start, (curve, search), false),
             followed => followed.map_err(|error| Failure { error, spans }),
         }
     }
 
     /// The motion along a curve that the joints follow, if it is shorter than `most` (s).
-    fn on(
+    pub(super) fn on(
         &self,
         followed: &Followed<N>,
         motion: &Move,
@@ -332,15 +260,18 @@ impl<const N: usize> Planner<N> {
         })
     }
 
-    /// A straight move to each pose in turn, with a stop at each.
+    /// A straight move to each pose in turn, with a stop at each; [`MotionError::NoWay`], as soon as that is known, where
+    /// they take `most` (s) or longer.
     fn straight_moves(
         &self,
         motion: &Move,
-        start: &SVector<f64, N>,
+        (start, most): (&SVector<f64, N>, f64),
     ) -> Result<PlannedMove<N>, MotionError> {
         let (mut pieces, mut crossings) = (Vec::new(), Vec::with_capacity(motion.poses.len()));
         let (mut joints, mut time) = (*start, 0.0);
-        for pose in &motion.poses {
+        let least = self.least_of_legs(motion, start);
+        let mut left: f64 = least.iter().sum();
+        for (pose, least) in motion.poses.iter().zip(least) {
             let leg = Move {
                 shape: Shape::Straight,
                 poses: vec![*pose],
@@ -351,6 +282,10 @@ impl<const N: usize> Planner<N> {
                 time += leg.duration();
                 joints = last.sample(last.duration).position;
                 pieces.extend_from_slice(leg.pieces());
+            }
+            left -= least;
+            if time + left >= most {
+                return Err(MotionError::NoWay);
             }
             crossings.push(Crossing {
                 time,

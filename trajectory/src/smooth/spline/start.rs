@@ -23,7 +23,7 @@ pub(super) const MOST: f64 = 700.0;
 /// Spans for each vertex of one that turns, if they are fewer, and the share of them where knots are farther apart than
 /// usual.
 const TURNING: f64 = 58.0;
-const ROUGH: f64 = 0.8;
+const ROUGH: f64 = 0.25;
 
 /// Legs that take less than this at full speed (s) count as no motion.
 const STILL: f64 = 1e-12;

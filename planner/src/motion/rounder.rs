@@ -1,0 +1,177 @@
+//! MoveSmoothlyTo where the joints rule: rounder curves of the tool than the one that is fastest for it.
+//!
+//! Such a curve is found by a short search on few knots, as it stays far from its bounds.
+
+use nalgebra::{Isometry3, SVector};
+
+use super::smooth::{Along, Search};
+use super::smooth_joints::Followed;
+use super::{PlannedMove, Planner};
+use crate::task::Move;
+
+/// Time of the motion over that of the tool alone from which on the joints rule.
+const RULED: f64 = 1.3;
+/// Gap to the optimum at which the search of the curve that is tried first ends.
+const FIRST_GAP: f64 = 0.05;
+/// Other curves tried then. Far from its optimum a curve is rounder, which the joints follow faster.
+const OTHERS: Others = Others {
+    shares: &[[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6]],
+    gap: 0.5,
+};
+/// The same where the joints cannot follow the first curve: also one that differs only in that it is rounder.
+const INSTEAD: Others = Others {
+    shares: &[[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]],
+    gap: 1.0,
+};
+/// Share by which the joints may be faster along another curve than their bound along it foretells.
+const SPREAD: f64 = 4e-3;
+/// The most that a motion takes over the bound along its curve for that to say something of other curves.
+const FORETOLD: f64 = 1.1;
+/// Most spans of a curve, and most poses of a list, that is cheap enough for others.
+const CHEAP: usize = 400;
+const FEW: usize = 20;
+
+/// Curves beside the fastest one.
+#[derive(Clone, Copy)]
+struct Others {
+    /// Shares of the linear and of the angular limits under which each is planned.
+    shares: &'static [[f64; 2]],
+    /// Gap to the optimum at which their searches end.
+    gap: f64,
+}
+
+/// What is known before other curves are tried.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Time of the fastest motion, s.
+    time: f64,
+    /// That time over the bound of the time along its curve.
+    over: f64,
+}
+
+impl<const N: usize> Planner<N> {
+    /// The fastest motion along curves that are rounder than the fastest one for the tool, where the joints rule; none that
+    /// rests without need.
+    pub(super) fn rounder(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
+        let few = motion.tolerance > 0.0 && motion.poses.len() <= FEW;
+        if !few || !self.foretells_joints(motion, start) {
+            return None;
+        }
+        let search = Search {
+            gap: Some(FIRST_GAP),
+            most: f64::INFINITY,
+        };
+        let curve = self.curve(start, (motion, search), true).ok()?;
+        let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
+        if !is_ruled(&first) {
+            return None;
+        }
+        let planned = self.for_the_joints(motion, start, (first, &curve));
+        let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
+        (!rests).then_some(planned)
+    }
+
+    /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
+    fn foretells_joints(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+        let tool: f64 = self.least_of_legs(motion, start).iter().sum();
+        let mut from = *start;
+        let mut leg = |pose: &Isometry3<f64>| {
+            let to = self.solver.nearest(pose, &from).ok()?.q;
+            Some(self.least_of_joints(&std::mem::replace(&mut from, to), &to))
+        };
+        let joints: Option<f64> = motion.poses.iter().map(&mut leg).sum();
+        joints.is_some_and(|joints| joints > tool)
+    }
+
+    /// The fastest of the motion found and of those along curves planned for less speed along or about,
+    /// where the joints rule: the fastest curve of the tool is not the fastest one for the joints. Only where
+    /// a curve is cheap to plan.
+    pub(super) fn for_the_joints(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (first, curve): (Along<N>, &Followed<N>),
+    ) -> PlannedMove<N> {
+        let time = first.planned.trajectory.duration();
+        if !is_ruled(&first) || motion.tolerance <= 0.0 || first.spans > CHEAP {
+            return first.planned;
+        }
+        let least = self.least_along(curve, motion).unwrap_or(time);
+        let known = Known {
+            time,
+            over: (time / least).min(FORETOLD),
+        };
+        let other = self.otherwise(motion, start, (known, OTHERS));
+        other.unwrap_or(first.planned)
+    }
+
+    /// The fastest motion along another curve, where the joints cannot follow the first, which has so many spans.
+    pub(super) fn instead(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        spans: usize,
+    ) -> Option<PlannedMove<N>> {
+        let none = Known {
+            time: f64::INFINITY,
+            over: 1.0,
+        };
+        (spans <= CHEAP)
+            .then(|| self.otherwise(motion, start, (none, INSTEAD)))
+            .flatten()
+    }
+
+    /// The fastest motion along another curve that is faster than the one that is known. The joints follow all of
+    /// them; the curves whose bounds of the time are least are timed, as long as one may be faster.
+    fn otherwise(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (mut known, others): (Known, Others),
+    ) -> Option<PlannedMove<N>> {
+        let search = Search {
+            gap: Some(others.gap),
+            most: known.time,
+        };
+        let mut tried = Vec::with_capacity(others.shares.len());
+        for &[along, about] in others.shares {
+            let slower = Move {
+                limits: motion.limits.scaled(along, about),
+                ..motion.clone()
+            };
+            let Ok(followed) = self.curve(start, (&slower, search), true) else {
+                continue;
+            };
+            if let Ok(least) = self.least_along(&followed, motion) {
+                tried.push((least, followed));
+            }
+        }
+        tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let mut best = None;
+        for (least, followed) in tried {
+            if least * known.over * (1.0 - SPREAD) >= known.time {
+                break;
+            }
+            let Ok(other) = self.on(&followed, motion, (start, known.time)) else {
+                continue;
+            };
+            let time = other.planned.trajectory.duration();
+            if time < known.time {
+                // No more is foretold than what was seen.
+                let over = time / least;
+                known.over = if best.is_some() || known.time.is_finite() {
+                    known.over.min(over)
+                } else {
+                    over
+                };
+                (known.time, best) = (time, Some(other.planned));
+            }
+        }
+        best
+    }
+}
+
+/// Whether the joints rule a motion.
+fn is_ruled<const N: usize>(along: &Along<N>) -> bool {
+    along.planned.trajectory.duration() > RULED * along.tool
+}
