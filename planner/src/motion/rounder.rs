@@ -13,16 +13,14 @@ use crate::task::Move;
 const RULED: f64 = 1.3;
 /// Gap to the optimum at which the search of the curve that is tried first ends.
 const FIRST_GAP: f64 = 0.05;
-/// Other curves tried then. Far from its optimum a curve is rounder, which the joints follow faster.
-const OTHERS: Others = Others {
-    shares: &[[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6]],
-    gap: 0.5,
-};
+/// Other curves tried then, each planned under a share of the linear and one of the angular limits; if the first of a pair
+/// is better than the other first one, the second is tried, too.
+const OTHERS: [[[f64; 2]; 2]; 2] = [[[1.0, 0.6], [1.0, 0.4]], [[0.7, 1.0], [0.6, 0.6]]];
+/// Gap to the optimum at which their searches end: far from its optimum a curve is rounder, which the joints follow faster.
+const OTHER_GAP: f64 = 0.5;
 /// The same where the joints cannot follow the first curve: also one that differs only in that it is rounder.
-const INSTEAD: Others = Others {
-    shares: &[[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]],
-    gap: 1.0,
-};
+const INSTEAD: [[f64; 2]; 5] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]];
+const INSTEAD_GAP: f64 = 1.0;
 /// Share by which the joints may be faster along another curve than their bound along it foretells.
 const SPREAD: f64 = 4e-3;
 /// The most that a motion takes over the bound along its curve for that to say something of other curves.
@@ -31,15 +29,6 @@ const FORETOLD: f64 = 1.1;
 const CHEAP: usize = 400;
 const FEW: usize = 20;
 
-/// Curves beside the fastest one.
-#[derive(Clone, Copy)]
-struct Others {
-    /// Shares of the linear and of the angular limits under which each is planned.
-    shares: &'static [[f64; 2]],
-    /// Gap to the optimum at which their searches end.
-    gap: f64,
-}
-
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
 struct Known {
@@ -47,6 +36,22 @@ struct Known {
     time: f64,
     /// That time over the bound of the time along its curve.
     over: f64,
+}
+
+impl Known {
+    /// Whether a curve with this bound of the time may be faster.
+    fn may_be_beaten(&self, least: f64) -> bool {
+        least * self.over * (1.0 - SPREAD) < self.time
+    }
+}
+
+/// Another curve, which the joints follow.
+struct Other<const N: usize> {
+    /// The bound of the time along it, s.
+    least: f64,
+    followed: Followed<N>,
+    /// The one that is tried next if this is good.
+    next: Option<[f64; 2]>,
 }
 
 impl<const N: usize> Planner<N> {
@@ -101,7 +106,23 @@ impl<const N: usize> Planner<N> {
             time,
             over: (time / least).min(FORETOLD),
         };
-        let other = self.otherwise(motion, start, (known, OTHERS));
+        let search = Search {
+            gap: Some(OTHER_GAP),
+            most: time,
+        };
+        let other = |[shares, next]: [[f64; 2]; 2]| {
+            let other = self.other(motion, start, (search, shares))?;
+            Some(Other {
+                next: Some(next),
+                ..other
+            })
+        };
+        let mut others: Vec<_> = OTHERS.into_iter().filter_map(other).collect();
+        let best = others.iter().min_by(|a, b| a.least.total_cmp(&b.least));
+        let best = best.filter(|best| known.may_be_beaten(best.least));
+        let next = best.and_then(|best| best.next);
+        others.extend(next.and_then(|next| self.other(motion, start, (search, next))));
+        let other = self.fastest_of(others, (motion, start), known);
         other.unwrap_or(first.planned)
     }
 
@@ -112,44 +133,56 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         spans: usize,
     ) -> Option<PlannedMove<N>> {
+        if spans > CHEAP {
+            return None;
+        }
         let none = Known {
             time: f64::INFINITY,
             over: 1.0,
         };
-        (spans <= CHEAP)
-            .then(|| self.otherwise(motion, start, (none, INSTEAD)))
-            .flatten()
+        let search = Search {
+            gap: Some(INSTEAD_GAP),
+            most: f64::INFINITY,
+        };
+        let other = |shares| self.other(motion, start, (search, shares));
+        let others = INSTEAD.into_iter().filter_map(other).collect();
+        self.fastest_of(others, (motion, start), none)
     }
 
-    /// The fastest motion along another curve that is faster than the one that is known. The joints follow all of
-    /// them; the curves whose bounds of the time are least are timed, as long as one may be faster.
-    fn otherwise(
+    /// The joints along the curve that is planned under shares of the limits, and the bound of the time along it.
+    fn other(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        (mut known, others): (Known, Others),
-    ) -> Option<PlannedMove<N>> {
-        let search = Search {
-            gap: Some(others.gap),
-            most: known.time,
+        (search, [along, about]): (Search, [f64; 2]),
+    ) -> Option<Other<N>> {
+        let slower = Move {
+            limits: motion.limits.scaled(along, about),
+            ..motion.clone()
         };
-        let mut tried = Vec::with_capacity(others.shares.len());
-        for &[along, about] in others.shares {
-            let slower = Move {
-                limits: motion.limits.scaled(along, about),
-                ..motion.clone()
-            };
-            let Ok(followed) = self.curve(start, (&slower, search), true) else {
-                continue;
-            };
-            if let Ok(least) = self.least_along(&followed, motion) {
-                tried.push((least, followed));
-            }
-        }
-        tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        let followed = self.curve(start, (&slower, search), true).ok()?;
+        Some(Other {
+            least: self.least_along(&followed, motion).ok()?,
+            followed,
+            next: None,
+        })
+    }
+
+    /// The fastest motion along one of these curves that is faster than the one that is known. The curves whose bounds of
+    /// the time are least are timed, as long as one may be faster.
+    fn fastest_of(
+        &self,
+        mut others: Vec<Other<N>>,
+        (motion, start): (&Move, &SVector<f64, N>),
+        mut known: Known,
+    ) -> Option<PlannedMove<N>> {
+        others.sort_by(|a, b| a.least.total_cmp(&b.least));
         let mut best = None;
-        for (least, followed) in tried {
-            if least * known.over * (1.0 - SPREAD) >= known.time {
+        for Other {
+            least, followed, ..
+        } in others
+        {
+            if !known.may_be_beaten(least) {
                 break;
             }
             let Ok(other) = self.on(&followed, motion, (start, known.time)) else {
