@@ -14,6 +14,7 @@ use crate::task::{Move, Shape};
 
 /// Share of the tolerance that is tried where all of it fails with the joints.
 const QUARTER: f64 = 0.25;
+
 /// Whether a curve may be possible for the tool, and only the joints fail on it.
 fn is_of_the_joints(error: &MotionError) -> bool {
     matches!(
