@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 use planner::motion::{MotionError, Planner};
-use planner::robot::load;
+use planner::robot::{Robot, load};
 use planner::task::{Move, Shape};
 
 /// Numbers from -1 to 1, the same each time.
@@ -17,17 +17,22 @@ fn random(state: &mut u64) -> f64 {
     2.0 * (*state >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
 }
 
+/// Plans for a robot with its flange as the controlled point.
+fn planner<const N: usize>(robot: &Robot) -> Planner<N> {
+    Planner::new(
+        &robot.chain::<N>().unwrap(),
+        Isometry3::identity(),
+        robot.joint_limits::<N>(),
+        robot.joint_names(),
+    )
+}
+
 /// Where straight moves reach all poses in turn, a smooth move is never refused, and never slower: not
 /// even where the joints cannot follow the fastest curve of the tool.
 #[test]
 fn what_straight_moves_reach_is_never_refused() {
     let robot = load("ur5e").unwrap();
-    let planner = Planner::new(
-        &robot.chain::<6>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<6>(),
-        robot.joint_names(),
-    );
+    let planner = planner::<6>(&robot);
     let (mut state, mut both) = (3, 0);
     for round in 0..ROUNDS {
         let start = SVector::<f64, 6>::from_fn(|_, _| 3.0 * random(&mut state));
@@ -79,12 +84,7 @@ const ROUNDS: usize = 60;
 #[test]
 fn where_joints_rule_a_rounder_curve_does_not_rest() {
     let robot = load("panda").unwrap();
-    let planner = Planner::new(
-        &robot.chain::<7>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<7>(),
-        robot.joint_names(),
-    );
+    let planner = planner::<7>(&robot);
     let start = [
         -1.2957, -1.23366, -1.04046, -2.96238, -2.64457, 1.74466, 1.93886,
     ];

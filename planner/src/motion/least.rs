@@ -1,6 +1,6 @@
 //! A lower bound of the time of all motions within the limits.
 
-use nalgebra::SVector;
+use nalgebra::{Isometry3, SVector};
 use trajectory::smooth::{self, SmoothOptions};
 use trajectory::timing::least_time;
 
@@ -63,15 +63,24 @@ impl<const N: usize> Planner<N> {
         end: &SVector<f64, N>,
         draft: &Draft<N>,
     ) -> f64 {
-        let options = SmoothOptions::new(0.0, motion.limits);
         let stops = draft.crossings.iter();
         let stops = stops.map(|pass| draft.trajectory.sample(pass.time).position);
-        let (mut from, mut pose, mut sum) = (*start, self.chain().forward(start), 0.0);
-        for (to, next) in stops.chain([*end]).zip(&motion.poses) {
-            let tool = smooth::least_time(&[pose, *next], &options).unwrap_or(0.0);
+        let (mut from, mut sum) = (*start, 0.0);
+        for (to, tool) in stops.chain([*end]).zip(self.least_of_legs(motion, start)) {
             sum += self.least_of_joints(&from, &to).max(tool);
-            (from, pose) = (to, *next);
+            from = to;
         }
         sum
+    }
+
+    /// A lower bound of the time of a straight move to each pose in turn, s: from the tool.
+    pub(super) fn least_of_legs(&self, motion: &Move, start: &SVector<f64, N>) -> Vec<f64> {
+        let options = SmoothOptions::new(0.0, motion.limits);
+        let mut from = self.chain().forward(start);
+        let least = |to: &Isometry3<f64>| {
+            let leg = [std::mem::replace(&mut from, *to), *to];
+            smooth::least_time(&leg, &options).unwrap_or(0.0)
+        };
+        motion.poses.iter().map(least).collect()
     }
 }

@@ -50,8 +50,6 @@ struct Other<const N: usize> {
     /// The bound of the time along it, s.
     least: f64,
     followed: Followed<N>,
-    /// The one that is tried next if this is good.
-    next: Option<[f64; 2]>,
 }
 
 impl<const N: usize> Planner<N> {
@@ -110,18 +108,21 @@ impl<const N: usize> Planner<N> {
             gap: Some(OTHER_GAP),
             most: time,
         };
-        let other = |[shares, next]: [[f64; 2]; 2]| {
-            let other = self.other(motion, start, (search, shares))?;
-            Some(Other {
-                next: Some(next),
-                ..other
-            })
-        };
-        let mut others: Vec<_> = OTHERS.into_iter().filter_map(other).collect();
-        let best = others.iter().min_by(|a, b| a.least.total_cmp(&b.least));
-        let best = best.filter(|best| known.may_be_beaten(best.least));
-        let next = best.and_then(|best| best.next);
-        others.extend(next.and_then(|next| self.other(motion, start, (search, next))));
+        let other = |shares| self.other(motion, start, (search, shares));
+        let pairs = OTHERS.into_iter();
+        let firsts: Vec<_> = pairs
+            .filter_map(|[first, next]| Some((other(first)?, next)))
+            .collect();
+        let best = firsts
+            .iter()
+            .min_by(|(a, _), (b, _)| a.least.total_cmp(&b.least));
+        let best = best.filter(|(best, _)| known.may_be_beaten(best.least));
+        let next = best.and_then(|(_, next)| other(*next));
+        let others = firsts
+            .into_iter()
+            .map(|(first, _)| first)
+            .chain(next)
+            .collect();
         let other = self.fastest_of(others, (motion, start), known);
         other.unwrap_or(first.planned)
     }
@@ -164,7 +165,6 @@ impl<const N: usize> Planner<N> {
         Some(Other {
             least: self.least_along(&followed, motion).ok()?,
             followed,
-            next: None,
         })
     }
 
@@ -178,10 +178,7 @@ impl<const N: usize> Planner<N> {
     ) -> Option<PlannedMove<N>> {
         others.sort_by(|a, b| a.least.total_cmp(&b.least));
         let mut best = None;
-        for Other {
-            least, followed, ..
-        } in others
-        {
+        for Other { least, followed } in others {
             if !known.may_be_beaten(least) {
                 break;
             }
@@ -192,7 +189,7 @@ impl<const N: usize> Planner<N> {
             if time < known.time {
                 // No more is foretold than what was seen.
                 let over = time / least;
-                known.over = if best.is_some() || known.time.is_finite() {
+                known.over = if known.time.is_finite() {
                     known.over.min(over)
                 } else {
                     over

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use nalgebra::{Isometry3, SVector};
-use trajectory::smooth::{RestCause, SmoothOptions, least_time};
+use trajectory::smooth::RestCause;
 use trajectory::{Line, Trajectory};
 
 use super::cartesian::{Way, is_still};
@@ -141,10 +141,8 @@ impl<const N: usize> Planner<N> {
             return Ok(planned);
         }
         let most = planned.trajectory.duration();
-        let straights = self.straight_moves(motion, (start, most)).ok();
-        let faster = straights.filter(|straights| straights.trajectory.duration() < most);
-        Ok(match faster {
-            Some(straights) => PlannedMove {
+        Ok(match self.straight_moves(motion, (start, most)) {
+            Ok(straights) => PlannedMove {
                 blend: planned.blend.map(|blend| Blend {
                     tolerance: 0.0,
                     corridor_ratio: 0.0,
@@ -153,7 +151,7 @@ impl<const N: usize> Planner<N> {
                 }),
                 ..straights
             },
-            None => planned,
+            Err(_) => planned,
         })
     }
 
@@ -182,17 +180,6 @@ impl<const N: usize> Planner<N> {
             from = to;
         }
         sum
-    }
-
-    /// A lower bound of the time of a straight move to each pose in turn, s: from the tool.
-    pub(super) fn least_of_legs(&self, motion: &Move, start: &SVector<f64, N>) -> Vec<f64> {
-        let options = SmoothOptions::new(0.0, motion.limits);
-        let mut from = self.chain().forward(start);
-        let least = |to: &Isometry3<f64>| {
-            let leg = [std::mem::replace(&mut from, *to), *to];
-            least_time(&leg, &options).unwrap_or(0.0)
-        };
-        motion.poses.iter().map(least).collect()
     }
 
     /// The motion along the curve of another move through the same poses, of at most the tolerance and the
@@ -284,7 +271,7 @@ impl<const N: usize> Planner<N> {
                 joints = last.sample(last.duration).position;
                 pieces.extend_from_slice(leg.pieces());
             }
-            left -= least;
+            left = (left - least).max(0.0);
             if time + left >= most {
                 return Err(MotionError::NoWay);
             }
