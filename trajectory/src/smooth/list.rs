@@ -142,6 +142,11 @@ impl<'a> List<'a> {
         found.is_divided() || found.plan.duration() > SLOW * self.least
     }
 
+    /// Whether a motion is so far above the bound that others are compared with it, those within less of the tolerance too.
+    fn is_far(&self, found: &Found) -> bool {
+        found.plan.duration() > FAR * self.least
+    }
+
     /// Whether the list is longer than one window may be: no search starts from its motion as a whole.
     fn is_long(&self) -> bool {
         self.poses.len() > windows::MOST_POSES
@@ -155,7 +160,7 @@ impl<'a> List<'a> {
             .parts
             .iter()
             .any(|(method, _)| *method == Method::Fit);
-        let near = found.plan.duration() <= FITTED[1] * self.least;
+        let near = found.plan.duration() <= FITTED * self.least;
         let good = found.plan.rests().is_empty() && (near || !found.motion.eased);
         self.poses.len() > 2 * windows::MOST_POSES && fitted && good
     }
@@ -164,8 +169,8 @@ impl<'a> List<'a> {
     fn is_doubtful(&self, found: &Found) -> bool {
         let over = found.plan.duration() / self.least;
         let fitted = found.plan.method() == Method::Fit && found.suffices();
-        let doubtful = if fitted {
-            FITTED[usize::from(self.is_long())]
+        let doubtful = if fitted && self.is_long() {
+            FITTED
         } else {
             DOUBTFUL
         };
@@ -189,11 +194,10 @@ impl<'a> List<'a> {
             return Some(best);
         }
         // A search may end elsewhere from the slower one of two motions.
-        if let Some(other) = other.filter(|_| best.plan.duration() > FAR * self.least) {
+        if let Some(other) = other.filter(|_| self.is_far(&best)) {
             best = Found::faster(Some(best), Some(self.refined(form, other)))?;
         }
-        let far = best.plan.duration() > FAR * self.least;
-        if hard || far || best.is_hard() || self.is_long() {
+        if hard || self.is_far(&best) || best.is_hard() || self.is_long() {
             let before = best.plan.duration();
             best = self.within_less(form, best)?;
             if best.plan.duration() < before {
@@ -215,18 +219,19 @@ impl<'a> List<'a> {
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
             let before = best.plan.duration();
+            // Where an attempt failed, or the best motion is slow, the search from that motion may have failed, too.
+            let refined = |found: Option<Found>, again: bool| match found {
+                Some(found) if again => Some(self.refined(form, found)),
+                found => found,
+            };
             if fit {
-                let fit = self.fit(form, &options);
-                // Where an attempt failed the search from the best motion may have failed, too.
-                let fit = if best.is_hard() {
-                    fit.map(|fit| self.refined(form, fit))
-                } else {
-                    fit
-                };
+                let again = best.is_hard() || self.is_far(&best);
+                let fit = refined(self.fit(form, &options), again);
                 best = Found::faster(Some(best), fit)?;
             }
             if spline {
-                best = Found::faster(Some(best), self.by_windows(form, &options))?;
+                let spline = refined(self.by_windows(form, &options), self.is_far(&best));
+                best = Found::faster(Some(best), spline)?;
             }
             left -= usize::from(best.plan.duration() > GAIN * before);
             if left == 0 || !self.is_doubtful(&best) {
@@ -479,13 +484,13 @@ const UNRESTED: [(f64, bool); 6] = [
 const GAIN: f64 = 0.998;
 
 /// A motion that takes no more than so many times the lower bound, found at the first attempt, is rarely slower than
-/// others by more than a percent; and a fit as it should be, up to this: of a list of one window, and of a longer one,
-/// where another search takes longer.
-const DOUBTFUL: f64 = 1.1;
-const FITTED: [f64; 2] = [1.18, 1.25];
+/// others by more than a percent; and a fit as it should be of a list longer than a window, where another search takes
+/// longer, up to this.
+const DOUBTFUL: f64 = 1.05;
+const FITTED: f64 = 1.25;
 
 /// A motion that takes so many times the lower bound after a search from it is compared with those within less.
-const FAR: f64 = 1.25;
+const FAR: f64 = 1.2;
 
 /// A motion that takes no more than so many times the lower bound cannot be much slower than another.
 const NEAR: f64 = 1.02;

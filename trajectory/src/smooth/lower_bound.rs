@@ -7,8 +7,8 @@
 //! wide as the certificate takes them:
 //!
 //! - **Length.** The limits bound the speed at any time after the start and before the end, so the
-//!   distance covered in a given time is bounded; the distance is at least the legs, less the
-//!   tolerances at both of their ends.
+//!   distance covered in a given time is bounded; the distance is at least that between some of the
+//!   poses, in order, less the tolerances at both ends of each part.
 //! - **Turning back.** Along any direction, the speed is zero where the motion turns back. Between
 //!   two such times it covers a known distance, from rest to rest.
 
@@ -21,7 +21,10 @@ use crate::ToolLimits;
 use crate::line::{Line, body_turn};
 use crate::timing::least_time as rest_to_rest;
 
-/// Largest number of legs whose directions are used.
+/// So many powers of two are tried as the step from one to the next of the poses that bound a length.
+const STEPS: u32 = 9;
+
+/// Largest number of legs, and of bends, whose directions are used.
 const DIRECTIONS: usize = 16;
 
 /// A lower bound (s) of the time of all motions from rest to rest through these poses, within these
@@ -90,23 +93,28 @@ pub(crate) fn lower_bound(poses: &[Isometry3<f64>], options: &SmoothOptions) -> 
         .max(turning_back(poses, place, &linear))
 }
 
-/// Least length of a path that passes the poses, by one measure of distance.
+/// Least length of a path that passes the poses, by one measure of distance: the greatest sum of the distances between
+/// some of them, in order, each less the tolerances at its ends. Where poses are dense, few of them bound it better than all.
 fn length(
     poses: &[Isometry3<f64>],
     tolerance: f64,
     distance: impl Fn(&Isometry3<f64>, &Isometry3<f64>) -> f64,
 ) -> f64 {
     let last = poses.len().saturating_sub(1);
-    let legs: f64 = (1..=last)
-        .map(|i| {
-            let slack = f64::from(u8::from(i > 1) + u8::from(i < last)) * tolerance;
-            (distance(&poses[i - 1], &poses[i]) - slack).max(0.0)
-        })
-        .sum();
-    match poses {
-        [first, .., goal] => legs.max(distance(first, goal)),
-        _ => 0.0,
+    let mut least: Vec<f64> = vec![0.0; last + 1];
+    for to in 1..=last {
+        let steps = (0..STEPS).map(|k| 1 << k).take_while(|step| *step <= to);
+        let whole = (to == last).then_some(last);
+        least[to] = steps
+            .chain(whole)
+            .map(|step| {
+                let from = to - step;
+                let slack = f64::from(u8::from(from > 0) + u8::from(to < last)) * tolerance;
+                least[from] + (distance(&poses[from], &poses[to]) - slack).max(0.0)
+            })
+            .fold(0.0, f64::max);
     }
+    least[last]
 }
 
 /// Least time for a path of a given length: the speed follows the limits from either end, up to the
@@ -139,18 +147,16 @@ fn shortest(length: f64, caps: &Caps) -> f64 {
     2.0 * low
 }
 
-/// The greatest bound by turning back along some directions.
+/// The greatest bound by turning back along some directions: of the whole way, of legs, and of the bends between legs, so that
+/// it is the same wherever the list is laid.
 fn turning_back(poses: &[Isometry3<f64>], tolerance: f64, caps: &Caps) -> f64 {
     let place = |i: usize| poses[i].translation.vector;
     let last = poses.len().saturating_sub(1);
-    let mut directions = vec![
-        Vector3::x(),
-        Vector3::y(),
-        Vector3::z(),
-        place(last) - place(0),
-    ];
+    let leg = |i: usize| place(i) - place(i - 1);
     let step = last.div_ceil(DIRECTIONS).max(1);
-    directions.extend((1..=last).step_by(step).map(|i| place(i) - place(i - 1)));
+    let mut directions = vec![place(last) - place(0)];
+    directions.extend((1..=last).step_by(step).map(leg));
+    directions.extend((2..=last).step_by(step).map(|i| leg(i) - leg(i - 1)));
     let along = |direction: &Vector3<f64>| {
         let unit = direction.try_normalize(1e-300)?;
         let places: Vec<f64> = poses
@@ -249,6 +255,23 @@ mod tests {
         let [once, twice] =
             [&[start, goal][..], &[start, goal, again]].map(|poses| lower_bound(poses, &options));
         assert_eq!(once, twice);
+    }
+
+    /// On a circle of 360 poses the balls of all of them take 72 of 377 mm off the length; those of every sixteenth 5 mm, and
+    /// their chords 2 mm. The bound is that of a line of so many mm, and the same from the other end.
+    #[test]
+    fn few_poses_bound_a_dense_list() {
+        let at = |i: u32| f64::from(i).to_radians().sin_cos();
+        let mut places: Vec<_> = (0..=360)
+            .map(|i| [0.06 * at(i).1, 0.06 * at(i).0])
+            .collect();
+        let least = bound(&places, 1e-4);
+        assert!(
+            least > 0.370 / 0.5 + 0.14 && least < 0.377 / 0.5 + 0.15,
+            "{least}"
+        );
+        places.reverse();
+        assert!((bound(&places, 1e-4) - least).abs() < 1e-9);
     }
 
     /// Back and forth: two distances of 99 mm between times at rest.
