@@ -216,14 +216,14 @@ impl<'a> List<'a> {
         let alone = self.is_fitted_alone(&best);
         let spline = !alone && (best.is_divided() || (!fitted && cheap));
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
+        // Where an attempt failed, or the best motion is slow, the search from that motion may have failed, too.
+        let refined = |found: Option<Found>, again: bool| match found {
+            Some(found) if again => Some(self.refined(form, found)),
+            found => found,
+        };
         for tolerance in narrower(form.options.tolerance).take(MOST_NARROWER) {
             let options = within(&form.options, tolerance / form.options.tolerance);
             let before = best.plan.duration();
-            // Where an attempt failed, or the best motion is slow, the search from that motion may have failed, too.
-            let refined = |found: Option<Found>, again: bool| match found {
-                Some(found) if again => Some(self.refined(form, found)),
-                found => found,
-            };
             if fit {
                 let again = best.is_hard() || self.is_far(&best);
                 let fit = refined(self.fit(form, &options), again);

@@ -338,7 +338,7 @@ fn splitting_legs_changes_nothing() {
 
 #[test]
 fn little_noise_costs_little() {
-    // List 2006 takes 1.74 s, with noise 1.80 s, as another of its motions is found; both took 1.89 s (decision 0186).
+    // List 2006 takes 1.74 s, with noise 1.80 s, as another of its motions is found; it took 1.89 s (decision 0186).
     let (chaotic, others): (Vec<_>, Vec<_>) = hard().partition(|list| list.name == "random 2006");
     let others = suites().chain(others);
     assert_eq!(broken(others, noisy, NOISY), [""; 0]);
