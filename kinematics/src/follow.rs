@@ -14,9 +14,11 @@ mod linear;
 mod null_space;
 mod null_space_path;
 mod redundancy;
+mod spare;
 mod trace;
 
 pub use error::{FollowCause, FollowError};
+pub use spare::{SpareCourse, joint_changes, spare_direction};
 
 use crate::ik::Solver;
 use nalgebra::{Isometry3, SVector, Vector3};
@@ -118,14 +120,27 @@ pub fn follow_choosing<const N: usize>(
     let none = null_space::NullSpace::none();
     let resolved = match resolve {
         Some(resolve) => resolve(&task, start),
-        None => task.trace(start, &none).map(|points| (points, none)),
+        None => task
+            .trace(start, &none)
+            .map(|points| (points, none.clone())),
     };
     resolved.map(|(points, motion)| (points, NullMotion(motion)))
 }
 
-/// A null-space motion along a path of the tool that was found by [`follow_choosing`] or [`cheaper`].
-#[derive(Clone, Copy, Debug)]
+/// A null-space motion along a path of the tool that was found by [`follow_choosing`] or [`cheaper`], or is
+/// [given](NullMotion::given).
+#[derive(Clone)]
 pub struct NullMotion<const N: usize>(null_space::NullSpace<N>);
+
+impl<const N: usize> std::fmt::Debug for NullMotion<N> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let motion = &self.0;
+        let mut shown = f.debug_struct("NullMotion");
+        shown.field("directions", &motion.directions);
+        shown.field("polynomials", &motion.polynomials);
+        shown.field("given", &motion.course.is_some()).finish()
+    }
+}
 
 /// A null-space motion along a path that costs less than none, and stays as far inside the limits and
 /// away from singular poses. `cost` is that of a joint path at a few places, in the unit of the caller,

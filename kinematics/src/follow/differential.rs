@@ -53,7 +53,7 @@ pub(super) fn task_rows<const N: usize>(
     rows
 }
 
-/// First to third derivative of the joints to `u` at a point of the path.
+/// First to third derivative of the joints to the path parameter at a point of the path, and at its value `u`.
 ///
 /// With `V` the twist of the tool as a screw in the frame that stands still, `S_i` the
 /// screw of joint `i` and `V_i` the motion of link `i`, `S_i' = V_i x S_i`; hence
@@ -66,13 +66,13 @@ pub(super) fn task_rows<const N: usize>(
 /// Dynamics 43, 2018, section 4 (derivatives of the geometric Jacobian).
 pub(super) fn derivatives<const N: usize>(
     jacobian: &SMatrix<f64, 6, N>,
-    point: &TwistPoint,
+    (u, point): (f64, &TwistPoint),
     null_space: &NullSpace<N>,
     prior: &[SVector<f64, N>; 3],
 ) -> [SVector<f64, N>; 3] {
     let rows = task_rows(jacobian, null_space);
     let system = System::<N>::new(&rows);
-    let u_rows = null_space.rates();
+    let u_rows = null_space.rates(u);
     let solve = |goal: &Screw, order: usize| -> SVector<f64, N> {
         let mut b = [0.0; 8];
         for i in 0..3 {

@@ -25,6 +25,11 @@ impl<'a, const N: usize> System<'a, N> {
         Self { rows, factors }
     }
 
+    /// Whether the rows settle all unknowns.
+    pub(super) fn is_regular(&self) -> bool {
+        self.factors.is_some()
+    }
+
     /// Solves `rows * x = b` for `N` unknowns.
     ///
     /// Where the rows do not settle `x` (singular, or fewer joints than six), the

@@ -3,22 +3,24 @@
 //! The null-space motion is given by linear functions of the joints, `c . q = r(u)`, where `c` is
 //! the direction in which the arm can move at the start without moving its tool, and `r` is a
 //! polynomial of `u`. So it has exact derivatives and does not drift. With two redundant joints,
-//! the second function is constant.
+//! the second function is constant. With one, `r` may be given by the caller instead.
 
+use super::spare::SpareCourse;
 use nalgebra::SVector;
 
 /// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
 pub(super) type NullSpacePolynomial = [f64; 6];
 
 /// Null-space motion: up to two linear functions of the joints with their polynomials.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone)]
 pub(super) struct NullSpace<const N: usize> {
     pub(super) directions: [SVector<f64, N>; 2],
     pub(super) polynomials: [NullSpacePolynomial; 2],
     pub(super) from: f64,
     pub(super) span: f64,
-    pub(super) u: f64,
     pub(super) still_ends: bool,
+    /// The values of the first function, if the caller gives them.
+    pub(super) course: Option<SpareCourse>,
 }
 
 impl<const N: usize> NullSpace<N> {
@@ -29,8 +31,8 @@ impl<const N: usize> NullSpace<N> {
             polynomials: [[0.0; 6]; 2],
             from: 0.0,
             span: 1.0,
-            u: 0.0,
             still_ends: false,
+            course: None,
         }
     }
 
@@ -39,14 +41,11 @@ impl<const N: usize> NullSpace<N> {
         &self.directions[k]
     }
 
-    /// The same, with derivatives taken at `u`.
-    pub(super) fn moved_to(mut self, u: f64) -> Self {
-        self.u = u;
-        self
-    }
-
-    /// Value of each polynomial at `u`.
+    /// Value of each function at `u`.
     pub(super) fn at(&self, u: f64) -> [f64; 2] {
+        if let Some(course) = &self.course {
+            return [course(u)[0], 0.0];
+        }
         let [w, ..] = self.progress((u - self.from) / self.span);
         self.polynomials
             .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c))
@@ -67,9 +66,13 @@ impl<const N: usize> NullSpace<N> {
         [1.0 - w, w1, -w2, w3]
     }
 
-    /// First to third derivative of each polynomial to `u`, by the chain rule through its progress.
-    pub(super) fn rates(&self) -> [[f64; 3]; 2] {
-        let [w, w1, w2, w3] = self.progress((self.u - self.from) / self.span);
+    /// First to third derivative of each function to `u`: of a polynomial by the chain rule through its progress.
+    pub(super) fn rates(&self, u: f64) -> [[f64; 3]; 2] {
+        if let Some(course) = &self.course {
+            let [_, first, second, third] = course(u);
+            return [[first, second, third], [0.0; 3]];
+        }
+        let [w, w1, w2, w3] = self.progress((u - self.from) / self.span);
         self.polynomials.map(|null_space_path| {
             let mut c = null_space_path;
             let [r1, r2, r3]: [f64; 3] = std::array::from_fn(|_| {

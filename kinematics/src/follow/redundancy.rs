@@ -78,12 +78,12 @@ fn along<const N: usize>(
     let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
     let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
     // A path cannot be expected to be better than its start.
-    let mut answer = first.map(|points| (points, still));
+    let mut answer = first.map(|points| (points, still.clone()));
     if (answer.is_ok() && best >= 1.0) || is_beyond(&answer) {
         return (best, answer);
     }
     for null_space_path in null_space_path::search(task, start, &still) {
-        let mut moving = still;
+        let mut moving = still.clone();
         moving.polynomials[0] = null_space_path;
         if let Ok(points) = task.trace(start, &moving) {
             let found = quality(&points);
@@ -206,7 +206,7 @@ impl<const N: usize> Search<'_, N> {
             let before = self.least;
             for shape in SHAPES {
                 self.along(|from, sign| {
-                    let mut other = *from;
+                    let mut other = from.clone();
                     for (c, s) in other.polynomials[0].iter_mut().zip(shape) {
                         *c += sign * size * s;
                     }
@@ -246,8 +246,8 @@ fn resting<const N: usize>(
         polynomials: directions.map(|direction| [direction.dot(start), 0.0, 0.0, 0.0, 0.0, 0.0]),
         from,
         span: to - from,
-        u: from,
         still_ends: task.options.still_ends,
+        course: None,
     }
 }
 
@@ -276,7 +276,7 @@ fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64
 
 /// Directions in which the joints can move without moving the tool: `N - 6` of them,
 /// at right angles to each other and to the rows of the Jacobian.
-fn null_space<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [SVector<f64, N>; 2] {
+pub(super) fn null_space<const N: usize>(jacobian: &SMatrix<f64, 6, N>) -> [SVector<f64, N>; 2] {
     let mut basis: Vec<SVector<f64, N>> = Vec::new();
     let mut reduce = |mut v: SVector<f64, N>, keep: bool| {
         // Twice: the second pass removes the rounding of the first.

@@ -276,7 +276,7 @@ impl<const N: usize> Task<'_, N> {
             last.q[3],
         ];
         let (_, jacobian) = self.solver.chain().jacobian(q);
-        let [q1, q2, q3] = derivatives(&jacobian, seen, &null_space.moved_to(u), &prior);
+        let [q1, q2, q3] = derivatives(&jacobian, (u, seen), null_space, &prior);
         FollowPoint {
             u,
             q: [*q, q1, q2, q3],

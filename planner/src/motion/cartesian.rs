@@ -117,7 +117,7 @@ impl<const N: usize> Planner<N> {
         let (tool, at, options) = (way.tool(), (grid, start), way.options());
         let found = match way.spare {
             Some(spare) => follow::follow_with(&self.solver, &tool, at, &options, spare)
-                .map(|points| (points, *spare)),
+                .map(|points| (points, spare.clone())),
             None => follow::follow_choosing(&self.solver, &tool, at, &options),
         };
         found.map_err(|error| self.blocked(&error, way.curve.end(), way.towards))

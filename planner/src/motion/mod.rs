@@ -31,6 +31,7 @@ mod soonest;
 mod timed;
 mod timed_refusal;
 mod windowed;
+mod with_joints;
 
 use kinematics::{Chain, Solver};
 use std::borrow::Cow;

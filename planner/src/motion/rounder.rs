@@ -69,7 +69,11 @@ impl<const N: usize> Planner<N> {
         if !is_ruled(&first) {
             return None;
         }
-        let planned = self.for_the_joints(motion, start, (first, &curve));
+        let found = self.with_joints(motion, start, &first.planned);
+        let planned = match found {
+            Some(found) => found,
+            None => self.for_the_joints(motion, start, (first, &curve)),
+        };
         let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
         (!rests).then_some(planned)
     }

@@ -77,7 +77,10 @@ impl<const N: usize> Planner<N> {
             return self.or_straight(motion, start, rounder);
         }
         let planned = match self.blended(motion, start, motion) {
-            Ok((first, curve)) => self.for_the_joints(motion, start, (first, &curve)),
+            Ok((first, curve)) => {
+                let planned = self.for_the_joints(motion, start, (first, &curve));
+                self.with_joints(motion, start, &planned).unwrap_or(planned)
+            }
             Err(Failure { error, spans }) => {
                 let error = self.blamed(error, motion, start);
                 if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
@@ -214,7 +217,7 @@ impl<const N: usize> Planner<N> {
             return Err(MotionError::NoWay.into());
         }
         let (spans, fitted) = (path.plan.spans(), path.is_fitted());
-        match self.joints_on(path, start) {
+        match self.joints_on(path, start, None) {
             Err(_) if fitted => self.curve(start, (curve, search), false),
             followed => followed.map_err(|error| Failure { error, spans }),
         }

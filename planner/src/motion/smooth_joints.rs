@@ -1,7 +1,7 @@
 //! MoveSmoothlyTo: the joints along a smooth motion of the tool.
 
 use kinematics::follow::{self, FollowPoint, NullMotion};
-use nalgebra::SVector;
+use nalgebra::{Isometry3, SVector};
 use trajectory::timing::PathTiming;
 use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, smooth};
 
@@ -26,29 +26,39 @@ const ALONG: TimingOptions = TimingOptions {
 };
 
 impl<const N: usize> Planner<N> {
-    /// The joints along a smooth path, without a null-space motion that helps them.
+    /// The joints along a smooth path, with a null-space motion that was found with it, or without one that helps them.
     pub(super) fn joints_on(
         &self,
         path: SmoothPath,
         start: &SVector<f64, N>,
+        spare: Option<&NullMotion<N>>,
     ) -> Result<Followed<N>, MotionError> {
         let points = if path.is_still() {
             Vec::new()
         } else {
             let towards = |u: f64| path.towards(u);
-            self.followed(&path.way(&towards), start)?
+            let way = Way {
+                spare,
+                ..path.way(&towards)
+            };
+            self.followed(&way, start)?
         };
-        Ok(Followed { path, points })
+        Ok(Followed {
+            path,
+            points,
+            chosen: spare.is_some(),
+        })
     }
 
     /// The motions of the joints along a smooth path, slowed down where a joint needs it, to be certified: the fastest
     /// first. [`MotionError::NoWay`] if none is shorter than `most` (s).
     pub(super) fn along_smooth(
         &self,
-        Followed { path, points }: &Followed<N>,
+        followed: &Followed<N>,
         motion: &Move,
         (start, most): (&SVector<f64, N>, f64),
     ) -> Result<Vec<Draft<N>>, MotionError> {
+        let Followed { path, points, .. } = followed;
         let plan = &path.plan;
         let crossings = Crossing::of(plan);
         if path.is_still() {
@@ -57,12 +67,12 @@ impl<const N: usize> Planner<N> {
         }
         let first = match self.fastest_along(plan, (points, most), (&crossings, motion)) {
             // The spare joint may help.
-            Err(MotionError::NoWay) if N > 6 => None,
+            Err(MotionError::NoWay) if N > 6 && !followed.chosen => None,
             first => Some(first?),
         };
         let time = |draft: &Draft<N>| draft.trajectory.duration();
         let most = first.as_ref().map_or(most, time);
-        if most <= plan.duration() * HELPED {
+        if followed.chosen || most <= plan.duration() * HELPED {
             return Ok(first.into_iter().collect());
         }
         let towards = |u: f64| path.towards(u);
@@ -84,7 +94,7 @@ impl<const N: usize> Planner<N> {
     /// A lower bound of the time of the joints along a smooth path, s: of the fastest law without limits of jerk.
     pub(super) fn least_along(
         &self,
-        Followed { path, points }: &Followed<N>,
+        Followed { path, points, .. }: &Followed<N>,
         motion: &Move,
     ) -> Result<f64, MotionError> {
         let plan = &path.plan;
@@ -189,11 +199,8 @@ impl<const N: usize> Planner<N> {
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.fit = fit;
         options.gap = gap.unwrap_or(options.gap);
-        Ok(SmoothPath {
-            plan: smooth::plan(&poses, &options)?,
-            tolerance: motion.tolerance,
-            still: is_still(&poses),
-        })
+        let plan = smooth::plan(&poses, &options)?;
+        Ok(SmoothPath::new(plan, motion.tolerance, &poses))
     }
 
     /// A motion along the path of a smooth motion, with a time law of its own that is never faster;
@@ -222,6 +229,8 @@ impl<const N: usize> Planner<N> {
 pub(super) struct Followed<const N: usize> {
     pub(super) path: SmoothPath,
     points: Vec<FollowPoint<N>>,
+    /// Whether the null-space motion was found with the path.
+    chosen: bool,
 }
 
 /// The smooth motion of the tool that the joints are to follow.
@@ -234,6 +243,15 @@ pub(super) struct SmoothPath {
 }
 
 impl SmoothPath {
+    /// A motion through poses that was planned with a tolerance (m).
+    pub(super) fn new(plan: smooth::SmoothPlan, tolerance: f64, poses: &[Isometry3<f64>]) -> Self {
+        Self {
+            plan,
+            tolerance,
+            still: is_still(poses),
+        }
+    }
+
     /// Whether it is along a curve fitted through a dense list.
     pub(super) fn is_fitted(&self) -> bool {
         self.plan.method() == smooth::Method::Fit

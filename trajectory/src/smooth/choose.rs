@@ -25,6 +25,15 @@ const EFFORT: Effort = Effort {
     onward: false,
 };
 
+/// The effort of a search for an arm, which ends at a gap to its optimum.
+pub(super) fn arm_effort(gap: f64) -> Effort {
+    Effort {
+        spread: None,
+        gap,
+        ..EFFORT
+    }
+}
+
 /// An attempt that breaks a bound by more than this (its first, a later one)
 /// is not followed by another.
 const HOPELESS: [f64; 2] = [10.0, 3.5];
@@ -33,7 +42,7 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 const FAR: f64 = 1.2;
 
 /// A motion from rest that exceeds a limit by less than this is slowed down as a whole.
-const SLOWED: f64 = 1.3;
+pub(super) const SLOWED: f64 = 1.3;
 
 /// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
 const TURNED: f64 = 4.0;
@@ -254,6 +263,7 @@ impl Attempts<'_> {
                 effort: self.effort,
                 coupled: false,
                 known: self.known,
+                arm: None,
             };
             let turns = request.moves()[1];
             request.coupled = self.couples(&request, turns)?;
@@ -392,7 +402,7 @@ fn broken(certificate: &Certificate, crossings: &[Crossing]) -> f64 {
 }
 
 /// Narrows the options by what a motion exceeded.
-fn narrow(
+pub(super) fn narrow(
     options: &mut SmoothOptions,
     certificate: &Certificate,
     crossings: &[Crossing],

@@ -13,6 +13,7 @@
 
 mod angular_bounds;
 mod approach;
+mod arm;
 mod bridge;
 mod certificate;
 mod choose;
@@ -20,6 +21,7 @@ mod crossing;
 mod dense;
 mod exact_stop;
 mod fade;
+mod for_arm;
 mod found;
 mod list;
 mod lower_bound;
@@ -41,10 +43,12 @@ mod turning_back;
 mod windows;
 
 use crate::poly;
+pub use arm::{ArmMotion, ArmState, JointBounds, JointState};
 pub(crate) use certificate::to_segment;
 pub use certificate::{Certificate, Peak};
 pub use crossing::{Crossing, RESOLUTION};
 pub use dense::{FittedCurve, FittedPart};
+pub use for_arm::{ArmPlan, SpareSpline, plan_for_arm};
 pub use list::plan;
 pub use lower_bound::{least_time, least_turning_time};
 pub use method::Method;

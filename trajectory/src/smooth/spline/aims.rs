@@ -58,7 +58,7 @@ impl Task<'_> {
         point: &Point<D>,
     ) -> Vec<[f64; D]> {
         let h = problem.spacing(point.z);
-        let rotations = self.rotations(problem, point, D - 3, h);
+        let rotations = self.rotations(problem, point, h);
         let passes = point.crossings.iter().zip(problem.inner());
         let aim = |(i, (time, vertex)): (usize, (&f64, &[f64; D]))| {
             let (span, share) = point.locate(*time);
@@ -66,7 +66,8 @@ impl Task<'_> {
             let at = point.at(*time)[0];
             let mut aim = *vertex;
             for d in 0..3 {
-                aim[D - 3 + d] = at[D - 3 + d] - off[d];
+                let turn = Problem::<D>::LAST + d;
+                aim[turn] = at[turn] - off[d];
             }
             aim
         };

@@ -150,6 +150,9 @@ impl<const D: usize> Ball<D> {
     /// The Hessian times a vector.
     pub(super) fn times(&self, vector: &[f64; D]) -> [f64; D] {
         let entry = |d: usize| {
+            if d / 3 >= Problem::<D>::GROUPS {
+                return 0.0;
+            }
             let row = &self.blocks[d / 3][d % 3];
             let own = &vector[d / 3 * 3..];
             row[0] * own[0] + row[1] * own[1] + row[2] * own[2]
@@ -169,7 +172,7 @@ impl<const D: usize> Ball<D> {
     /// The Hessian without the passing time: it couples all coordinates.
     pub(super) fn eliminated(&self) -> [[f64; D]; D] {
         let mut hessian = [[0.0; D]; D];
-        for d in 0..D {
+        for d in 0..3 * Problem::<D>::GROUPS {
             hessian[d][d / 3 * 3..d / 3 * 3 + 3].copy_from_slice(&self.blocks[d / 3][d % 3]);
             if self.stiff > 0.0 {
                 for e in 0..D {

@@ -188,6 +188,7 @@ mod tests {
             scale: 1.0,
             anchor: None,
             led: Vec::new(),
+            joints: Vec::new(),
         }
     }
 

@@ -20,8 +20,8 @@ pub(crate) const SPARE: usize = 3;
 /// all of them, and always at the same place of a register.
 pub(crate) const PANEL: usize = LANES;
 
-/// Length of a panel column with zeros after it, for `B` up to 36.
-const ROOM: usize = 48;
+/// Length of a panel column with zeros after it, for `B` up to 40.
+const ROOM: usize = 52;
 
 impl<const B: usize> Band<B> {
     /// A zero matrix of `size` rows.

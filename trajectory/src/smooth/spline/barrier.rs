@@ -154,6 +154,7 @@ impl<const D: usize> Op for Look<'_, D> {
                 self.corridor(&mut slacks, &coordinates, (g, room))?;
             }
         }
+        bounds += self.joints(&mut slacks)?;
         Some(Seen {
             rest: -bounds - slacks.sum - slacks.logarithm(),
             slacks: slacks.seen,
@@ -200,6 +201,22 @@ impl<const D: usize> Look<'_, D> {
         let count = [last, last.saturating_sub(1), last.saturating_sub(2)];
         let logarithm = |k: usize| count[k] as f64 * caps[k].ln();
         Some(logarithm(0) + logarithm(1) + logarithm(2))
+    }
+
+    /// Adds the slacks of all joints; returns the sum of the logarithms of their bounds that depend on `z`.
+    #[inline(always)]
+    fn joints<S: Four>(&self, slacks: &mut Slacks<'_, S>) -> Option<f64> {
+        let (simd, problem) = (slacks.product.build(), self.barrier.problem);
+        let h = problem.spacing(self.point.z);
+        let mut bounds = 0.0;
+        for joint in &problem.joints {
+            bounds += joint.look(simd, (self.point, h), |squares, bound| {
+                let held = slacks.take_four(squares, bound);
+                slacks.fold();
+                held
+            })?;
+        }
+        Some(bounds)
     }
 
     /// Adds the slacks of the balls.
@@ -317,6 +334,7 @@ mod tests {
             scale: 1.0,
             anchor: None,
             led: Vec::new(),
+            joints: Vec::new(),
         }
     }
 

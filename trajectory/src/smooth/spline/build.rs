@@ -11,6 +11,7 @@ use super::start::{self, KNOTS_PER_RAMP};
 use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
+use crate::smooth::arm::ArmMotion;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::Span;
 
@@ -74,6 +75,8 @@ pub(crate) struct Request<'a> {
     pub(crate) coupled: bool,
     /// A motion from the same start through the same poses that holds, to start the search from.
     pub(crate) known: Option<&'a [Span]>,
+    /// A motion of an arm from rest to rest through the poses, to start the search from, and what its joints may do.
+    pub(crate) arm: Option<&'a ArmMotion<'a>>,
 }
 
 impl Request<'_> {
@@ -133,15 +136,8 @@ impl Request<'_> {
 /// Time-optimal spline from the first pose to the last through balls around
 /// those between. `None` when no feasible spline was found.
 pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
-    let vectors = unroll(request.poses);
-    let task = Task {
-        request,
-        poses: request.poses,
-        vectors,
-        options: request.options,
-        moving: request.moving,
-    };
-    match request.moves() {
+    let task = Task::new(request);
+    let found = match request.moves() {
         [true, false] => task.run::<3, 20>([true, false]),
         [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
         [false, true] => task.run::<3, 20>([false, true]),
@@ -149,6 +145,21 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
         [true, true] if request.poses.len() <= FEW => task.run::<6, 20>([true, true]),
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
+    };
+    found.map(|(spans, _)| spans)
+}
+
+/// The same for an arm, between rests, and the control points of its spare coordinate; empty if it has none.
+pub(crate) fn plan_for_arm(request: &Request<'_>) -> Option<Found> {
+    let task = Task::new(request);
+    match (request.moves(), request.arm?.has_spare) {
+        ([true, false], false) => task.run::<3, 20>([true, false]),
+        ([true, false], true) => task.run::<4, 24>([true, false]),
+        ([false, true], false) => task.run::<3, 20>([false, true]),
+        ([false, true], true) => task.run::<4, 24>([false, true]),
+        ([true, true], false) => task.run::<6, 36>([true, true]),
+        ([true, true], true) => task.run::<7, 40>([true, true]),
+        ([false, false], _) => None,
     }
 }
 
@@ -164,6 +175,9 @@ fn unroll(poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
     result
 }
 
+/// Spans, and the control points of a spare coordinate.
+type Found = (Vec<Span>, Vec<f64>);
+
 pub(super) struct Task<'a> {
     request: &'a Request<'a>,
     pub(super) poses: &'a [Isometry3<f64>],
@@ -172,9 +186,19 @@ pub(super) struct Task<'a> {
     moving: Option<&'a Moving>,
 }
 
-impl Task<'_> {
+impl<'a> Task<'a> {
+    fn new(request: &'a Request<'a>) -> Self {
+        Self {
+            request,
+            poses: request.poses,
+            vectors: unroll(request.poses),
+            options: request.options,
+            moving: request.moving,
+        }
+    }
+
     /// Coordinates of a position and a rotation vector: those in use.
-    fn pack<const D: usize>(
+    pub(super) fn pack<const D: usize>(
         &self,
         used: [bool; 2],
         p: &Vector3<f64>,
@@ -259,7 +283,7 @@ impl Task<'_> {
         2.0 * most.max(1e-3)
     }
 
-    fn run<const D: usize, const B: usize>(&self, used: [bool; 2]) -> Option<Vec<Span>> {
+    fn run<const D: usize, const B: usize>(&self, used: [bool; 2]) -> Option<Found> {
         let vertices = self.poses.iter().zip(&self.vectors);
         let vertices: Vec<[f64; D]> = vertices
             .map(|(pose, turn)| self.pack(used, &pose.translation.vector, turn))
@@ -287,22 +311,28 @@ impl Task<'_> {
             start: begin,
             scale: 1.0,
             anchor: None,
-            led: if D > 3 { self.led() } else { Vec::new() },
+            led: if Problem::<D>::TURNS {
+                self.led()
+            } else {
+                Vec::new()
+            },
+            joints: Vec::new(),
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;
             problem.finish = finish.map(|finish| self.end(used, finish, spacing));
         }
         let mut effort = self.request.effort;
-        let mut point = match self.request.known {
-            Some(spans) => {
+        let mut point = match (self.request.arm, self.request.known) {
+            (Some(arm), _) => self.of_arm(&mut problem, arm, used)?,
+            (_, Some(spans)) => {
                 effort.spread = None;
-                if D == 3 && self.moving.is_none() {
+                if !Problem::<D>::TURNS && self.moving.is_none() {
                     (effort.steps, effort.search) = (STEPS, SEARCH);
                 }
                 self.known(&mut problem, spans, used)
             }
-            None => {
+            (None, None) => {
                 let spread = self.moving.map(|_| effort.spread.unwrap_or(1.0));
                 start::first(&mut problem, spread, self.knots_per_ramp())
             }
@@ -310,7 +340,11 @@ impl Task<'_> {
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
         let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
         solve::<D, B>(&mut problem, &mut point, effort, aims)?;
-        Some(self.spans(&problem, &point, used))
+        let spare = point
+            .control
+            .iter()
+            .filter_map(|c| Some(c[Problem::<D>::SPARE?]));
+        Some((self.spans(&problem, &point, used), spare.collect()))
     }
 
     /// First iterate from a known motion.
@@ -351,7 +385,7 @@ impl Task<'_> {
     ) -> Vec<Span> {
         let h = problem.spacing(point.z);
         let rotations = match (used, self.request.moves()[1]) {
-            ([_, true], _) => self.rotations(problem, point, D - 3, h),
+            ([_, true], _) => self.rotations(problem, point, h),
             (_, true) => self.following(problem, point, h),
             _ => Vec::new(),
         };
@@ -397,10 +431,9 @@ impl Task<'_> {
         &self,
         problem: &Problem<D>,
         point: &Point<D>,
-        first: usize,
         h: f64,
     ) -> Vec<UnitQuaternion<f64>> {
-        let knots = point.control.len();
+        let (knots, first) = (point.control.len(), Problem::<D>::LAST);
         let vector = |k: usize| {
             let c = &point.control[k];
             Vector3::new(c[first], c[first + 1], c[first + 2])
@@ -415,7 +448,11 @@ impl Task<'_> {
             result.push(result[k - 1] * step);
         }
         let mut from = 3;
-        let mut anchors = anchors(problem, point);
+        // The orientations of an arm's motion are not those of the legs.
+        let mut anchors = match self.request.arm {
+            Some(_) => Vec::new(),
+            None => anchors(problem, point),
+        };
         anchors.push((knots - 4, self.poses.len() - 1));
         let end = match self.request.finish {
             Some(finish) => rotations(finish, h),
@@ -429,7 +466,7 @@ impl Task<'_> {
             };
             // As long as it has to be, over other corrections where the legs are short.
             let drift = body_turn(&result[to], &target).norm() / CORRECTED;
-            let [_, bent, steep] = problem.groups[D / 3 - 1].caps;
+            let [_, bent, steep] = problem.groups[Problem::<D>::GROUPS - 1].caps;
             let reach = (BEND * drift / bent).sqrt();
             let reach = reach.max((STEEPEST * drift / steep).cbrt()) / h;
             let since = from.min(to.saturating_sub(reach as usize));

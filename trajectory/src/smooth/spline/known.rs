@@ -102,7 +102,7 @@ impl<'a> Known<'a> {
         let ramps = groups.iter().map(|group| group.caps[1] / group.caps[2]);
         let ramp = ramps.fold(0.0, f64::max) / KNOTS_PER_RAMP;
         let total = self.duration();
-        if D > 3 {
+        if Problem::<D>::TURNS {
             return ramp.min(total / FEWEST).max(total / MOST);
         }
         // The time in which a jerk turns the motion at a corner.

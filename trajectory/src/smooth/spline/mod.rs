@@ -7,6 +7,7 @@
 //! see docs/decisions/0050-smooth-spline.md.
 
 mod aims;
+mod arm;
 mod ball;
 mod balls;
 mod band;
@@ -16,6 +17,7 @@ mod build;
 mod coordinates;
 mod ends;
 mod iterate;
+mod joints;
 mod known;
 mod led;
 mod meet;
@@ -30,7 +32,7 @@ mod turns;
 
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
-pub(crate) use build::{Moving, Request, plan};
+pub(crate) use build::{Moving, Request, plan, plan_for_arm};
 pub(crate) use meet::meet_spans;
 pub(crate) use solve::Effort;
 pub(crate) use start::KNOTS_PER_RAMP;

@@ -100,6 +100,7 @@ impl<const D: usize, const B: usize> System<D, B> {
     fn of(&mut self, at: &Iterate<'_, D>, t: f64) -> Option<Step> {
         if Self::STRIDE > 3 {
             self.band.clear();
+            self.sides.fill([0.0; 2]);
         }
         (self.gradient_z, self.hessian_z) = (t, 0.0);
         let coordinates = Coordinates::of(&at.point.control);
@@ -116,6 +117,7 @@ impl<const D: usize, const B: usize> System<D, B> {
             self.place(g, at.shifts.is_none());
         }
         self.balls(at);
+        self.joints(at);
         self.solve(&at.slides)
     }
 
@@ -143,7 +145,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         let falls = self.sides.iter().zip(&along);
         let falls: f64 = falls.map(|(side, step)| side[0] * step).sum();
         let free = size / D;
-        let entry = |i: usize| along[Self::row(free, i / D, i % D / 3) + i % 3];
+        let entry = |i: usize| along[Self::row(free, i / D, i % D / 3) + i % D % 3];
         let mut control: Vec<f64> = (0..size).map(entry).collect();
         for (step, slide) in control.iter_mut().zip(slides.iter().skip(4).flatten()) {
             *step += slide * z;

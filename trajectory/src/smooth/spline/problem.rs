@@ -9,6 +9,7 @@
 use simd::{F4, Four};
 
 use super::basis::{self, START, weights};
+use super::joints::Joint;
 
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
 /// slack that each step along a ball leaves it.
@@ -25,7 +26,7 @@ pub(crate) struct Group {
     pub(crate) width: f64,
 }
 
-/// The problem in `D` coordinates, three to a group.
+/// The problem in `D` coordinates, three to a group, and one of a spare joint.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<const D: usize> {
     /// One for each three coordinates; the second is unused when `D = 3`.
@@ -45,6 +46,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) anchor: Option<f64>,
     /// Whether the place alone says when an inner vertex is passed, by vertex; empty: of none.
     pub(crate) led: Vec<bool>,
+    /// The joints of an arm that follow.
+    pub(crate) joints: Vec<Joint<D>>,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -76,6 +79,15 @@ impl<const D: usize> Problem<D> {
     /// Number of groups.
     pub(crate) const GROUPS: usize = D / 3;
 
+    /// First coordinate of the last group.
+    pub(crate) const LAST: usize = 3 * (Self::GROUPS - 1);
+
+    /// Whether position and orientation are both searched.
+    pub(crate) const TURNS: bool = Self::GROUPS > 1;
+
+    /// The coordinate of a spare joint, if there is one: after those of the groups.
+    pub(crate) const SPARE: Option<usize> = if D % 3 == 1 { Some(D - 1) } else { None };
+
     /// Whether the start or the end is in motion.
     pub(crate) fn moving(&self) -> bool {
         let start = self.start[1..].iter().flatten();
@@ -89,7 +101,7 @@ impl<const D: usize> Problem<D> {
 
     /// Whether the place alone says when inner vertex `i` is passed.
     pub(crate) fn is_led(&self, i: usize) -> bool {
-        D > 3 && self.led.get(i).copied().unwrap_or(false)
+        Self::TURNS && self.led.get(i).copied().unwrap_or(false)
     }
 
     /// Inner vertices: those with a ball.
@@ -219,7 +231,7 @@ impl<const D: usize> Problem<D> {
         way.way.map(|x| x * free)
     }
 
-    /// Barrier parameter: twice the number of norm constraints.
+    /// Barrier parameter: twice the number of constraints.
     pub(crate) fn parameter(&self, point: &Point<D>) -> f64 {
         let knots = point.control.len() as f64;
         let corridor = if self.groups[0].width.is_finite() {
@@ -228,12 +240,13 @@ impl<const D: usize> Problem<D> {
             0.0
         };
         let balls = self.heavy(point) * point.crossings.len() as f64;
-        2.0 * Self::GROUPS as f64 * (knots * (3.0 + corridor) + balls)
+        let norms = Self::GROUPS as f64 * (knots * (3.0 + corridor) + balls);
+        2.0 * (norms + self.joint_bounds(knots))
     }
 
     /// Weight of a ball beside other constraints.
     pub(crate) fn heavy(&self, point: &Point<D>) -> f64 {
-        if D == 3 || point.crossings.is_empty() {
+        if !Self::TURNS || point.crossings.is_empty() {
             return 1.0;
         }
         let knots = point.control.len() as f64;
@@ -359,7 +372,7 @@ pub(crate) struct Foot {
 /// The legs between vertices, by group.
 pub(crate) fn ways<const D: usize>(vertices: &[[f64; D]]) -> [Vec<Way>; 2] {
     [0, 1].map(|g| {
-        let pairs = vertices.windows(2).filter(|_| 3 * g < D);
+        let pairs = vertices.windows(2).filter(|_| g < D / 3);
         pairs
             .map(|pair| {
                 let (from, to) = (part(&pair[0], g), part(&pair[1], g));

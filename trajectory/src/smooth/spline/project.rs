@@ -77,10 +77,10 @@ pub(crate) fn project<const D: usize>(
                 break;
             };
             let (mut share, mut moved) = (1.0, false);
-            for _ in 0..if D > 3 { 4 } else { 1 } {
+            for _ in 0..if Problem::<D>::TURNS { 4 } else { 1 } {
                 let to = (time - share * step).clamp(before, end.max(before));
                 let there = pass.strain(point, to);
-                if D == 3 || there <= here {
+                if !Problem::<D>::TURNS || there <= here {
                     (time, here, moved) = (to, there, true);
                     break;
                 }
@@ -109,7 +109,7 @@ struct Pass<'a, const D: usize> {
 impl<const D: usize> Pass<'_, D> {
     /// Strain of a passing time: outside of a ball how far, and inside the barrier, which is less.
     fn strain(&self, point: &Point<D>, time: f64) -> (f64, f64) {
-        if D == 3 {
+        if !Problem::<D>::TURNS {
             return (0.0, 0.0);
         }
         let [p, ..] = point.at(time);
@@ -152,7 +152,7 @@ impl<const D: usize> Pass<'_, D> {
                 speed += v[d] * v[d];
             }
             let slack = self.squares[g] - away;
-            let inside = D > 3 && slack > 0.0 && !self.led;
+            let inside = Problem::<D>::TURNS && slack > 0.0 && !self.led;
             let scale = if inside { 1.0 / slack } else { self.scales[g] };
             slope += scale * along;
             bend += scale * bent;

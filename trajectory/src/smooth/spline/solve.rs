@@ -84,9 +84,9 @@ impl Pace {
         if problem.finish.is_none() {
             return Self {
                 steps: effort.steps,
-                growth: if D > 3 { TURNING } else { GROWTH },
-                centre: if D > 3 { LOOSELY } else { CENTRE },
-                last: if D > 3 { ROUGHLY } else { CENTRE },
+                growth: if Problem::<D>::TURNS { TURNING } else { GROWTH },
+                centre: if Problem::<D>::TURNS { LOOSELY } else { CENTRE },
+                last: if Problem::<D>::TURNS { ROUGHLY } else { CENTRE },
                 low: LOW,
                 keep: KEEP,
                 rounds: ROUNDS,
@@ -373,10 +373,17 @@ fn aim<const D: usize, const B: usize>(
         return 0.0;
     };
     let shift = |(aim, from): (&[f64; D], &[f64; D])| -> [f64; D] {
-        std::array::from_fn(|d| if d < D - 3 { 0.0 } else { aim[d] - from[d] })
+        let turn = Problem::<D>::LAST..3 * Problem::<D>::GROUPS;
+        std::array::from_fn(|d| {
+            if turn.contains(&d) {
+                aim[d] - from[d]
+            } else {
+                0.0
+            }
+        })
     };
     let shifts: Vec<[f64; D]> = aims.iter().zip(problem.inner()).map(shift).collect();
-    let radius = problem.groups[D / 3 - 1].radius;
+    let radius = problem.groups[Problem::<D>::GROUPS - 1].radius;
     let far = |shift: &[f64; D]| shift.iter().map(|x| x * x).sum::<f64>().sqrt() / radius;
     let off = shifts.iter().map(far).fold(0.0, f64::max);
     let Some(seen) = left(problem, room, point, &[]) else {
@@ -530,15 +537,21 @@ fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort:
     }
 }
 
-/// Raises `z` until speed, acceleration and jerk hold with a margin.
+/// The cube of the factor on the time with which speed, acceleration and jerk hold with a margin.
+fn time_cubed(ratios: [f64; 3]) -> f64 {
+    let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
+    speed.powi(3).max(acceleration.powf(1.5)).max(jerk)
+}
+
+/// Raises `z` until speed, acceleration and jerk hold with a margin, those of joints, too.
 fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     let mut need = 0.0_f64;
     for ratios in super::project::ratios(problem, point) {
-        let [speed, acceleration, jerk] = ratios.map(|ratio| ratio / 0.9);
-        need = need
-            .max(speed.powi(3))
-            .max(acceleration.powf(1.5))
-            .max(jerk);
+        need = need.max(time_cubed(ratios));
+    }
+    let h = problem.spacing(point.z);
+    for joint in &problem.joints {
+        need = need.max(time_cubed(joint.ratios(point, h)));
     }
     point.z *= need.max(1e-9);
 }
@@ -593,7 +606,7 @@ fn go<const D: usize>(
     problem.pin(trial);
     trial.crossings.copy_from_slice(&point.crossings);
     let times = trial.crossings.iter_mut().zip(&step.times);
-    for (time, change) in times.filter(|_| D > 3) {
+    for (time, change) in times.filter(|_| Problem::<D>::TURNS) {
         *time += share * change;
     }
 }

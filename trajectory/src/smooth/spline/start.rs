@@ -75,7 +75,7 @@ impl Schedule {
 /// Most spans of a spline through so many vertices. One that turns needs twice the work for each span, and its steps are
 /// longer where knots are farther apart. `knots` is the number of them in one time `A / J`.
 fn most<const D: usize>(vertices: usize, knots: f64) -> f64 {
-    if D == 3 {
+    if !Problem::<D>::TURNS {
         return MOST;
     }
     let share = if knots < KNOTS_PER_RAMP { ROUGH } else { 1.0 };

@@ -1,0 +1,117 @@
+//! MoveSmoothlyTo where the joints rule: the curve of the tool and the spare joint are searched under the limits of the
+//! joints, near a motion that is known.
+
+use std::sync::Arc;
+
+use kinematics::follow::{self, NullMotion};
+use nalgebra::{Isometry3, SVector, Vector3};
+use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
+
+use super::smooth_joints::SmoothPath;
+use super::{PlannedMove, Planner};
+use crate::task::Move;
+
+/// Searches, each from the motion that the one before has found, and the share of the time that one has to save for another.
+const ROUNDS: usize = 3;
+const GAIN: f64 = 0.01;
+
+/// Gap to its optimum at which a search ends: the joints are timed once more after it.
+const GAP: f64 = 0.1;
+
+impl<const N: usize> Planner<N> {
+    /// The fastest motion of searches with the joints that begin at a known one; `None` if none is faster. Only for arms with six or seven joints.
+    pub(super) fn with_joints(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        known: &PlannedMove<N>,
+    ) -> Option<PlannedMove<N>> {
+        let mut best: Option<PlannedMove<N>> = None;
+        for _ in 0..ROUNDS {
+            let from = best.as_ref().unwrap_or(known);
+            let before = from.trajectory.duration();
+            let found = self.searched_from(motion, start, from);
+            let Some(found) = found.filter(|found| found.trajectory.duration() < before) else {
+                break;
+            };
+            let little = found.trajectory.duration() > (1.0 - GAIN) * before;
+            best = Some(found);
+            if little {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The motion with which a search ends that begins at a known one.
+    fn searched_from(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        known: &PlannedMove<N>,
+    ) -> Option<PlannedMove<N>> {
+        let trajectory = &known.trajectory;
+        let middle = trajectory.sample(0.5 * trajectory.duration()).position;
+        let direction = follow::spare_direction(self.chain(), &middle);
+        let spare = direction.unwrap_or_else(SVector::zeros);
+        let at = |time: f64| self.state(&trajectory.sample(time).position, &spare);
+        let passes: Vec<f64> = known
+            .certificate
+            .poses
+            .iter()
+            .map(|pass| pass.time_s)
+            .collect();
+        let arm = ArmMotion {
+            duration: trajectory.duration(),
+            at: &at,
+            passes: &passes,
+            bounds: &self.joint_bounds(),
+            has_spare: direction.is_some(),
+        };
+        let mut poses: Vec<Isometry3<f64>> = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
+        options.gap = GAP;
+        let found = smooth::plan_for_arm(&poses, &options, &arm).ok()??;
+        let course = found.spare.zip(direction).map(|(course, direction)| {
+            NullMotion::given(direction, Arc::new(move |time| course.at(time)))
+        });
+        let path = SmoothPath::new(found.plan, motion.tolerance, &poses);
+        let followed = self.joints_on(path, start, course.as_ref()).ok()?;
+        let along = self.on(&followed, motion, (start, trajectory.duration()));
+        along.ok().map(|along| along.planned)
+    }
+
+    /// The arm at joint positions, with the linear function `spare` of its joints as the spare coordinate.
+    fn state(&self, q: &SVector<f64, N>, spare: &SVector<f64, N>) -> Option<ArmState> {
+        let pose = self.chain().forward(q);
+        let changes = follow::joint_changes(self.chain(), q, spare)?;
+        let joints = (0..N).map(|j| {
+            let [along, about] =
+                [0, 3].map(|first| Vector3::from_fn(|d, _| changes[(j, first + d)]));
+            let about = pose.rotation.inverse() * about;
+            let with_spare = changes[(j, 6)];
+            JointState {
+                position: q[j],
+                changes: [
+                    along.x, along.y, along.z, about.x, about.y, about.z, with_spare,
+                ],
+            }
+        });
+        Some(ArmState {
+            pose,
+            joints: joints.collect(),
+            spare: spare.dot(q),
+        })
+    }
+
+    /// What the joints may do.
+    fn joint_bounds(&self) -> Vec<JointBounds> {
+        let (limits, chain) = (&self.limits, self.chain());
+        let joint = |j: usize| JointBounds {
+            position: [chain.lower()[j], chain.upper()[j]],
+            rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
+        };
+        (0..N).map(joint).collect()
+    }
+}

@@ -1,0 +1,185 @@
+//! First iterate from the motion of an arm, and how its joints move with the control points.
+//!
+//! Its places at even times are control points, as those of any motion that is known. Orientations are rolled out, so that a
+//! difference of them is a turn of the tool; where the poses are is told by the passes.
+
+use nalgebra::Vector3;
+
+use super::build::Task;
+use super::joints::Joint;
+use super::problem::{Point, Problem, ways};
+use crate::line::body_turn;
+use crate::smooth::arm::{ArmMotion, ArmState};
+
+/// Spans for each leg and the least number of them, the same where the tool turns, for which each costs several times as
+/// much, and the most of both.
+const SPANS: [usize; 2] = [30, 100];
+const TURNING: [usize; 2] = [8, 40];
+const MOST: usize = 400;
+
+/// Knots that pass before the motion begins and after it has ended.
+const REST: usize = 3;
+/// Control points at either end that do not move.
+const FIXED: usize = 4;
+/// A joint that is beyond its range, or nearer to its end than this (rad, m), may stay there.
+const AT_END: f64 = 1e-2;
+
+/// What the arm has at the control points.
+struct Sampled {
+    states: Vec<ArmState>,
+    /// The orientations, rolled out from the first.
+    turns: Vec<Vector3<f64>>,
+    /// Knot spacing, s.
+    spacing: f64,
+}
+
+impl Sampled {
+    fn new(arm: &ArmMotion<'_>, (legs, turns): (usize, bool)) -> Option<Self> {
+        let [each, fewest] = if turns { TURNING } else { SPANS };
+        let spans = (each * legs).clamp(fewest, MOST);
+        let spacing = arm.duration / spans as f64;
+        let time = |k: usize| (k as f64 - REST as f64) * spacing;
+        let states = (0..=spans + 2 * REST).map(|k| (arm.at)(time(k).clamp(0.0, arm.duration)));
+        let states: Vec<ArmState> = states.collect::<Option<_>>()?;
+        let mut turns = vec![Vector3::zeros()];
+        for pair in states.windows(2) {
+            let turn = body_turn(&pair[0].pose.rotation, &pair[1].pose.rotation);
+            turns.push(turns[turns.len() - 1] + turn);
+        }
+        Some(Self {
+            states,
+            turns,
+            spacing,
+        })
+    }
+
+    /// The rolled-out orientation at a time, s.
+    fn turn(&self, time: f64) -> Vector3<f64> {
+        let at = time / self.spacing + REST as f64;
+        let k = (at.max(0.0) as usize).min(self.turns.len() - 2);
+        let share = (at - k as f64).clamp(0.0, 1.0);
+        self.turns[k] * (1.0 - share) + self.turns[k + 1] * share
+    }
+}
+
+impl Task<'_> {
+    /// The first iterate along the motion of an arm, whose joints the problem gets; its vertices are where that motion sees
+    /// the poses.
+    pub(super) fn of_arm<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        arm: &ArmMotion<'_>,
+        used: [bool; 2],
+    ) -> Option<Point<D>> {
+        let sampled = Sampled::new(arm, (self.poses.len() - 1, Problem::<D>::TURNS))?;
+        let states = &sampled.states;
+        problem.scale = sampled.spacing;
+        let spare = Problem::<D>::SPARE;
+        let mut control: Vec<[f64; D]> = Vec::with_capacity(states.len());
+        for (state, turn) in states.iter().zip(&sampled.turns) {
+            let mut c = self.pack(used, &state.pose.translation.vector, turn);
+            if let Some(spare) = spare {
+                c[spare] = state.spare;
+            }
+            control.push(c);
+        }
+        self.see_poses(problem, (arm, &sampled), used)?;
+        let (first, last) = (control[0], control[control.len() - 1]);
+        if let Some(spare) = spare {
+            problem.start[0][spare] = first[spare];
+            let goal = problem.vertices.len() - 1;
+            problem.vertices[goal][spare] = last[spare];
+        }
+        for d in 0..D {
+            sharpen(&mut control, |c| &mut c[d]);
+        }
+        let knots = (control.len() - FIXED) as f64;
+        let pass = |time: &f64| (time / sampled.spacing + 1.5).min(knots);
+        let mut point = Point {
+            control,
+            z: 1.0,
+            crossings: arm.passes.iter().map(pass).collect(),
+        };
+        let goal = problem.vertices[problem.vertices.len() - 1];
+        for c in point.control.iter_mut().rev().take(FIXED) {
+            *c = goal;
+        }
+        problem.pin(&mut point);
+        problem.joints = (0..arm.bounds.len())
+            .map(|j| self.joint(&point, (arm, states), (j, used)))
+            .collect();
+        Some(point)
+    }
+
+    /// Moves the vertices of orientations to where the motion of an arm sees the poses.
+    fn see_poses<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        (arm, sampled): (&ArmMotion<'_>, &Sampled),
+        used: [bool; 2],
+    ) -> Option<()> {
+        if !used[1] {
+            return Some(());
+        }
+        let times = arm.passes.iter().chain([&arm.duration]);
+        for (i, time) in times.enumerate() {
+            let pose = (arm.at)(*time)?.pose;
+            let off = body_turn(&pose.rotation, &self.poses[i + 1].rotation);
+            let seen = sampled.turn(*time) + off;
+            problem.vertices[i + 1][Problem::<D>::LAST..][..3].copy_from_slice(seen.as_slice());
+        }
+        problem.ways = ways(&problem.vertices);
+        Some(())
+    }
+
+    /// How joint `j` moves with the control points of the first iterate.
+    fn joint<const D: usize>(
+        &self,
+        point: &Point<D>,
+        (arm, states): (&ArmMotion<'_>, &[ArmState]),
+        (j, used): (usize, [bool; 2]),
+    ) -> Joint<D> {
+        let mut positions: Vec<f64> = states
+            .iter()
+            .map(|state| state.joints[j].position)
+            .collect();
+        sharpen(&mut positions, |q| q);
+        let changes: Vec<[f64; D]> = states
+            .iter()
+            .map(|state| {
+                let [x, y, z, a, b, c, with_spare] = state.joints[j].changes;
+                let (along, about) = (Vector3::new(x, y, z), Vector3::new(a, b, c));
+                let mut change = self.pack(used, &along, &about);
+                if let Some(spare) = Problem::<D>::SPARE {
+                    change[spare] = with_spare;
+                }
+                change
+            })
+            .collect();
+        let all = positions.iter().zip(&changes).zip(&point.control);
+        let base = all.map(|((q, change), c)| {
+            let moved: f64 = change.iter().zip(c).map(|(a, b)| a * b).sum();
+            q - moved
+        });
+        let bounds = &arm.bounds[j];
+        let [low, high] = bounds.position;
+        let least = positions.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = (low.min(least - AT_END), high.max(most + AT_END));
+        Joint {
+            caps: bounds.rates,
+            range: [0.5 * (low + high), 0.5 * (high - low)],
+            base: base.collect(),
+            changes,
+        }
+    }
+}
+
+/// Moves each number but those at the ends to that of the control point which reproduces cubics.
+fn sharpen<T: Copy>(all: &mut [T], number: impl Fn(&mut T) -> &mut f64) {
+    let before: Vec<f64> = all.iter_mut().map(|x| *number(x)).collect();
+    for k in FIXED..before.len() - FIXED {
+        let bend = before[k - 1] - 2.0 * before[k] + before[k + 1];
+        *number(&mut all[k]) -= 5.0 / 24.0 * bend;
+    }
+}

@@ -1,0 +1,194 @@
+//! The joints of an arm that follow a spline.
+//!
+//! Near a motion that is known, the position of a joint is to first order an affine function of where the tool is. So the
+//! joints at the control points are control points of a spline, too, and the hulls of their differences bound speed,
+//! acceleration and jerk of each joint for all times.
+
+use simd::{F4, Four, LANES};
+
+use super::basis::{FIRST, SECOND, THIRD};
+use super::iterate::Iterate;
+use super::newton::System;
+use super::problem::{Point, Problem};
+
+/// How often the last position stands there once more, so that groups of four may begin at each.
+const MORE: usize = 8;
+
+/// Control points of the longest difference.
+const WIDE: usize = 4;
+
+/// Differences of order 1 to 3, as weights of consecutive control points.
+const DIFFERENCES: [&[f64]; 3] = [&FIRST, &SECOND, &THIRD];
+
+/// Bounds of a joint at each control point: of its position, speed, acceleration and jerk.
+const BOUNDS: usize = 4;
+
+/// A joint whose position at each control point is an affine function of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Joint<const D: usize> {
+    /// Greatest speed, acceleration and jerk.
+    pub(super) caps: [f64; 3],
+    /// Middle of its positions, and how far it may be from there.
+    pub(super) range: [f64; 2],
+    /// Its position where the coordinates of a control point are 0, and how it changes with each, by control point.
+    pub(super) base: Vec<f64>,
+    pub(super) changes: Vec<[f64; D]>,
+}
+
+/// Gradient, border and curvature of the terms of one joint, by control point.
+struct Terms {
+    slopes: Vec<f64>,
+    borders: Vec<f64>,
+    /// With the control point itself and those before it.
+    curves: Vec<[f64; WIDE]>,
+    /// What the terms add to the slope along `z` and to its curvature.
+    along_z: [f64; 2],
+}
+
+impl<const D: usize> Joint<D> {
+    /// Its positions at control points, the last of which stands there a few times more.
+    fn positions(&self, control: &[[f64; D]]) -> Vec<f64> {
+        let mut positions = Vec::with_capacity(control.len() + MORE);
+        let all = self.base.iter().zip(&self.changes).zip(control);
+        positions.extend(all.map(|((base, change), c)| {
+            let moved: f64 = change.iter().zip(c).map(|(a, b)| a * b).sum();
+            base + moved
+        }));
+        let last = positions.last().copied().unwrap_or_default();
+        positions.resize(control.len() + MORE, last);
+        positions
+    }
+
+    /// Greatest ratio of speed, acceleration and jerk to their bounds.
+    pub(super) fn ratios(&self, point: &Point<D>, h: f64) -> [f64; 3] {
+        let positions = self.positions(&point.control);
+        let worst = |order: usize| {
+            let all = positions.windows(order + 2);
+            let all = all.map(|q| dot(DIFFERENCES[order], q).abs());
+            all.fold(0.0, f64::max) / (self.caps[order] * h.powi(order as i32 + 1))
+        };
+        [worst(0), worst(1), worst(2)]
+    }
+
+    /// Passes the squares of four neighbours at a time to `take`, with the square of their bound, until it says false: then
+    /// `None`, else the sum of the logarithms of the bounds that depend on `z`.
+    #[inline(always)]
+    pub(super) fn look<S: Four>(
+        &self,
+        simd: S,
+        (point, h): (&Point<D>, f64),
+        mut take: impl FnMut(F4<S>, F4<S>) -> bool,
+    ) -> Option<f64> {
+        let positions = self.positions(&point.control);
+        let count = point.control.len();
+        let [middle, half] = self.range;
+        let bounds = [1, 2, 3].map(|k| (self.caps[k - 1] * h.powi(k as i32)).powi(2));
+        let squares = [half * half, bounds[0], bounds[1], bounds[2]].map(|b| F4::splat(simd, b));
+        for k in (0..count).step_by(LANES) {
+            let near = &positions[k..];
+            let (q0, q1) = (F4::load(simd, near), F4::load(simd, &near[1..]));
+            let (q2, q3) = (F4::load(simd, &near[2..]), F4::load(simd, &near[3..]));
+            let (first, second, third) = (q1 - q0, q2 - q1, q3 - q2);
+            let (bend, next) = (second - first, third - second);
+            let away = q0 - F4::splat(simd, middle);
+            for (value, bound) in [away, first, bend, next - bend].into_iter().zip(squares) {
+                if !take(value * value, bound) {
+                    return None;
+                }
+            }
+        }
+        let logarithm = |k: usize| (count - 1 - k) as f64 * bounds[k].ln();
+        Some(logarithm(0) + logarithm(1) + logarithm(2))
+    }
+
+    /// The terms of an iterate.
+    fn terms(&self, problem: &Problem<D>, point: &Point<D>) -> Terms {
+        let (positions, count) = (self.positions(&point.control), point.control.len());
+        let mut terms = Terms {
+            slopes: vec![0.0; count],
+            borders: vec![0.0; count],
+            curves: vec![[0.0; WIDE]; count],
+            along_z: [0.0; 2],
+        };
+        let [middle, half] = self.range;
+        for (k, q) in positions[..count].iter().enumerate() {
+            let slope = 2.0 * (q - middle) / (half * half - (q - middle).powi(2));
+            terms.slopes[k] = slope;
+            terms.curves[k][0] = slope * slope + 2.0 / (half * half - (q - middle).powi(2));
+        }
+        let h = problem.spacing(point.z);
+        for (order, w) in DIFFERENCES.into_iter().enumerate() {
+            let power = (order + 1) as f64 / 3.0;
+            let bound = self.caps[order] * h.powi(order as i32 + 1);
+            let rise = bound * power / point.z;
+            let bent = rise * rise + bound * rise * (power - 1.0) / point.z;
+            for (k, q) in positions[..count].windows(w.len()).enumerate() {
+                let y = dot(w, q);
+                let inverse = 1.0 / (bound * bound - y * y);
+                let slope = 2.0 * y * inverse;
+                let fall = -2.0 * bound * rise * inverse;
+                let curve = 2.0 * inverse + slope * slope;
+                terms.along_z[0] += fall;
+                terms.along_z[1] += fall * fall - 2.0 * bent * inverse;
+                for (i, wi) in w.iter().enumerate() {
+                    terms.slopes[k + i] += wi * slope;
+                    terms.borders[k + i] += wi * slope * fall;
+                    for (j, wj) in w[..=i].iter().enumerate() {
+                        terms.curves[k + i][i - j] += wi * wj * curve;
+                    }
+                }
+            }
+        }
+        terms
+    }
+}
+
+impl<const D: usize> Problem<D> {
+    /// Number of bounds of joints.
+    pub(super) fn joint_bounds(&self, knots: f64) -> f64 {
+        BOUNDS as f64 * knots * self.joints.len() as f64
+    }
+}
+
+impl<const D: usize, const B: usize> System<D, B> {
+    /// Adds the bounds of all joints.
+    pub(super) fn joints(&mut self, at: &Iterate<'_, D>) {
+        let steep = if at.shifts.is_none() { 1.0 } else { 0.0 };
+        for joint in &at.problem.joints {
+            let terms = joint.terms(at.problem, at.point);
+            self.gradient_z += steep * terms.along_z[0];
+            self.hessian_z += terms.along_z[1];
+            for (k, side) in self.sides.chunks_exact_mut(D).enumerate() {
+                let (slope, border) = (steep * terms.slopes[k + 4], terms.borders[k + 4]);
+                for (side, change) in side.iter_mut().zip(&joint.changes[k + 4]) {
+                    side[0] += slope * change;
+                    side[1] += border * change;
+                }
+            }
+            self.joint(joint, &terms.curves);
+        }
+    }
+
+    /// Adds the curvature of the bounds of a joint.
+    fn joint(&mut self, joint: &Joint<D>, curves: &[[f64; WIDE]]) {
+        let free = self.sides.len() / D;
+        for (k, columns) in self.band.columns.chunks_exact_mut(D).enumerate() {
+            let own = &joint.changes[k + 4];
+            for back in 0..WIDE.min(free - k) {
+                let curve = curves[k + back + 4][back];
+                let other = joint.changes[k + back + 4].map(|change| curve * change);
+                for (b, column) in columns.iter_mut().enumerate() {
+                    let from = if back == 0 { b } else { 0 };
+                    for a in from..D {
+                        column[back * D + a - b] += other[a] * own[b];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The sum of products.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
