@@ -64,15 +64,23 @@ impl<const N: usize> Planner<N> {
             gap: Some(FIRST_GAP),
             most: f64::INFINITY,
         };
-        let curve = self.curve(start, (motion, search), true).ok()?;
+        let mut curve = self.curve(start, (motion, search), true).ok()?;
+        // A search with the joints finds the null-space motion, too.
+        curve.may_be_helped = false;
         let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
         if !is_ruled(&first) {
             return None;
         }
-        let found = self.with_joints(motion, start, &first.planned);
-        let planned = match found {
+        let planned = match self.with_joints(motion, start, &first.planned) {
             Some(found) => found,
-            None => self.for_the_joints(motion, start, (first, &curve)),
+            None => {
+                curve.may_be_helped = N > 6;
+                let first = match N > 6 {
+                    true => self.on(&curve, motion, (start, f64::INFINITY)).ok()?,
+                    false => first,
+                };
+                self.for_the_joints(motion, start, (first, &curve))
+            }
         };
         let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
         (!rests).then_some(planned)

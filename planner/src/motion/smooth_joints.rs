@@ -46,7 +46,7 @@ impl<const N: usize> Planner<N> {
         Ok(Followed {
             path,
             points,
-            chosen: spare.is_some(),
+            may_be_helped: N > 6 && spare.is_none(),
         })
     }
 
@@ -67,12 +67,12 @@ impl<const N: usize> Planner<N> {
         }
         let first = match self.fastest_along(plan, (points, most), (&crossings, motion)) {
             // The spare joint may help.
-            Err(MotionError::NoWay) if N > 6 && !followed.chosen => None,
+            Err(MotionError::NoWay) if followed.may_be_helped => None,
             first => Some(first?),
         };
         let time = |draft: &Draft<N>| draft.trajectory.duration();
         let most = first.as_ref().map_or(most, time);
-        if followed.chosen || most <= plan.duration() * HELPED {
+        if !followed.may_be_helped || most <= plan.duration() * HELPED {
             return Ok(first.into_iter().collect());
         }
         let towards = |u: f64| path.towards(u);
@@ -167,9 +167,6 @@ impl<const N: usize> Planner<N> {
         points: &[FollowPoint<N>],
         start: &SVector<f64, N>,
     ) -> Option<NullMotion<N>> {
-        if N <= 6 {
-            return None;
-        }
         let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
         let cost = |points: &[FollowPoint<N>]| self.about_time(points);
         let (tool, options) = (way.tool(), way.options());
@@ -229,8 +226,8 @@ impl<const N: usize> Planner<N> {
 pub(super) struct Followed<const N: usize> {
     pub(super) path: SmoothPath,
     points: Vec<FollowPoint<N>>,
-    /// Whether the null-space motion was found with the path.
-    chosen: bool,
+    /// Whether another null-space motion may be searched that helps the joints.
+    pub(super) may_be_helped: bool,
 }
 
 /// The smooth motion of the tool that the joints are to follow.

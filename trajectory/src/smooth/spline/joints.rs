@@ -117,29 +117,41 @@ impl<const D: usize> Joint<D> {
             terms.curves[k][0] = slope * slope + 2.0 / (half * half - (q - middle).powi(2));
         }
         let h = problem.spacing(point.z);
-        for (order, w) in DIFFERENCES.into_iter().enumerate() {
-            let power = (order + 1) as f64 / 3.0;
-            let bound = self.caps[order] * h.powi(order as i32 + 1);
-            let rise = bound * power / point.z;
-            let bent = rise * rise + bound * rise * (power - 1.0) / point.z;
-            for (k, q) in positions[..count].windows(w.len()).enumerate() {
-                let y = dot(w, q);
-                let inverse = 1.0 / (bound * bound - y * y);
-                let slope = 2.0 * y * inverse;
-                let fall = -2.0 * bound * rise * inverse;
-                let curve = 2.0 * inverse + slope * slope;
-                terms.along_z[0] += fall;
-                terms.along_z[1] += fall * fall - 2.0 * bent * inverse;
-                for (i, wi) in w.iter().enumerate() {
-                    terms.slopes[k + i] += wi * slope;
-                    terms.borders[k + i] += wi * slope * fall;
-                    for (j, wj) in w[..=i].iter().enumerate() {
-                        terms.curves[k + i][i - j] += wi * wj * curve;
-                    }
+        let bound = |k: usize| (self.caps[k - 1] * h.powi(k as i32), k as f64 / 3.0);
+        terms.add(&FIRST, &positions[..count], (bound(1), point.z));
+        terms.add(&SECOND, &positions[..count], (bound(2), point.z));
+        terms.add(&THIRD, &positions[..count], (bound(3), point.z));
+        terms
+    }
+}
+
+impl Terms {
+    /// Adds the terms of differences, whose bound is proportional to a power of `z`.
+    #[inline(always)]
+    fn add<const M: usize>(
+        &mut self,
+        w: &[f64; M],
+        positions: &[f64],
+        ((bound, power), z): ((f64, f64), f64),
+    ) {
+        let rise = bound * power / z;
+        let bent = rise * rise + bound * rise * (power - 1.0) / z;
+        for (k, q) in positions.windows(M).enumerate() {
+            let y = dot(w, q);
+            let inverse = 1.0 / (bound * bound - y * y);
+            let slope = 2.0 * y * inverse;
+            let fall = -2.0 * bound * rise * inverse;
+            let curve = 2.0 * inverse + slope * slope;
+            self.along_z[0] += fall;
+            self.along_z[1] += fall * fall - 2.0 * bent * inverse;
+            for i in 0..M {
+                self.slopes[k + i] += w[i] * slope;
+                self.borders[k + i] += w[i] * slope * fall;
+                for j in 0..=i {
+                    self.curves[k + i][i - j] += w[i] * w[j] * curve;
                 }
             }
         }
-        terms
     }
 }
 
@@ -154,8 +166,10 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// Adds the bounds of all joints.
     pub(super) fn joints(&mut self, at: &Iterate<'_, D>) {
         let steep = if at.shifts.is_none() { 1.0 } else { 0.0 };
-        for joint in &at.problem.joints {
-            let terms = joint.terms(at.problem, at.point);
+        let joints = &at.problem.joints;
+        let all = joints.iter().map(|joint| joint.terms(at.problem, at.point));
+        let all: Vec<Terms> = all.collect();
+        for (joint, terms) in joints.iter().zip(&all) {
             self.gradient_z += steep * terms.along_z[0];
             self.hessian_z += terms.along_z[1];
             for (k, side) in self.sides.chunks_exact_mut(D).enumerate() {
@@ -165,22 +179,30 @@ impl<const D: usize, const B: usize> System<D, B> {
                     side[1] += border * change;
                 }
             }
-            self.joint(joint, &terms.curves);
+        }
+        if !joints.is_empty() {
+            self.curves(joints, &all);
         }
     }
 
-    /// Adds the curvature of the bounds of a joint.
-    fn joint(&mut self, joint: &Joint<D>, curves: &[[f64; WIDE]]) {
+    /// Adds the curvature of the bounds of all joints.
+    fn curves(&mut self, joints: &[Joint<D>], all: &[Terms]) {
         let free = self.sides.len() / D;
         for (k, columns) in self.band.columns.chunks_exact_mut(D).enumerate() {
-            let own = &joint.changes[k + 4];
             for back in 0..WIDE.min(free - k) {
-                let curve = curves[k + back + 4][back];
-                let other = joint.changes[k + back + 4].map(|change| curve * change);
                 for (b, column) in columns.iter_mut().enumerate() {
+                    let mut sums = [0.0; D];
+                    for (joint, terms) in joints.iter().zip(all) {
+                        let curve = terms.curves[k + back + 4][back];
+                        let own = curve * joint.changes[k + 4][b];
+                        for (sum, other) in sums.iter_mut().zip(&joint.changes[k + back + 4]) {
+                            *sum += own * other;
+                        }
+                    }
                     let from = if back == 0 { b } else { 0 };
-                    for a in from..D {
-                        column[back * D + a - b] += other[a] * own[b];
+                    let entries = &mut column[back * D + from - b..][..D - from];
+                    for (entry, sum) in entries.iter_mut().zip(&sums[from..]) {
+                        *entry += sum;
                     }
                 }
             }
