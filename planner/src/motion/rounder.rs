@@ -13,6 +13,8 @@ use crate::task::Move;
 const RULED: f64 = 1.3;
 /// Gap to the optimum at which the search of the curve that is tried first ends.
 const FIRST_GAP: f64 = 0.05;
+/// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
+const ENOUGH: f64 = 0.95;
 /// Other curves tried then, each planned under a share of the linear and one of the angular limits; if the first of a pair
 /// is better than the other first one, the second is tried, too.
 const OTHERS: [[[f64; 2]; 2]; 2] = [[[1.0, 0.6], [1.0, 0.4]], [[0.7, 1.0], [0.6, 0.6]]];
@@ -71,19 +73,37 @@ impl<const N: usize> Planner<N> {
         if !is_ruled(&first) {
             return None;
         }
-        let planned = match self.with_joints(motion, start, &first.planned) {
-            Some(found) => found,
-            None => {
+        let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
+        let enough = ENOUGH * time(&first.planned);
+        let found = self.with_joints(motion, start, &first.planned);
+        let planned = match found {
+            Some(found) if time(&found) <= enough => found,
+            found => {
                 curve.may_be_helped = N > 6;
-                let first = match N > 6 {
-                    true => self.on(&curve, motion, (start, f64::INFINITY)).ok()?,
-                    false => first,
-                };
-                self.for_the_joints(motion, start, (first, &curve))
+                let other = self.on_others(motion, start, (first, &curve));
+                let all = found.into_iter().chain([other]);
+                all.min_by(|a, b| time(a).total_cmp(&time(b)))?
             }
         };
         let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
         (!rests).then_some(planned)
+    }
+
+    /// The fastest motion of searches with the joints that begin at the fastest one along other curves.
+    fn on_others(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (first, curve): (Along<N>, &Followed<N>),
+    ) -> PlannedMove<N> {
+        let first = if curve.may_be_helped {
+            let helped = self.on(curve, motion, (start, f64::INFINITY));
+            helped.unwrap_or(first)
+        } else {
+            first
+        };
+        let planned = self.for_the_joints(motion, start, (first, curve));
+        self.with_joints(motion, start, &planned).unwrap_or(planned)
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.

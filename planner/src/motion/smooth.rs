@@ -8,7 +8,7 @@ use trajectory::{Line, Trajectory};
 
 use super::cartesian::{Way, is_still};
 use super::draft::{Crossing, Draft};
-use super::smooth_joints::Followed;
+use super::smooth_joints::{Followed, HELPED};
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
 use crate::task::{Move, Shape};
 
@@ -63,7 +63,7 @@ pub(super) struct Along<const N: usize> {
 impl<const N: usize> Planner<N> {
     /// The smooth motion within the tolerance asked for. If its certificate with the joints fails, or
     /// if they cannot follow its curve, other curves are tried; then, if they could follow the straight legs, a quarter of the
-    /// tolerance, then a stop at each pose. Never slower than straight moves to each pose in turn: these are
+    /// tolerance, then a stop at each pose. Where the joints make it slower than the tool needs, a faster one is searched with them. Never slower than straight moves to each pose in turn: these are
     /// tried wherever they may be faster.
     pub(super) fn smooth_move(
         &self,
@@ -76,10 +76,12 @@ impl<const N: usize> Planner<N> {
         if let Some(rounder) = self.rounder(motion, start) {
             return self.or_straight(motion, start, rounder);
         }
+        // The least time, if the tool alone needs it.
+        let mut least = 0.0;
         let planned = match self.blended(motion, start, motion) {
             Ok((first, curve)) => {
-                let planned = self.for_the_joints(motion, start, (first, &curve));
-                self.with_joints(motion, start, &planned).unwrap_or(planned)
+                least = first.tool;
+                self.for_the_joints(motion, start, (first, &curve))
             }
             Err(Failure { error, spans }) => {
                 let error = self.blamed(error, motion, start);
@@ -92,6 +94,9 @@ impl<const N: usize> Planner<N> {
                 }
             }
         };
+        let slower = planned.trajectory.duration() > HELPED * least;
+        let found = slower.then(|| self.with_joints(motion, start, &planned));
+        let planned = found.flatten().unwrap_or(planned);
         self.or_straight(motion, start, planned)
     }
 

@@ -14,8 +14,8 @@ use crate::task::Move;
 /// Fraction of the time by which a motion may be slowed down uniformly before another time law is
 /// computed.
 const ENOUGH: f64 = 1e-3;
-/// Time of the joints over that of the tool from which on the spare joint of an arm is asked to help.
-const HELPED: f64 = 1.01;
+/// Time of the joints over that of the tool from which on another way of the joints, or another curve, is worth a search.
+pub(super) const HELPED: f64 = 1.01;
 /// A time law along a motion of the tool, whose ends rest; it is never faster.
 const ALONG: TimingOptions = TimingOptions {
     start: Boundary::Free,

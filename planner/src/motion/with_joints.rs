@@ -1,6 +1,7 @@
 //! MoveSmoothlyTo where the joints rule: the curve of the tool and the spare joint are searched under the limits of the
 //! joints, near a motion that is known.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use kinematics::follow::{self, NullMotion};
@@ -15,17 +16,25 @@ use crate::task::Move;
 const ROUNDS: usize = 3;
 const GAIN: f64 = 0.01;
 
+/// Poses of a list for which it is not too dear; one pose is reached straight.
+const POSES: RangeInclusive<usize> = 2..=60;
+
 /// Gap to its optimum at which a search ends: the joints are timed once more after it.
 const GAP: f64 = 0.1;
 
 impl<const N: usize> Planner<N> {
-    /// The fastest motion of searches with the joints that begin at a known one; `None` if none is faster. Only for arms with six or seven joints.
+    /// The fastest motion of searches with the joints that begin at a known one; `None` if none is faster, and for arms of
+    /// other than six or seven joints.
     pub(super) fn with_joints(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
         known: &PlannedMove<N>,
     ) -> Option<PlannedMove<N>> {
+        let has_inverse = N == 6 || N == 7;
+        if !has_inverse || !POSES.contains(&motion.poses.len()) {
+            return None;
+        }
         let mut best: Option<PlannedMove<N>> = None;
         for _ in 0..ROUNDS {
             let from = best.as_ref().unwrap_or(known);
