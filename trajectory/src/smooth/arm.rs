@@ -43,8 +43,9 @@ pub struct ArmMotion<'a> {
     pub passes: &'a [f64],
     /// What the joints may do.
     pub bounds: &'a [JointBounds],
-    /// Whether the arm has a joint more than the tool needs.
-    pub has_spare: bool,
+    /// For an arm with a joint more than the tool needs, by how much the spare coordinate may differ from that of this motion:
+    /// farther away the joints are others than to first order.
+    pub spare: Option<f64>,
 }
 
 impl std::fmt::Debug for ArmMotion<'_> {
@@ -53,7 +54,7 @@ impl std::fmt::Debug for ArmMotion<'_> {
             .field("duration", &self.duration)
             .field("passes", &self.passes)
             .field("bounds", &self.bounds)
-            .field("has_spare", &self.has_spare)
+            .field("spare", &self.spare)
             .finish_non_exhaustive()
     }
 }

@@ -86,7 +86,7 @@ pub struct ArmPlan {
 ///     at: &at,
 ///     passes: &[2.0 * tool.crossings()[0].time],
 ///     bounds: &[bounds; 3],
-///     has_spare: false,
+///     spare: None,
 /// };
 /// let found = smooth::plan_for_arm(&poses, &options, &arm)?.unwrap();
 /// assert!(found.plan.certificate().holds());
@@ -144,7 +144,7 @@ fn searched(
             narrow(&mut inner, &whole.0, &whole.1, request.moves()[1]);
             continue;
         }
-        let spare = arm.has_spare.then(|| SpareSpline {
+        let spare = arm.spare.map(|_| SpareSpline {
             spacing: spans.last().map_or(0.0, |span| span.end()) / spans.len() as f64,
             control,
         });

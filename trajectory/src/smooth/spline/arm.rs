@@ -17,6 +17,9 @@ const SPANS: [usize; 2] = [30, 100];
 const TURNING: [usize; 2] = [8, 40];
 const MOST: usize = 400;
 
+/// A bound that holds nothing.
+const UNLIMITED: f64 = 1e6;
+
 /// Knots that pass before the motion begins and after it has ended.
 const REST: usize = 3;
 /// Control points at either end that do not move.
@@ -84,12 +87,10 @@ impl Task<'_> {
             control.push(c);
         }
         self.see_poses(problem, (arm, &sampled), used)?;
-        let (first, last) = (control[0], control[control.len() - 1]);
         if let Some(spare) = spare {
-            problem.start[0][spare] = first[spare];
-            let goal = problem.vertices.len() - 1;
-            problem.vertices[goal][spare] = last[spare];
+            problem.start[0][spare] = control[0][spare];
         }
+        let end = control[control.len() - 1];
         for d in 0..D {
             sharpen(&mut control, |c| &mut c[d]);
         }
@@ -105,9 +106,17 @@ impl Task<'_> {
             *c = goal;
         }
         problem.pin(&mut point);
+        if let Some(spare) = spare {
+            let before = point.control.len() - FIXED - 1;
+            point.control[before][spare] = end[spare];
+        }
+        point.end_spare();
         problem.joints = (0..arm.bounds.len())
             .map(|j| self.joint(&point, (arm, states), (j, used)))
             .collect();
+        problem
+            .joints
+            .extend(spare.zip(arm.spare).map(|spare| near(&point, spare)));
         Some(point)
     }
 
@@ -172,6 +181,18 @@ impl Task<'_> {
             base: base.collect(),
             changes,
         }
+    }
+}
+
+/// The spare coordinate as one more joint, whose positions are by how much it is off the first iterate.
+fn near<const D: usize>(point: &Point<D>, (spare, most): (usize, f64)) -> Joint<D> {
+    let mut change = [0.0; D];
+    change[spare] = 1.0;
+    Joint {
+        caps: [UNLIMITED; 3],
+        range: [0.0, most],
+        base: point.control.iter().map(|c| -c[spare]).collect(),
+        changes: vec![change; point.control.len()],
     }
 }
 

@@ -152,7 +152,7 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
 /// The same for an arm, between rests, and the control points of its spare coordinate; empty if it has none.
 pub(crate) fn plan_for_arm(request: &Request<'_>) -> Option<Found> {
     let task = Task::new(request);
-    match (request.moves(), request.arm?.has_spare) {
+    match (request.moves(), request.arm?.spare.is_some()) {
         ([true, false], false) => task.run::<3, 20>([true, false]),
         ([true, false], true) => task.run::<4, 24>([true, false]),
         ([false, true], false) => task.run::<3, 20>([false, true]),

@@ -183,6 +183,38 @@ impl<const D: usize, const B: usize> System<D, B> {
         if !joints.is_empty() {
             self.curves(joints, &all);
         }
+        if let Some(spare) = Problem::<D>::SPARE {
+            for (joint, terms) in joints.iter().zip(&all) {
+                self.end(joint, (terms, steep), spare);
+            }
+        }
+    }
+
+    /// Adds what the last control points have in a joint through the spare coordinate, which they share with the one before
+    /// them.
+    fn end(&mut self, joint: &Joint<D>, (terms, steep): (&Terms, f64), spare: usize) {
+        let free = self.sides.len() / D;
+        // The first of them, and the row of their coordinate.
+        let (first, row) = (free + 4, (free - 1) * D + spare);
+        for k in first..first + 4 {
+            let own = joint.changes[k][spare];
+            self.sides[row][0] += steep * terms.slopes[k] * own;
+            self.sides[row][1] += terms.borders[k] * own;
+            for (back, curve) in terms.curves[k].iter().enumerate() {
+                let other = k - back;
+                let twice = if back == 0 { 1.0 } else { 2.0 };
+                if other >= first {
+                    let both = own * joint.changes[other][spare];
+                    self.band.columns[row][0] += twice * curve * both;
+                    continue;
+                }
+                for (d, change) in joint.changes[other].iter().enumerate() {
+                    let column = (other - 4) * D + d;
+                    let twice = if column == row { 2.0 } else { 1.0 };
+                    self.band.columns[column][row - column] += twice * curve * own * change;
+                }
+            }
+        }
     }
 
     /// Adds the curvature of the bounds of all joints.

@@ -260,6 +260,17 @@ impl<const D: usize> Point<D> {
         self.control.len().saturating_sub(4)
     }
 
+    /// Gives the last four control points the spare coordinate of the one before them: where a spare joint ends is free.
+    pub(crate) fn end_spare(&mut self) {
+        let last = self.control.len().saturating_sub(4);
+        if let Some((spare, before)) = Problem::<D>::SPARE.zip(last.checked_sub(1)) {
+            let end = self.control[before][spare];
+            for control in &mut self.control[last..] {
+                control[spare] = end;
+            }
+        }
+    }
+
     /// The span of a time in knots, and the local parameter within it.
     pub(crate) fn locate(&self, time: f64) -> (usize, f64) {
         let last = self.spans().saturating_sub(1);

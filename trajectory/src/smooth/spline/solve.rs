@@ -604,6 +604,7 @@ fn go<const D: usize>(
     }
     follow(problem, trial, point.z);
     problem.pin(trial);
+    trial.end_spare();
     trial.crossings.copy_from_slice(&point.crossings);
     let times = trial.crossings.iter_mut().zip(&step.times);
     for (time, change) in times.filter(|_| Problem::<D>::TURNS) {
