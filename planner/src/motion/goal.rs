@@ -132,12 +132,17 @@ impl<const N: usize> Planner<N> {
     /// How well a seven-joint arm can move on from a configuration: 1 is well, near 0 at a limit or
     /// a singular pose.
     fn ease(&self, q: &SVector<f64, N>) -> f64 {
+        self.ease_within(q, [ROOM, NIMBLE]).max(1e-3)
+    }
+
+    /// The same where 1 is a distance from each limit (rad, m) and a smallest singular value, and less than 0 beyond a limit.
+    pub(super) fn ease_within(&self, q: &SVector<f64, N>, [well, nimble]: [f64; 2]) -> f64 {
         let chain = self.chain();
         let room = (0..N)
             .map(|i| (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]))
             .fold(f64::INFINITY, f64::min);
         let smallest = kinematics::measure::dexterity(chain, q).smallest;
-        (room / ROOM).min(smallest / NIMBLE).clamp(1e-3, 1.0)
+        (room / well).min(smallest / nimble).min(1.0)
     }
 
     /// The fastest motion in joint space that keeps every limit of joints and tool.

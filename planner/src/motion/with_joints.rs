@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use kinematics::follow::{self, NullMotion};
 use nalgebra::{Isometry3, SVector, Vector3};
+use trajectory::Trajectory;
 use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
 
 use super::smooth_joints::SmoothPath;
@@ -26,6 +27,20 @@ const POSES: RangeInclusive<usize> = 2..=60;
 
 /// Gap to its optimum at which a search ends: the joints are timed once more after it.
 const GAP: f64 = 0.1;
+
+/// Distance from a limit (rad) and smallest singular value from which a spare joint is well where it is, as in the
+/// search of a null-space motion along a curve.
+const ROOM: f64 = 0.1;
+const NIMBLE: f64 = 0.05;
+
+/// Places along a motion at which its ease is looked at.
+const LOOKS: u32 = 24;
+
+/// Joint positions along a motion, its ends with them.
+fn places<const N: usize>(trajectory: &Trajectory<N>) -> impl Iterator<Item = SVector<f64, N>> {
+    let step = trajectory.duration() / f64::from(LOOKS);
+    (0..=LOOKS).map(move |k| trajectory.sample(step * f64::from(k)).position)
+}
 
 impl<const N: usize> Planner<N> {
     /// The fastest motion of searches with the joints that begin at a known one; `None` if none is faster, and for arms of
@@ -85,7 +100,7 @@ impl<const N: usize> Planner<N> {
             duration: trajectory.duration(),
             at: &at,
             passes: &passes,
-            bounds: &self.joint_bounds(),
+            bounds: &self.joint_bounds(trajectory),
             spare: direction.map(|_| near),
         };
         let mut poses: Vec<Isometry3<f64>> = vec![self.chain().forward(start)];
@@ -99,7 +114,9 @@ impl<const N: usize> Planner<N> {
         let path = SmoothPath::new(found.plan, motion.tolerance, &poses);
         let followed = self.joints_on(path, start, course.as_ref()).ok()?;
         let along = self.on(&followed, motion, (start, trajectory.duration()));
-        along.ok().map(|along| along.planned)
+        let found = along.ok()?.planned;
+        let eased = N <= 6 || self.ease_along(&found.trajectory) >= self.ease_along(trajectory);
+        eased.then_some(found)
     }
 
     /// The arm at joint positions, with the linear function `spare` of its joints as the spare coordinate.
@@ -125,13 +142,27 @@ impl<const N: usize> Planner<N> {
         })
     }
 
-    /// What the joints may do.
-    fn joint_bounds(&self) -> Vec<JointBounds> {
+    /// What the joints may do. With a spare joint they may be no nearer to limits than in the known motion, up to what counts as
+    /// well inside.
+    fn joint_bounds(&self, known: &Trajectory<N>) -> Vec<JointBounds> {
         let (limits, chain) = (&self.limits, self.chain());
-        let joint = |j: usize| JointBounds {
-            position: [chain.lower()[j], chain.upper()[j]],
-            rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
+        let places: Vec<_> = places(known).collect();
+        let joint = |j: usize| {
+            let [low, high] = [chain.lower()[j], chain.upper()[j]];
+            let room = |q: &SVector<f64, N>| (high - q[j]).min(q[j] - low);
+            let room = places.iter().map(room).fold(ROOM, f64::min);
+            let room = if N > 6 { room.max(0.0) } else { 0.0 };
+            JointBounds {
+                position: [low + room, high - room],
+                rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
+            }
         };
         (0..N).map(joint).collect()
+    }
+
+    /// The least ease along a motion.
+    fn ease_along(&self, trajectory: &Trajectory<N>) -> f64 {
+        let all = places(trajectory).map(|q| self.ease_within(&q, [ROOM, NIMBLE]));
+        all.fold(f64::INFINITY, f64::min)
     }
 }

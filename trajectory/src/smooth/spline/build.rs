@@ -6,12 +6,12 @@ use super::basis;
 use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
 use super::problem::{Group, Point, Problem, ways};
+use super::request::{Moving, Request};
 use super::solve::{Aims, Effort, solve};
 use super::start::{self, KNOTS_PER_RAMP};
 use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
-use crate::smooth::arm::ArmMotion;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::Span;
 
@@ -35,10 +35,6 @@ const FEW: usize = 26;
 const STEPS: usize = 300;
 const SEARCH: usize = 200;
 
-/// Times that the jump of an angular velocity within one knot may exceed the angular jerk where the
-/// orientation is to follow the progress.
-const HOPELESS: f64 = 30.0;
-
 /// Share of the angular limits that a correction of the drift may take, and the largest second and third
 /// derivative of its course from 0 to 1.
 const CORRECTED: f64 = 0.015;
@@ -50,88 +46,6 @@ const ROUGH_KNOTS: f64 = 2.0;
 
 /// Control points over which the difference of an orientation in motion fades out.
 const FADE: f64 = 12.0;
-
-/// A start in motion: state and knot spacing of the motion it continues.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Moving {
-    pub(crate) state: ToolPoint,
-    pub(crate) spacing: f64,
-}
-
-/// What is asked of the spline.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Request<'a> {
-    /// The poses; with `moving` the first is the pose passed last.
-    pub(crate) poses: &'a [Isometry3<f64>],
-    pub(crate) options: &'a SmoothOptions,
-    /// State at the start; `None` at rest in the first pose.
-    pub(crate) moving: Option<&'a Moving>,
-    /// State at the end, between the last pose but one and the last; `None` at rest in the last pose. Only
-    /// with a start in motion and a motion that is known.
-    pub(crate) finish: Option<&'a ToolPoint>,
-    pub(crate) effort: Effort,
-    /// True: the orientation is part of the optimum. False: it follows the
-    /// progress of the controlled point, which is faster to plan.
-    pub(crate) coupled: bool,
-    /// A motion from the same start through the same poses that holds, to start the search from.
-    pub(crate) known: Option<&'a [Span]>,
-    /// A motion of an arm from rest to rest through the poses, to start the search from, and what its joints may do.
-    pub(crate) arm: Option<&'a ArmMotion<'a>>,
-}
-
-impl Request<'_> {
-    /// Whether the poses and the ends move the controlled point, and whether they turn it.
-    pub(crate) fn moves(&self) -> [bool; 2] {
-        let begin = self.moving.map_or(self.poses[0], |m| m.state.pose);
-        let far =
-            |p: &Isometry3<f64>| (p.translation.vector - begin.translation.vector).norm() > 1e-12;
-        let turned = |p: &Isometry3<f64>| body_turn(&begin.rotation, &p.rotation).norm() > 1e-12;
-        let ends = || self.moving.map(|m| &m.state).into_iter().chain(self.finish);
-        let fast = |k: fn(&ToolPoint) -> f64| ends().any(|state| k(state) > 1e-9);
-        let finish = self.finish.map(|state| &state.pose);
-        [
-            self.poses.iter().chain(finish).any(far) || fast(|s| s.linear[0].norm()),
-            self.poses.iter().chain(finish).any(turned) || fast(|s| s.angular[0].norm()),
-        ]
-    }
-
-    /// True when each leg that turns takes about as long to move as to turn, so that the orientation
-    /// can follow the progress, and when no pose is passed with a jump of the angular velocity that is
-    /// far above the angular jerk.
-    pub(crate) fn can_follow(&self) -> bool {
-        let least = self.options.tolerance.min(1e-3);
-        self.follows(least)
-    }
-
-    /// The same where legs may be short: then poses are missed more often.
-    pub(crate) fn may_follow(&self) -> bool {
-        self.follows(0.0)
-    }
-
-    /// The same where legs that turn are longer than `least` (m).
-    fn follows(&self, least: f64) -> bool {
-        let limits = &self.options.limits;
-        let ramps = [
-            limits.acceleration / limits.jerk,
-            limits.angular_acceleration / limits.angular_jerk,
-        ];
-        let knot = ramps[0].max(ramps[1]) / KNOTS_PER_RAMP;
-        let most = HOPELESS * limits.angular_jerk * knot * knot / limits.speed;
-        let mut before: Option<Vector3<f64>> = None;
-        self.poses.windows(2).all(|pair| {
-            let way = (pair[1].translation.vector - pair[0].translation.vector).norm();
-            let turn = body_turn(&pair[0].rotation, &pair[1].rotation);
-            let angle = turn.norm();
-            let far = way > least;
-            let slow = angle / limits.angular_speed < 1.5 * way / limits.speed;
-            let rate = turn / way.max(1e-300);
-            let jump = before
-                .replace(rate)
-                .map_or(0.0, |before| (rate - before).norm());
-            (angle < 1e-12 || (far && slow)) && jump <= most
-        })
-    }
-}
 
 /// Time-optimal spline from the first pose to the last through balls around
 /// those between. `None` when no feasible spline was found.
@@ -322,21 +236,7 @@ impl<'a> Task<'a> {
             let spacing = moving.spacing;
             problem.finish = finish.map(|finish| self.end(used, finish, spacing));
         }
-        let mut effort = self.request.effort;
-        let mut point = match (self.request.arm, self.request.known) {
-            (Some(arm), _) => self.of_arm(&mut problem, arm, used)?,
-            (_, Some(spans)) => {
-                effort.spread = None;
-                if !Problem::<D>::TURNS && self.moving.is_none() {
-                    (effort.steps, effort.search) = (STEPS, SEARCH);
-                }
-                self.known(&mut problem, spans, used)
-            }
-            (None, None) => {
-                let spread = self.moving.map(|_| effort.spread.unwrap_or(1.0));
-                start::first(&mut problem, spread, self.knots_per_ramp())
-            }
-        };
+        let (mut point, effort) = self.first(&mut problem, used)?;
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
         let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
         solve::<D, B>(&mut problem, &mut point, effort, aims)?;
@@ -345,6 +245,30 @@ impl<'a> Task<'a> {
             .iter()
             .filter_map(|c| Some(c[Problem::<D>::SPARE?]));
         Some((self.spans(&problem, &point, used), spare.collect()))
+    }
+
+    /// The first iterate of a problem, and how far and how long the search from there goes.
+    fn first<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        used: [bool; 2],
+    ) -> Option<(Point<D>, Effort)> {
+        let mut effort = self.request.effort;
+        let point = match (self.request.arm, self.request.known) {
+            (Some(arm), _) => self.of_arm(problem, arm, used)?,
+            (_, Some(spans)) => {
+                effort.spread = None;
+                if !Problem::<D>::TURNS && self.moving.is_none() {
+                    (effort.steps, effort.search) = (STEPS, SEARCH);
+                }
+                self.known(problem, spans, used)
+            }
+            (None, None) => {
+                let spread = self.moving.map(|_| effort.spread.unwrap_or(1.0));
+                start::first(problem, spread, self.knots_per_ramp())
+            }
+        };
+        Some((point, effort))
     }
 
     /// First iterate from a known motion.

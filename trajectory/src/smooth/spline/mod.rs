@@ -26,14 +26,16 @@ mod norms;
 mod passes;
 mod problem;
 mod project;
+mod request;
 mod solve;
 mod start;
 mod turns;
 
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
-pub(crate) use build::{Moving, Request, plan, plan_for_arm};
+pub(crate) use build::{plan, plan_for_arm};
 pub(crate) use meet::meet_spans;
+pub(crate) use request::{Moving, Request};
 pub(crate) use solve::Effort;
 pub(crate) use start::KNOTS_PER_RAMP;
 pub(crate) use turns::turns;
