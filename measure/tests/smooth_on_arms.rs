@@ -21,7 +21,8 @@ fn suite_on_arms() {
     };
     for (case, poses, tolerance, _) in suite::cases() {
         let options = SmoothOptions::new(tolerance, limits);
-        let free = plan(&poses, &options).unwrap().duration();
+        let tool = plan(&poses, &options).unwrap();
+        let (free, least) = (tool.duration(), tool.certificate().lower_bound);
         for name in ["ur5e", "panda", "iiwa7"] {
             let trial = Trial {
                 poses: poses.clone(),
@@ -38,7 +39,11 @@ fn suite_on_arms() {
                 row.certified && row.deviation_ratio <= 1.0 + 1e-9,
                 "{row:?}"
             );
-            assert!(motion >= free * (1.0 - 1e-6), "{case} on {name}");
+            // A search with the joints may find a curve that is a little faster for the tool, too.
+            assert!(
+                motion >= least,
+                "{case} on {name}: {motion} s, bound {least} s"
+            );
             if let Some(stops) = row.exact_stop {
                 assert!(motion <= stops * (1.0 + 1e-9), "{case} on {name}: {stops}");
             }

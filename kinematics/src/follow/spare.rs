@@ -102,3 +102,48 @@ pub fn joint_changes<const N: usize>(
     }
     Some(changes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::urdf;
+
+    /// The changes undo the Jacobian and the linear function.
+    fn check<const N: usize>(text: &str) {
+        let chain = urdf::read(text, None).unwrap().chain::<N>().unwrap();
+        for k in 0..20 {
+            let q = SVector::<f64, N>::from_fn(|i, _| {
+                let middle = 0.5 * (chain.lower()[i] + chain.upper()[i]);
+                let wide = (chain.upper()[i] - chain.lower()[i]).min(3.0);
+                middle + 0.4 * wide * (1.0 + 2.1 * i as f64 + 0.9 * k as f64).sin()
+            });
+            let direction = spare_direction(&chain, &q);
+            assert_eq!(direction.is_some(), N == 7);
+            let direction = direction.unwrap_or_else(SVector::zeros);
+            let (_, jacobian) = chain.jacobian(&q);
+            assert!((jacobian * direction).amax() < 1e-9);
+            let changes = joint_changes(&chain, &q, &direction).unwrap();
+            let step = SVector::<f64, N>::from_fn(|i, _| 0.3 - 0.1 * i as f64);
+            let mut seen = SVector::<f64, 7>::zeros();
+            seen.rows_mut(0, 6).copy_from(&(jacobian * step));
+            seen[6] = direction.dot(&step);
+            assert!((changes * seen - step).amax() < 1e-8, "{N} {k}");
+        }
+    }
+
+    #[test]
+    fn changes_undo_the_jacobian_and_the_linear_function() {
+        check::<6>(include_str!("../../../robots/ur5e/robot.urdf"));
+        check::<7>(include_str!("../../../robots/panda/robot.urdf"));
+        check::<7>(include_str!("../../../robots/iiwa7/robot.urdf"));
+    }
+
+    /// A function that is zero does not say where the spare joint is, and other arms have no such changes.
+    #[test]
+    fn what_does_not_settle_the_joints_is_refused() {
+        let text = include_str!("../../../robots/panda/robot.urdf");
+        let chain = urdf::read(text, None).unwrap().chain::<7>().unwrap();
+        let q = SVector::<f64, 7>::from([0.1, -0.8, 0.1, -2.3, 0.1, 1.6, 0.8]);
+        assert!(joint_changes(&chain, &q, &SVector::zeros()).is_none());
+    }
+}

@@ -83,7 +83,8 @@ impl<const D: usize> Joint<D> {
         let count = point.control.len();
         let [middle, half] = self.range;
         let bounds = [1, 2, 3].map(|k| (self.caps[k - 1] * h.powi(k as i32)).powi(2));
-        let squares = [half * half, bounds[0], bounds[1], bounds[2]].map(|b| F4::splat(simd, b));
+        let mut squares =
+            [half * half, bounds[0], bounds[1], bounds[2]].map(|b| F4::splat(simd, b));
         for k in (0..count).step_by(LANES) {
             let near = &positions[k..];
             let (q0, q1) = (F4::load(simd, near), F4::load(simd, &near[1..]));
@@ -91,6 +92,15 @@ impl<const D: usize> Joint<D> {
             let (first, second, third) = (q1 - q0, q2 - q1, q3 - q2);
             let (bend, next) = (second - first, third - second);
             let away = q0 - F4::splat(simd, middle);
+            // The last position counts once.
+            let inside = |i: usize| {
+                if k + i < count {
+                    half * half
+                } else {
+                    f64::INFINITY
+                }
+            };
+            squares[0] = F4::new(simd, std::array::from_fn(inside));
             for (value, bound) in [away, first, bend, next - bend].into_iter().zip(squares) {
                 if !take(value * value, bound) {
                     return None;
@@ -245,4 +255,150 @@ impl<const D: usize, const B: usize> System<D, B> {
 /// The sum of products.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::problem::{Group, Room, ways};
+    use crate::smooth::spline::project::project;
+    use crate::smooth::spline::start;
+
+    fn number(i: usize, d: usize) -> f64 {
+        (1.7 * i as f64 + 2.3 * d as f64 + 0.4).sin()
+    }
+
+    /// Corners without joints.
+    fn corners<const D: usize>() -> Problem<D> {
+        let spare = |d: usize| Problem::<D>::SPARE == Some(d);
+        let vertex =
+            |i: usize| std::array::from_fn(|d| if spare(d) { 0.0 } else { 0.1 * number(i, d) });
+        let vertices: Vec<[f64; D]> = (0..4).map(vertex).collect();
+        let group = Group {
+            caps: [0.5, 5.0, 100.0],
+            radius: 0.01,
+            width: 0.02,
+        };
+        Problem {
+            groups: [group; 2],
+            ways: ways(&vertices),
+            start: [vertices[0], [0.0; D], [0.0; D], [0.0; D]],
+            vertices,
+            finish: None,
+            scale: 1.0,
+            anchor: None,
+            led: Vec::new(),
+            joints: Vec::new(),
+        }
+    }
+
+    /// Corners with joints that follow, and a first iterate inside of all bounds; `E` are the coordinates without a spare one.
+    fn problem<const D: usize, const E: usize>() -> (Problem<D>, Point<D>) {
+        let mut without = corners::<E>();
+        let first = start::first(&mut without, None, start::KNOTS_PER_RAMP);
+        let mut problem = corners::<D>();
+        problem.scale = without.scale;
+        let lift = |c: &[f64; E]| std::array::from_fn(|d| c.get(d).copied().unwrap_or(0.0));
+        let mut point = Point {
+            control: first.control.iter().map(lift).collect(),
+            z: first.z,
+            crossings: first.crossings,
+        };
+        problem.pin(&mut point);
+        project(&problem, &mut point, None, 20);
+        let count = point.control.len();
+        let joint = |j: usize| Joint {
+            caps: [0.5, 5.0, 100.0],
+            range: [0.0, 1.0],
+            base: (0..count).map(|k| 1e-4 * number(k, j)).collect(),
+            changes: (0..count)
+                .map(|k| std::array::from_fn(|d| number(j, d) + 1e-3 * number(k, d)))
+                .collect(),
+        };
+        problem.joints = (0..3).map(joint).collect();
+        let h = problem.spacing(point.z);
+        let worst = problem
+            .joints
+            .iter()
+            .flat_map(|joint| joint.ratios(&point, h));
+        point.z *= (1.5 * worst.fold(1.0, f64::max)).powi(3);
+        (problem, point)
+    }
+
+    /// The barrier falls along the Newton step as the decrement says, with a spare coordinate and without.
+    fn check<const D: usize, const E: usize, const B: usize>() {
+        let (problem, point) = problem::<D, E>();
+        let room = Room::new(&problem, &point);
+        let weight = problem.parameter(&point) / point.z;
+        let step = System::<D, B>::new(&point).step(&problem, &point, &room, weight);
+        let step = step.unwrap();
+        let barrier = Barrier {
+            problem: &problem,
+            room: &room,
+            weight,
+            keep: 0.0,
+        };
+        let value = |share: f64| {
+            let mut moved = point.clone();
+            moved.z += share * step.z;
+            let free = moved.control.iter_mut().skip(4);
+            for (control, change) in free.zip(step.control.chunks_exact(D)) {
+                for d in 0..D {
+                    control[d] += share * change[d];
+                }
+            }
+            moved.end_spare();
+            project(&problem, &mut moved, Some(&room), 20);
+            let seen = barrier.look(&moved, &[]).unwrap();
+            barrier.value(&moved, &seen)
+        };
+        let share = 1e-5;
+        let (before, here, after) = (value(-share), value(0.0), value(share));
+        let slope = (before - after) / (2.0 * share) / step.decrement;
+        assert!((slope - 1.0).abs() < 1e-3, "{D}: {slope}");
+        // Along Newton's step the curvature is the decrement.
+        let wide = 1e-3;
+        let bend = (value(-wide) + value(wide) - 2.0 * here) / (wide * wide) / step.decrement;
+        assert!((bend - 1.0).abs() < 2e-2, "{D}: {bend}");
+    }
+
+    #[test]
+    fn the_barrier_falls_along_the_step_as_its_decrement_says() {
+        check::<3, 3, 20>();
+        check::<4, 3, 24>();
+        check::<6, 6, 36>();
+        check::<7, 6, 40>();
+    }
+
+    /// Four at a time, the squares and bounds of a joint are what they are one by one.
+    #[test]
+    fn four_at_a_time_are_as_one_by_one() {
+        let (problem, point) = problem::<4, 3>();
+        let h = problem.spacing(point.z);
+        for joint in &problem.joints {
+            let q = joint.positions(&point.control);
+            let mut sum = 0.0;
+            for w in DIFFERENCES {
+                let bound = joint.caps[w.len() - 2] * h.powi(w.len() as i32 - 1);
+                for q in q[..point.control.len()].windows(w.len()) {
+                    sum += (bound * bound - dot(w, q).powi(2)).ln();
+                }
+            }
+            for q in &q[..point.control.len()] {
+                sum += (1.0 - q * q).ln();
+            }
+            let mut product = 0.0;
+            let bounds = joint.look(simd::Plain, (&point, h), |squares, bounds| {
+                let both = squares.array().into_iter().zip(bounds.array());
+                product += both
+                    .map(|(square, bound)| (1.0 - square / bound).ln())
+                    .sum::<f64>();
+                true
+            });
+            let got = bounds.unwrap() + product;
+            // Thousands of logarithms.
+            assert!((got - sum).abs() < 1e-6, "{got} {sum}");
+        }
+    }
 }
