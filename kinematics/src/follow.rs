@@ -18,7 +18,7 @@ mod spare;
 mod trace;
 
 pub use error::{FollowCause, FollowError};
-pub use spare::{SpareCourse, joint_changes, spare_direction};
+pub use spare::{joint_changes, spare_direction};
 
 use crate::ik::Solver;
 use nalgebra::{Isometry3, SVector, Vector3};

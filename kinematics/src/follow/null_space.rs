@@ -5,8 +5,11 @@
 //! polynomial of `u`. So it has exact derivatives and does not drift. With two redundant joints,
 //! the second function is constant. With one, `r` may be given by the caller instead.
 
-use super::spare::SpareCourse;
 use nalgebra::SVector;
+use std::sync::Arc;
+
+/// The value of a linear function of the joints at a path parameter, and its first three derivatives to it.
+type SpareCourse = Arc<dyn Fn(f64) -> [f64; 4] + Send + Sync>;
 
 /// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
 pub(super) type NullSpacePolynomial = [f64; 6];

@@ -11,12 +11,9 @@ use crate::measure::LENGTH;
 use nalgebra::{SMatrix, SVector};
 use std::sync::Arc;
 
-/// The value of a linear function of the joints at a path parameter, and its first three derivatives to it.
-pub type SpareCourse = Arc<dyn Fn(f64) -> [f64; 4] + Send + Sync>;
-
 impl<const N: usize> NullMotion<N> {
-    /// The null-space motion along which the linear function `direction . q` of the joints has the values of `course`.
-    /// Only for arms with seven joints; others have no such function, or two.
+    /// The null-space motion along which the linear function `direction . q` of the joints has the values of `course`, which
+    /// gives the value at a path parameter and its first three derivatives. Only for arms with seven joints; others have no such function, or two.
     ///
     /// ```
     /// use kinematics::follow::{FollowOptions, NullMotion, TwistPoint, follow_with, spare_direction};
@@ -33,7 +30,7 @@ impl<const N: usize> NullMotion<N> {
     /// let direction = spare_direction(solver.chain(), &q).unwrap();
     /// let first = direction.dot(&q);
     /// let course = move |u: f64| [first + 0.2 * u, 0.2, 0.0, 0.0];
-    /// let motion = NullMotion::given(direction, std::sync::Arc::new(course));
+    /// let motion = NullMotion::given(direction, course);
     /// let options = FollowOptions::default();
     /// let points = follow_with(&solver, &tool, (&[0.0, 1.0], &q), &options, &motion)?;
     /// let end = points.last().unwrap().q[0];
@@ -41,10 +38,13 @@ impl<const N: usize> NullMotion<N> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn given(direction: SVector<f64, N>, course: SpareCourse) -> Self {
+    pub fn given(
+        direction: SVector<f64, N>,
+        course: impl Fn(f64) -> [f64; 4] + Send + Sync + 'static,
+    ) -> Self {
         let mut motion = NullSpace::none();
         motion.directions[0] = direction;
-        motion.course = Some(course);
+        motion.course = Some(Arc::new(course));
         Self(motion)
     }
 }

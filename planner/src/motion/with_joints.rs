@@ -2,7 +2,6 @@
 //! joints, near a motion that is known.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
 use kinematics::follow::{self, NullMotion};
 use nalgebra::{Isometry3, SVector, Vector3};
@@ -108,9 +107,10 @@ impl<const N: usize> Planner<N> {
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.gap = GAP;
         let found = smooth::plan_for_arm(&poses, &options, &arm).ok()??;
-        let course = found.spare.zip(direction).map(|(course, direction)| {
-            NullMotion::given(direction, Arc::new(move |time| course.at(time)))
-        });
+        let course = found
+            .spare
+            .zip(direction)
+            .map(|(course, direction)| NullMotion::given(direction, move |time| course.at(time)));
         let path = SmoothPath::new(found.plan, motion.tolerance, &poses);
         let followed = self.joints_on(path, start, course.as_ref()).ok()?;
         let along = self.on(&followed, motion, (start, trajectory.duration()));

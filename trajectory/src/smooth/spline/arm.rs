@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::build::Task;
-use super::joints::Joint;
+use super::joint::Joint;
 use super::problem::{Point, Problem, ways};
 use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};

@@ -210,7 +210,7 @@ impl<const D: usize> Look<'_, D> {
         let h = problem.spacing(self.point.z);
         let mut bounds = 0.0;
         for joint in &problem.joints {
-            bounds += joint.look(simd, (self.point, h), |squares, bound| {
+            bounds += joint.look(simd, (&self.point.control, h), |squares, bound| {
                 let held = slacks.take_four(squares, bound);
                 slacks.fold();
                 held

@@ -1,39 +1,13 @@
-//! The joints of an arm that follow a spline.
-//!
-//! Near a motion that is known, the position of a joint is to first order an affine function of where the tool is. So the
-//! joints at the control points are control points of a spline, too, and the hulls of their differences bound speed,
-//! acceleration and jerk of each joint for all times.
-
-use simd::{F4, Four, LANES};
+//! What the joints of an arm that follow a spline add to the Newton system.
 
 use super::basis::{FIRST, SECOND, THIRD};
 use super::iterate::Iterate;
+use super::joint::{Joint, dot};
 use super::newton::System;
 use super::problem::{Point, Problem};
 
-/// How often the last position stands there once more, so that groups of four may begin at each.
-const MORE: usize = 8;
-
 /// Control points of the longest difference.
 const WIDE: usize = 4;
-
-/// Differences of order 1 to 3, as weights of consecutive control points.
-const DIFFERENCES: [&[f64]; 3] = [&FIRST, &SECOND, &THIRD];
-
-/// Bounds of a joint at each control point: of its position, speed, acceleration and jerk.
-const BOUNDS: usize = 4;
-
-/// A joint whose position at each control point is an affine function of it.
-#[derive(Clone, Debug)]
-pub(crate) struct Joint<const D: usize> {
-    /// Greatest speed, acceleration and jerk.
-    pub(super) caps: [f64; 3],
-    /// Middle of its positions, and how far it may be from there.
-    pub(super) range: [f64; 2],
-    /// Its position where the coordinates of a control point are 0, and how it changes with each, by control point.
-    pub(super) base: Vec<f64>,
-    pub(super) changes: Vec<[f64; D]>,
-}
 
 /// Gradient, border and curvature of the terms of one joint, by control point.
 struct Terms {
@@ -46,71 +20,6 @@ struct Terms {
 }
 
 impl<const D: usize> Joint<D> {
-    /// Its positions at control points, the last of which stands there a few times more.
-    fn positions(&self, control: &[[f64; D]]) -> Vec<f64> {
-        let mut positions = Vec::with_capacity(control.len() + MORE);
-        let all = self.base.iter().zip(&self.changes).zip(control);
-        positions.extend(all.map(|((base, change), c)| {
-            let moved: f64 = change.iter().zip(c).map(|(a, b)| a * b).sum();
-            base + moved
-        }));
-        let last = positions.last().copied().unwrap_or_default();
-        positions.resize(control.len() + MORE, last);
-        positions
-    }
-
-    /// Greatest ratio of speed, acceleration and jerk to their bounds.
-    pub(super) fn ratios(&self, point: &Point<D>, h: f64) -> [f64; 3] {
-        let positions = self.positions(&point.control);
-        let worst = |order: usize| {
-            let all = positions.windows(order + 2);
-            let all = all.map(|q| dot(DIFFERENCES[order], q).abs());
-            all.fold(0.0, f64::max) / (self.caps[order] * h.powi(order as i32 + 1))
-        };
-        [worst(0), worst(1), worst(2)]
-    }
-
-    /// Passes the squares of four neighbours at a time to `take`, with the square of their bound, until it says false: then
-    /// `None`, else the sum of the logarithms of the bounds that depend on `z`.
-    #[inline(always)]
-    pub(super) fn look<S: Four>(
-        &self,
-        simd: S,
-        (point, h): (&Point<D>, f64),
-        mut take: impl FnMut(F4<S>, F4<S>) -> bool,
-    ) -> Option<f64> {
-        let positions = self.positions(&point.control);
-        let count = point.control.len();
-        let [middle, half] = self.range;
-        let bounds = [1, 2, 3].map(|k| (self.caps[k - 1] * h.powi(k as i32)).powi(2));
-        let mut squares =
-            [half * half, bounds[0], bounds[1], bounds[2]].map(|b| F4::splat(simd, b));
-        for k in (0..count).step_by(LANES) {
-            let near = &positions[k..];
-            let (q0, q1) = (F4::load(simd, near), F4::load(simd, &near[1..]));
-            let (q2, q3) = (F4::load(simd, &near[2..]), F4::load(simd, &near[3..]));
-            let (first, second, third) = (q1 - q0, q2 - q1, q3 - q2);
-            let (bend, next) = (second - first, third - second);
-            let away = q0 - F4::splat(simd, middle);
-            // The last position counts once.
-            let inside = |i: usize| {
-                if k + i < count {
-                    half * half
-                } else {
-                    f64::INFINITY
-                }
-            };
-            squares[0] = F4::new(simd, std::array::from_fn(inside));
-            for (value, bound) in [away, first, bend, next - bend].into_iter().zip(squares) {
-                if !take(value * value, bound) {
-                    return None;
-                }
-            }
-        }
-        let logarithm = |k: usize| (count - 1 - k) as f64 * bounds[k].ln();
-        Some(logarithm(0) + logarithm(1) + logarithm(2))
-    }
-
     /// The terms of an iterate.
     fn terms(&self, problem: &Problem<D>, point: &Point<D>) -> Terms {
         let (positions, count) = (self.positions(&point.control), point.control.len());
@@ -162,13 +71,6 @@ impl Terms {
                 }
             }
         }
-    }
-}
-
-impl<const D: usize> Problem<D> {
-    /// Number of bounds of joints.
-    pub(super) fn joint_bounds(&self, knots: f64) -> f64 {
-        BOUNDS as f64 * knots * self.joints.len() as f64
     }
 }
 
@@ -252,15 +154,11 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 }
 
-/// The sum of products.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::joint::DIFFERENCES;
     use crate::smooth::spline::problem::{Group, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::start;
@@ -321,7 +219,7 @@ mod tests {
         let worst = problem
             .joints
             .iter()
-            .flat_map(|joint| joint.ratios(&point, h));
+            .flat_map(|joint| joint.ratios(&point.control, h));
         point.z *= (1.5 * worst.fold(1.0, f64::max)).powi(3);
         (problem, point)
     }
@@ -389,7 +287,7 @@ mod tests {
                 sum += (1.0 - q * q).ln();
             }
             let mut product = 0.0;
-            let bounds = joint.look(simd::Plain, (&point, h), |squares, bounds| {
+            let bounds = joint.look(simd::Plain, (&point.control, h), |squares, bounds| {
                 let both = squares.array().into_iter().zip(bounds.array());
                 product += both
                     .map(|(square, bound)| (1.0 - square / bound).ln())

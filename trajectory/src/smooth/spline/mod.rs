@@ -17,6 +17,7 @@ mod build;
 mod coordinates;
 mod ends;
 mod iterate;
+mod joint;
 mod joints;
 mod known;
 mod led;

@@ -9,7 +9,7 @@
 use simd::{F4, Four};
 
 use super::basis::{self, START, weights};
-use super::joints::Joint;
+use super::joint::{BOUNDS, Joint};
 
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
 /// slack that each step along a ball leaves it.
@@ -241,7 +241,8 @@ impl<const D: usize> Problem<D> {
         };
         let balls = self.heavy(point) * point.crossings.len() as f64;
         let norms = Self::GROUPS as f64 * (knots * (3.0 + corridor) + balls);
-        2.0 * (norms + self.joint_bounds(knots))
+        let joints = (BOUNDS * self.joints.len()) as f64 * knots;
+        2.0 * (norms + joints)
     }
 
     /// Weight of a ball beside other constraints.

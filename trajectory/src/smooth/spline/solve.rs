@@ -551,7 +551,7 @@ fn slow_down<const D: usize>(problem: &Problem<D>, point: &mut Point<D>) {
     }
     let h = problem.spacing(point.z);
     for joint in &problem.joints {
-        need = need.max(time_cubed(joint.ratios(point, h)));
+        need = need.max(time_cubed(joint.ratios(&point.control, h)));
     }
     point.z *= need.max(1e-9);
 }
