@@ -6,10 +6,10 @@
 //! the second function is constant. With one, `r` may be given by the caller instead.
 
 use nalgebra::SVector;
-use std::sync::Arc;
+use std::rc::Rc;
 
 /// The value of a linear function of the joints at a path parameter, and its first three derivatives to it.
-type SpareCourse = Arc<dyn Fn(f64) -> [f64; 4] + Send + Sync>;
+type SpareCourse = Rc<dyn Fn(f64) -> [f64; 4]>;
 
 /// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
 pub(super) type NullSpacePolynomial = [f64; 6];

@@ -9,7 +9,7 @@ use super::redundancy::null_space;
 use crate::Chain;
 use crate::measure::LENGTH;
 use nalgebra::{SMatrix, SVector};
-use std::sync::Arc;
+use std::rc::Rc;
 
 impl<const N: usize> NullMotion<N> {
     /// The null-space motion along which the linear function `direction . q` of the joints has the values of `course`, which
@@ -38,13 +38,10 @@ impl<const N: usize> NullMotion<N> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn given(
-        direction: SVector<f64, N>,
-        course: impl Fn(f64) -> [f64; 4] + Send + Sync + 'static,
-    ) -> Self {
+    pub fn given(direction: SVector<f64, N>, course: impl Fn(f64) -> [f64; 4] + 'static) -> Self {
         let mut motion = NullSpace::none();
         motion.directions[0] = direction;
-        motion.course = Some(Arc::new(course));
+        motion.course = Some(Rc::new(course));
         Self(motion)
     }
 }
