@@ -258,6 +258,11 @@ fn what_cannot_be_used_is_refused() {
     };
     let found = |arm: &ArmMotion<'_>| plan_for_arm(&case.poses, &case.options, arm).unwrap();
     let singular = |_: f64| None;
+    let without_a_joint = |time: f64| {
+        let mut state = case.state(time);
+        state.joints.pop();
+        Some(state)
+    };
     let infinite = [JointBounds {
         rates: [1.0, 6.0, f64::INFINITY],
         ..case.bounds[0]
@@ -275,6 +280,10 @@ fn what_cannot_be_used_is_refused() {
         },
         ArmMotion {
             at: &singular,
+            ..arm
+        },
+        ArmMotion {
+            at: &without_a_joint,
             ..arm
         },
     ] {

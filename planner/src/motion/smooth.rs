@@ -63,8 +63,8 @@ pub(super) struct Along<const N: usize> {
 impl<const N: usize> Planner<N> {
     /// The smooth motion within the tolerance asked for. If its certificate with the joints fails, or
     /// if they cannot follow its curve, other curves are tried; then, if they could follow the straight legs, a quarter of the
-    /// tolerance, then a stop at each pose. Where the joints make it slower than the tool needs, a faster one is searched with them. Never slower than straight moves to each pose in turn: these are
-    /// tried wherever they may be faster.
+    /// tolerance, then a stop at each pose. Where the joints make it slower than the tool needs, a faster one is searched
+    /// with them. Never slower than straight moves to each pose in turn: these are tried wherever they may be faster.
     pub(super) fn smooth_move(
         &self,
         motion: &Move,

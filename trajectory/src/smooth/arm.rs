@@ -37,7 +37,8 @@ pub struct ArmState {
 pub struct ArmMotion<'a> {
     /// Its time, s.
     pub duration: f64,
-    /// The arm at a time between 0 and [`ArmMotion::duration`]; `None` where it is singular.
+    /// The arm at a time between 0 and [`ArmMotion::duration`], with a joint for each of the bounds; `None` where it is
+    /// singular.
     pub at: &'a dyn Fn(f64) -> Option<ArmState>,
     /// The times at which it passes the poses between the first and the last, s.
     pub passes: &'a [f64],

@@ -42,7 +42,9 @@ impl Sampled {
         let spans = (each * legs).clamp(fewest, MOST);
         let spacing = arm.duration / spans as f64;
         let time = |k: usize| (k as f64 - REST as f64) * spacing;
-        let states = (0..=spans + 2 * REST).map(|k| (arm.at)(time(k).clamp(0.0, arm.duration)));
+        let all = |state: &ArmState| state.joints.len() == arm.bounds.len();
+        let state = |k: usize| (arm.at)(time(k).clamp(0.0, arm.duration)).filter(all);
+        let states = (0..=spans + 2 * REST).map(state);
         let states: Vec<ArmState> = states.collect::<Option<_>>()?;
         let mut turns = vec![Vector3::zeros()];
         for pair in states.windows(2) {
