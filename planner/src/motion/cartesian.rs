@@ -28,6 +28,13 @@ const REFINEMENTS: usize = 8;
 const MOST_POINTS: usize = 400_000;
 
 impl<const N: usize> Planner<N> {
+    /// Where the tool is at the start of a move, and the poses of the move.
+    pub(super) fn through(&self, motion: &Move, start: &SVector<f64, N>) -> Vec<Isometry3<f64>> {
+        let mut poses = vec![self.chain().forward(start)];
+        poses.extend_from_slice(&motion.poses);
+        poses
+    }
+
     pub(super) fn plan_straight(
         &self,
         motion: &Move,

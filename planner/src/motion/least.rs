@@ -19,8 +19,7 @@ impl<const N: usize> Planner<N> {
         end: &SVector<f64, N>,
         draft: &Draft<N>,
     ) -> f64 {
-        let mut poses = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
+        let poses = self.through(motion, start);
         let mut options = SmoothOptions::new(motion.tolerance, motion.limits);
         match motion.shape {
             // Any path is allowed.

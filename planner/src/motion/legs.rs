@@ -48,8 +48,7 @@ impl<const N: usize> Planner<N> {
         fit: bool,
     ) -> Result<PlannedMove<N>, MotionError> {
         let motion = &legs.motion;
-        let mut poses = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
+        let poses = self.through(motion, start);
         let mut options = smooth::SmoothOptions::new(tolerance, motion.limits);
         options.fit = fit;
         let plan = smooth::plan(&poses, &options)?;

@@ -191,8 +191,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (fit, gap): (bool, Option<f64>),
     ) -> Result<SmoothPath, MotionError> {
-        let mut poses = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
+        let poses = self.through(motion, start);
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.fit = fit;
         options.gap = gap.unwrap_or(options.gap);

@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 
 use kinematics::follow::{self, NullMotion};
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::{SVector, Vector3};
 use trajectory::Trajectory;
 use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
 
@@ -102,8 +102,7 @@ impl<const N: usize> Planner<N> {
             bounds: &self.joint_bounds(trajectory),
             spare: direction.map(|_| near),
         };
-        let mut poses: Vec<Isometry3<f64>> = vec![self.chain().forward(start)];
-        poses.extend_from_slice(&motion.poses);
+        let poses = self.through(motion, start);
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
         options.gap = GAP;
         let found = smooth::plan_for_arm(&poses, &options, &arm).ok()??;

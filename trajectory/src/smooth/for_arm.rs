@@ -127,10 +127,9 @@ fn searched(
     let mut inner = options.clone();
     inner.angular_tolerance = Some(TURNED * options.angular_tolerance());
     for _ in 0..ATTEMPTS {
-        let narrowed = inner.clone();
         let request = Request {
             poses,
-            options: &narrowed,
+            options: &inner,
             moving: None,
             finish: None,
             effort: arm_effort(options.gap),
@@ -138,10 +137,11 @@ fn searched(
             known: None,
             arm: Some(arm),
         };
+        let turns = request.moves()[1];
         let (mut spans, control) = spline::plan_for_arm(&request)?;
         let whole = certify_slowed(&mut spans, (poses, false), options, SLOWED);
         if !whole.0.holds() {
-            narrow(&mut inner, &whole.0, &whole.1, request.moves()[1]);
+            narrow(&mut inner, &whole.0, &whole.1, turns);
             continue;
         }
         let spare = arm.spare.map(|_| SpareSpline {

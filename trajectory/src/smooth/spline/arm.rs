@@ -5,8 +5,9 @@
 
 use nalgebra::Vector3;
 
+use super::basis;
 use super::build::Task;
-use super::joint::Joint;
+use super::joint::{Joint, dot};
 use super::problem::{Point, Problem, ways};
 use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};
@@ -168,10 +169,7 @@ impl Task<'_> {
             })
             .collect();
         let all = positions.iter().zip(&changes).zip(&point.control);
-        let base = all.map(|((q, change), c)| {
-            let moved: f64 = change.iter().zip(c).map(|(a, b)| a * b).sum();
-            q - moved
-        });
+        let base = all.map(|((q, change), c)| q - dot(change, c));
         let bounds = &arm.bounds[j];
         let [low, high] = bounds.position;
         let least = positions.iter().copied().fold(f64::INFINITY, f64::min);
@@ -198,11 +196,9 @@ fn near<const D: usize>(point: &Point<D>, (spare, most): (usize, f64)) -> Joint<
     }
 }
 
-/// Moves each number but those at the ends to that of the control point which reproduces cubics.
-fn sharpen<T: Copy>(all: &mut [T], number: impl Fn(&mut T) -> &mut f64) {
-    let before: Vec<f64> = all.iter_mut().map(|x| *number(x)).collect();
-    for k in FIXED..before.len() - FIXED {
-        let bend = before[k - 1] - 2.0 * before[k] + before[k + 1];
-        *number(&mut all[k]) -= 5.0 / 24.0 * bend;
-    }
+/// [`basis::reproduce`] of all places but those that do not move.
+fn sharpen<T>(places: &mut [T], number: impl Fn(&mut T) -> &mut f64) {
+    let inner = FIXED..places.len() - FIXED;
+    let share = |k: usize| if inner.contains(&k) { 1.0 } else { 0.0 };
+    basis::reproduce(places, number, share);
 }

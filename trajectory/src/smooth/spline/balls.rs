@@ -162,6 +162,7 @@ mod tests {
     use crate::smooth::spline::newton::{Step, System};
     use crate::smooth::spline::problem::{Group, Point, Problem, Room, ways};
     use crate::smooth::spline::project::project;
+    use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
 
     /// Corners in position and orientation, with and without motion at the start.
@@ -225,13 +226,7 @@ mod tests {
         share: f64,
     ) -> Point<6> {
         let mut moved = point.clone();
-        moved.z += share * step.z;
-        let free = moved.control.iter_mut().skip(4);
-        for (control, change) in free.zip(step.control.chunks_exact(6)) {
-            for d in 0..6 {
-                control[d] += share * change[d];
-            }
-        }
+        go(problem, (point, &mut moved), (step, share));
         project(problem, &mut moved, Some(room), 20);
         moved
     }

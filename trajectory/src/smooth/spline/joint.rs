@@ -34,10 +34,7 @@ impl<const D: usize> Joint<D> {
     pub(super) fn positions(&self, control: &[[f64; D]]) -> Vec<f64> {
         let mut positions = Vec::with_capacity(control.len() + MORE);
         let all = self.base.iter().zip(&self.changes).zip(control);
-        positions.extend(all.map(|((base, change), c)| {
-            let moved: f64 = change.iter().zip(c).map(|(a, b)| a * b).sum();
-            base + moved
-        }));
+        positions.extend(all.map(|((base, change), c)| base + dot(change, c)));
         let last = positions.last().copied().unwrap_or_default();
         positions.resize(control.len() + MORE, last);
         positions

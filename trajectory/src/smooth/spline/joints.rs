@@ -161,6 +161,7 @@ mod tests {
     use crate::smooth::spline::joint::DIFFERENCES;
     use crate::smooth::spline::problem::{Group, Room, ways};
     use crate::smooth::spline::project::project;
+    use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
 
     fn number(i: usize, d: usize) -> f64 {
@@ -239,14 +240,7 @@ mod tests {
         };
         let value = |share: f64| {
             let mut moved = point.clone();
-            moved.z += share * step.z;
-            let free = moved.control.iter_mut().skip(4);
-            for (control, change) in free.zip(step.control.chunks_exact(D)) {
-                for d in 0..D {
-                    control[d] += share * change[d];
-                }
-            }
-            moved.end_spare();
+            go(&problem, (&point, &mut moved), (&step, share));
             project(&problem, &mut moved, Some(&room), 20);
             let seen = barrier.look(&moved, &[]).unwrap();
             barrier.value(&moved, &seen)

@@ -11,6 +11,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use super::basis;
 use super::problem::Problem;
 use super::start::{FEWEST, KNOTS_PER_RAMP, MOST};
 use crate::line::body_turn;
@@ -241,14 +242,9 @@ fn join(control: &mut [[Vector3<f64>; 2]]) {
     });
 }
 
-/// Moves each place by a share of the way to the control point that reproduces cubics: away from the place by 5/24 of
-/// its second difference.
+/// [`basis::reproduce`] of places and rotation vectors.
 fn reproduce(control: &mut [[Vector3<f64>; 2]], share: impl Fn(usize) -> f64) {
-    let places = control.to_vec();
-    for k in 1..control.len() - 1 {
-        for (g, place) in control[k].iter_mut().enumerate() {
-            let bend = places[k - 1][g] - places[k][g] * 2.0 + places[k + 1][g];
-            *place -= bend * (5.0 / 24.0 * share(k));
-        }
+    for i in 0..6 {
+        basis::reproduce(control, |c| &mut c[i / 3][i % 3], &share);
     }
 }

@@ -590,7 +590,7 @@ fn search<const D: usize>(
 }
 
 /// Moves a trial to where a share of a step leads from an iterate.
-fn go<const D: usize>(
+pub(super) fn go<const D: usize>(
     problem: &Problem<D>,
     (point, trial): (&Point<D>, &mut Point<D>),
     (step, share): (&Step, f64),
