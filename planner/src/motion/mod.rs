@@ -8,6 +8,7 @@ mod actuate;
 mod blocked_cause;
 mod cartesian;
 mod certificate;
+mod course;
 mod draft;
 mod efforts;
 mod fault;

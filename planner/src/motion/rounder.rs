@@ -67,18 +67,20 @@ impl<const N: usize> Planner<N> {
             most: f64::INFINITY,
         };
         let mut curve = self.curve(start, (motion, search), true).ok()?;
-        // A search with the joints finds the null-space motion, too.
-        curve.may_be_helped = false;
-        let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
-        if !is_ruled(&first) {
+        // The time of the joints need not be known exactly.
+        let course = self.course_along(&curve);
+        let about = course.time;
+        if about <= RULED * curve.path.plan.duration() {
             return None;
         }
         let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
-        let enough = ENOUGH * time(&first.planned);
-        let found = self.with_joints(motion, start, &first.planned);
+        let found = self.with_joints(motion, start, course);
         let planned = match found {
-            Some(found) if time(&found) <= enough => found,
+            Some(found) if time(&found) <= ENOUGH * about => found,
             found => {
+                // A search with the joints would have found the null-space motion, too.
+                curve.may_be_helped = false;
+                let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
                 curve.may_be_helped = N > 6;
                 let other = self.on_others(motion, start, (first, &curve));
                 let all = found.into_iter().chain([other]);
@@ -103,7 +105,9 @@ impl<const N: usize> Planner<N> {
             first
         };
         let planned = self.for_the_joints(motion, start, (first, curve));
-        self.with_joints(motion, start, &planned).unwrap_or(planned)
+        let course = self.course_of(&planned);
+        let found = self.with_joints(motion, start, course);
+        found.unwrap_or(planned)
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.

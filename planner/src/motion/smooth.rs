@@ -95,7 +95,7 @@ impl<const N: usize> Planner<N> {
             }
         };
         let slower = planned.trajectory.duration() > HELPED * least;
-        let found = slower.then(|| self.with_joints(motion, start, &planned));
+        let found = slower.then(|| self.with_joints(motion, start, self.course_of(&planned)));
         let planned = found.flatten().unwrap_or(planned);
         self.or_straight(motion, start, planned)
     }

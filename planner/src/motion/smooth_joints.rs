@@ -175,7 +175,7 @@ impl<const N: usize> Planner<N> {
 
     /// About the time that the joints need along points whose parameter is the time of the tool: at each point
     /// the factor by which it must be stretched.
-    fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
+    pub(super) fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
         let parts = points.windows(2).map(|pair| {
             let mean = 0.5 * (self.slowdown(&pair[0]) + self.slowdown(&pair[1]));
             mean * (pair[1].u - pair[0].u)
@@ -224,7 +224,7 @@ impl<const N: usize> Planner<N> {
 /// A smooth motion of the tool, and joints along it whose parameter is its time.
 pub(super) struct Followed<const N: usize> {
     pub(super) path: SmoothPath,
-    points: Vec<FollowPoint<N>>,
+    pub(super) points: Vec<FollowPoint<N>>,
     /// Whether another null-space motion may be searched that helps the joints.
     pub(super) may_be_helped: bool,
 }

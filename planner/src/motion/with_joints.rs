@@ -1,5 +1,11 @@
 //! MoveSmoothlyTo where the joints rule: the curve of the tool and the spare joint are searched under the limits of the
 //! joints, near a motion that is known.
+//!
+//! The joints are looked at to first order, so a search may go only so far; the joints are followed along its curve, and the next
+//! search begins there.
+//!
+//! # Source
+//! J. Nocedal, S. J. Wright, "Numerical Optimization", 2nd ed. 2006, algorithm 4.1 (trust region).
 
 use std::ops::RangeInclusive;
 
@@ -8,32 +14,62 @@ use nalgebra::{SVector, Vector3};
 use trajectory::Trajectory;
 use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
 
-use super::smooth_joints::SmoothPath;
+use super::course::Course;
+use super::smooth_joints::{Followed, SmoothPath};
 use super::{PlannedMove, Planner};
 use crate::task::Move;
 
-/// Most searches, each from the fastest motion so far, and the share of its time that one has to save for another like it.
-const ROUNDS: usize = 3;
+/// Most searches before the last, and the share of the time that one has to save for another like it.
+const ROUNDS: usize = 6;
 const GAIN: f64 = 0.01;
 
-/// How far the linear function of the joints that says where the spare joint is may be from that of the known motion, at first and
-/// where that leads nowhere.
+/// Gaps to its optimum at which a search ends: before the last and the last.
+const ROUGH: f64 = 0.3;
+const GAP: f64 = 0.1;
+
+/// How far each joint may go from where it is looked at (rad, m) at first, the share of that where it leads nowhere, and how far is
+/// not worth a search.
 const FAR: f64 = 0.6;
-const NEAR: f64 = 0.15;
+const SHRINK: f64 = 0.25;
+const NOWHERE: f64 = 0.01;
+/// Less than this share of what was foretold to be saved says that the joints were looked at too far away.
+const POOR: f64 = 0.25;
 
 /// Poses of a list for which it is not too dear; one pose is reached straight.
 const POSES: RangeInclusive<usize> = 2..=60;
-
-/// Gap to its optimum at which a search ends: the joints are timed once more after it.
-const GAP: f64 = 0.1;
 
 /// Distance from a limit (rad) and smallest singular value from which a spare joint is well where it is, as in the
 /// search of a null-space motion along a curve.
 const ROOM: f64 = 0.1;
 const NIMBLE: f64 = 0.05;
+/// Share of the ease of the known motion that another must have.
+const EASED: f64 = 0.95;
 
 /// Places along a motion at which its ease is looked at.
 const LOOKS: u32 = 24;
+
+/// How far a search may go.
+struct Region {
+    /// How far each joint may go from where it is looked at, rad or m.
+    far: f64,
+    /// The least ease of a motion; with a spare joint only.
+    ease: Option<f64>,
+    /// How far from their limits the joints of an arm with a spare one stay, rad or m.
+    room: Vec<f64>,
+}
+
+/// What a search has found.
+struct Found<const N: usize> {
+    followed: Followed<N>,
+    course: Course<N>,
+}
+
+/// The search of a move.
+#[derive(Clone, Copy)]
+struct Task<'a, const N: usize> {
+    motion: &'a Move,
+    start: &'a SVector<f64, N>,
+}
 
 /// Joint positions along a motion, its ends with them.
 fn places<const N: usize>(trajectory: &Trajectory<N>) -> impl Iterator<Item = SVector<f64, N>> {
@@ -42,80 +78,104 @@ fn places<const N: usize>(trajectory: &Trajectory<N>) -> impl Iterator<Item = SV
 }
 
 impl<const N: usize> Planner<N> {
-    /// The fastest motion of searches with the joints that begin at a known one; `None` if none is faster, and for arms of
+    /// The motion with which searches with the joints end that begin at a known one; `None` if it is not faster, and for arms of
     /// other than six or seven joints.
     pub(super) fn with_joints(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        known: &PlannedMove<N>,
+        known: Course<N>,
     ) -> Option<PlannedMove<N>> {
         let has_inverse = N == 6 || N == 7;
         if !has_inverse || !POSES.contains(&motion.poses.len()) {
             return None;
         }
-        let (mut best, mut near): (Option<PlannedMove<N>>, _) = (None, FAR);
-        let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
-        for _ in 0..ROUNDS {
-            let from = best.as_ref().unwrap_or(known);
-            let before = time(from);
-            let found = self.searched_from(motion, start, (from, near));
-            let found = found.filter(|found| time(found) < before);
-            let gains = found
-                .as_ref()
-                .is_some_and(|found| time(found) <= (1.0 - GAIN) * before);
-            best = found.or(best);
-            if gains {
-                continue;
-            }
-            if N <= 6 || near <= NEAR {
-                break;
-            }
-            // The joints were perhaps too far from where they were looked at.
-            near = NEAR;
-        }
-        best
+        let (task, most) = (Task { motion, start }, known.time);
+        let mut region = self.region(&known.trajectory);
+        let (course, sure) = self.fastest_course(task, known, &mut region);
+        course.seed.as_ref()?;
+        let last = self.searched(task, &course, (&region, GAP));
+        let last = last.map(|found| found.followed);
+        let mut all = last.into_iter().chain(sure);
+        all.find_map(|followed| {
+            let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
+            let trajectory = &planned.trajectory;
+            let taken = trajectory.duration() < most && self.is_eased(trajectory, &region);
+            taken.then_some(planned)
+        })
     }
 
-    /// The motion with which a search ends that begins at a known one.
-    fn searched_from(
+    /// The course that needs the least time of those with which rough searches end, each of which begins where one before ended; and
+    /// the joints along the last curve of them that is certified.
+    fn fastest_course(
         &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (known, near): (&PlannedMove<N>, f64),
-    ) -> Option<PlannedMove<N>> {
-        let trajectory = &known.trajectory;
-        let middle = trajectory.sample(0.5 * trajectory.duration()).position;
-        let direction = follow::spare_direction(self.chain(), &middle);
-        let spare = direction.unwrap_or_else(SVector::zeros);
-        let at = |time: f64| self.state(&trajectory.sample(time).position, &spare);
-        let passes: Vec<f64> = known
-            .certificate
-            .poses
-            .iter()
-            .map(|pass| pass.time_s)
-            .collect();
+        task: Task<'_, N>,
+        mut course: Course<N>,
+        region: &mut Region,
+    ) -> (Course<N>, Option<Followed<N>>) {
+        let mut sure = None;
+        for _ in 0..ROUNDS {
+            let found = self.searched(task, &course, (region, ROUGH));
+            let before = course.time;
+            // Where the joints cannot follow, nothing is saved of what was hoped for.
+            let foretold = found
+                .as_ref()
+                .map_or(0.0, |found| found.followed.path.plan.duration());
+            let found = found.filter(|found| self.is_admitted(&found.course.trajectory, region));
+            if let Some(found) = found.filter(|found| found.course.time < before) {
+                course = found.course;
+                let holds = found.followed.path.plan.certificate().holds();
+                sure = holds.then_some(found.followed).or(sure);
+            }
+            let (saved, hoped) = (before - course.time, before - foretold);
+            if saved > GAIN * before {
+                if region.far >= FAR && course.time < (1.0 + GAIN) * foretold {
+                    break;
+                }
+            } else if hoped < 2.0 * GAIN * before || SHRINK * region.far < NOWHERE {
+                break;
+            }
+            if saved <= GAIN * before || saved < POOR * hoped {
+                region.far *= SHRINK;
+            }
+        }
+        (course, sure)
+    }
+
+    /// The joints along the plan of a search that begins at a course and ends at a gap to its optimum.
+    fn searched(
+        &self,
+        Task { motion, start }: Task<'_, N>,
+        from: &Course<N>,
+        (region, gap): (&Region, f64),
+    ) -> Option<Found<N>> {
+        let spare = from.direction.unwrap_or_else(SVector::zeros);
+        let at = |time: f64| self.state(&from.trajectory.sample(time).position, &spare);
         let arm = ArmMotion {
-            duration: trajectory.duration(),
+            duration: from.trajectory.duration(),
             at: &at,
-            passes: &passes,
-            bounds: &self.joint_bounds(trajectory),
-            spare: direction.map(|_| near),
+            passes: &from.passes,
+            bounds: &self.joint_bounds(region),
+            far: region.far,
+            has_spare: from.direction.is_some(),
+            rough: gap > GAP,
+            onward: from.seed.as_ref(),
         };
         let poses = self.through(motion, start);
         let mut options = smooth::SmoothOptions::new(motion.tolerance, motion.limits);
-        options.gap = GAP;
-        let found = smooth::plan_for_arm(&poses, &options, &arm).ok()??;
-        let course = found
-            .spare
-            .zip(direction)
-            .map(|(course, direction)| NullMotion::given(direction, move |time| course.at(time)));
-        let path = SmoothPath::new(found.plan, motion.tolerance, &poses);
-        let followed = self.joints_on(path, start, course.as_ref()).ok()?;
-        let along = self.on(&followed, motion, (start, trajectory.duration()));
-        let found = along.ok()?.planned;
-        let eased = N <= 6 || self.ease_along(&found.trajectory) >= self.ease_along(trajectory);
-        eased.then_some(found)
+        options.gap = gap;
+        let smooth::ArmPlan { plan, spare, seed } =
+            smooth::plan_for_arm(&poses, &options, &arm).ok()??;
+        let spare = spare.zip(from.direction);
+        let spare = spare.map(|(spare, along)| NullMotion::given(along, move |t| spare.at(t)));
+        let path = SmoothPath::new(plan, motion.tolerance, &poses);
+        let followed = self.joints_on(path, start, spare.as_ref()).ok()?;
+        let course = Course {
+            direction: from.direction,
+            seed: Some(seed),
+            ..self.course_along(&followed)
+        };
+        Some(Found { followed, course })
     }
 
     /// The arm at joint positions, with the linear function `spare` of its joints as the spare coordinate.
@@ -141,22 +201,51 @@ impl<const N: usize> Planner<N> {
         })
     }
 
+    /// Where searches may go that begin at a known motion.
+    fn region(&self, known: &Trajectory<N>) -> Region {
+        let chain = self.chain();
+        let places: Vec<_> = places(known).collect();
+        let room = |j: usize| {
+            let room = |q: &SVector<f64, N>| (chain.upper()[j] - q[j]).min(q[j] - chain.lower()[j]);
+            places.iter().map(room).fold(ROOM, f64::min).max(0.0)
+        };
+        Region {
+            far: FAR,
+            ease: (N > 6).then(|| EASED * self.ease_along(known)),
+            room: (0..N).map(|j| if N > 6 { room(j) } else { 0.0 }).collect(),
+        }
+    }
+
     /// What the joints may do. With a spare joint they may be no nearer to limits than in the known motion, up to what counts as
     /// well inside.
-    fn joint_bounds(&self, known: &Trajectory<N>) -> Vec<JointBounds> {
+    fn joint_bounds(&self, region: &Region) -> Vec<JointBounds> {
         let (limits, chain) = (&self.limits, self.chain());
-        let places: Vec<_> = places(known).collect();
-        let joint = |j: usize| {
-            let [low, high] = [chain.lower()[j], chain.upper()[j]];
-            let room = |q: &SVector<f64, N>| (high - q[j]).min(q[j] - low);
-            let room = places.iter().map(room).fold(ROOM, f64::min);
-            let room = if N > 6 { room.max(0.0) } else { 0.0 };
-            JointBounds {
-                position: [low + room, high - room],
-                rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
-            }
+        let joint = |(j, room): (usize, &f64)| JointBounds {
+            position: [chain.lower()[j] + room, chain.upper()[j] - room],
+            rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
         };
-        (0..N).map(joint).collect()
+        region.room.iter().enumerate().map(joint).collect()
+    }
+
+    /// Whether a motion has the ease that it must have.
+    fn is_eased(&self, trajectory: &Trajectory<N>, region: &Region) -> bool {
+        let least = region.ease;
+        least.is_none_or(|least| self.ease_along(trajectory) >= least)
+    }
+
+    /// The same; if not, the joints stay farther from their limits from now on, by what was missing.
+    fn is_admitted(&self, trajectory: &Trajectory<N>, region: &mut Region) -> bool {
+        let Some(least) = region.ease else {
+            return true;
+        };
+        let missing = least - self.ease_along(trajectory);
+        if missing > 0.0 {
+            region
+                .room
+                .iter_mut()
+                .for_each(|room| *room += ROOM * missing);
+        }
+        missing <= 0.0
     }
 
     /// The least ease along a motion.

@@ -2,6 +2,8 @@
 
 use nalgebra::Isometry3;
 
+use super::seed::Seed;
+
 /// What one joint may do; all finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointBounds {
@@ -44,9 +46,16 @@ pub struct ArmMotion<'a> {
     pub passes: &'a [f64],
     /// What the joints may do.
     pub bounds: &'a [JointBounds],
-    /// For an arm with a joint more than the tool needs, by how much the spare coordinate may differ from that of this motion:
-    /// farther away the joints are others than to first order.
-    pub spare: Option<f64>,
+    /// By how much each joint may differ from this motion (rad or m): farther away the joints are others than to first order.
+    pub far: f64,
+    /// Whether the arm has a joint more than the tool needs, and the states a spare coordinate.
+    pub has_spare: bool,
+    /// Whether the plan is no more than the known motion of a further search: it may exceed the tolerances and the corridor by a little, as
+    /// its certificate then says.
+    pub rough: bool,
+    /// Where the search of the plan ended that this motion follows in the time of the tool, if it does: the next goes on from there. Of
+    /// a plan for the same poses.
+    pub onward: Option<&'a Seed>,
 }
 
 impl std::fmt::Debug for ArmMotion<'_> {
@@ -55,7 +64,9 @@ impl std::fmt::Debug for ArmMotion<'_> {
             .field("duration", &self.duration)
             .field("passes", &self.passes)
             .field("bounds", &self.bounds)
-            .field("spare", &self.spare)
+            .field("far", &self.far)
+            .field("has_spare", &self.has_spare)
+            .field("rough", &self.rough)
             .finish_non_exhaustive()
     }
 }

@@ -23,13 +23,20 @@ const EFFORT: Effort = Effort {
     gap: f64::INFINITY,
     most: f64::INFINITY,
     onward: false,
+    aimed: 1e-4,
 };
 
-/// The effort of a search for an arm, which ends at a gap to its optimum.
-pub(super) fn arm_effort(gap: f64) -> Effort {
+/// Steps after which a search for an arm is given up that goes on where another ended, and is still not inside of its bounds.
+const ONWARD: usize = 30;
+
+/// The effort of a search for an arm, which ends at a gap to its optimum, with the poses seen so far beside their vertices, in
+/// radii of their balls; it may go on where another ended.
+pub(super) fn arm_effort(gap: f64, aimed: f64, onward: bool) -> Effort {
     Effort {
         spread: None,
         gap,
+        aimed,
+        search: if onward { ONWARD } else { EFFORT.search },
         ..EFFORT
     }
 }

@@ -3,21 +3,28 @@
 use nalgebra::Isometry3;
 
 use super::arm::ArmMotion;
-use super::certificate::certify_slowed;
+use super::certificate::{Certificate, certify_slowed};
 use super::choose::{SLOWED, arm_effort, narrow};
-use super::crossing::RESOLUTION;
+use super::crossing::{Crossing, RESOLUTION};
 use super::lower_bound::lower_bound;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
-use super::spline::{self, Request, power};
+use super::seed::Seed;
+use super::spline::{self, Effort, Found, Request, power};
 use super::{exact_stop, method::Method, motion::Motion};
 use crate::poly::quartic;
 
-/// Searches, each with bounds narrowed by what the motion before exceeded.
+/// Searches, each with bounds narrowed by what the motion before exceeded. A rough one, or one that goes on, is done once: it is
+/// soon followed by another, or has a motion to fall back on.
 const ATTEMPTS: usize = 3;
 
-/// Share of the angular tolerance that a search uses: it ends before the poses are seen exactly where it has them.
-const TURNED: f64 = 0.995;
+/// Share of the angular tolerance that a search uses, and by how much of it a pose may then be seen elsewhere than where the
+/// search has it.
+const TURNED: f64 = 0.98;
+const AIMED: f64 = 0.015;
+
+/// By how much a rough plan may exceed the corridor and the tolerances.
+const ROUGHLY: f64 = 1.1;
 
 /// How the spare coordinate of an arm changes along a [`SmoothPlan`]: a uniform spline of degree four, from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,13 +55,16 @@ pub struct ArmPlan {
     pub plan: SmoothPlan,
     /// How the spare coordinate of the arm changes along it, if the arm has one.
     pub spare: Option<SpareSpline>,
+    /// Where its search ended.
+    pub seed: Seed,
 }
 
 /// Plans a motion through `poses` that is about as fast as the joints of an arm allow, near a motion of the arm that is known.
 ///
 /// The tool keeps its limits, tolerances and corridor, which the certificate of the plan says. The joints are looked at to first order from
-/// where they are in the known motion: the caller follows the plan with the joints and times them. A motion from there may be
-/// the known one of a further search. [`SmoothOptions::gap`] says how near to the optimum a search ends. `None` where nothing is found that is
+/// where they are in the known motion: the caller follows the plan with the joints and times them. The joints along a plan may be
+/// the known motion of a further search, which goes on where that of the plan ended ([`ArmMotion::onward`]); all but the last of
+/// such searches may be [rough](ArmMotion::rough). [`SmoothOptions::gap`] says how near to the optimum a search ends. `None` where nothing is found that is
 /// certified.
 ///
 /// # Errors
@@ -86,7 +96,10 @@ pub struct ArmPlan {
 ///     at: &at,
 ///     passes: &[2.0 * tool.crossings()[0].time],
 ///     bounds: &[bounds; 3],
-///     spare: None,
+///     far: 1.0,
+///     has_spare: false,
+///     rough: false,
+///     onward: None,
 /// };
 /// let found = smooth::plan_for_arm(&poses, &options, &arm)?.unwrap();
 /// assert!(found.plan.certificate().holds());
@@ -115,7 +128,9 @@ fn fits(arm: &ArmMotion<'_>, poses: &[Isometry3<f64>]) -> bool {
         rates && all.into_iter().all(|x| x.is_finite())
     });
     let passes = arm.passes.len() + 2 == poses.len();
-    finite && passes && !arm.bounds.is_empty() && arm.duration > 0.0 && arm.duration.is_finite()
+    let numbers = [arm.duration, arm.far];
+    let numbers = numbers.iter().all(|x| *x > 0.0 && x.is_finite());
+    finite && passes && numbers && !arm.bounds.is_empty()
 }
 
 /// The first motion of some searches that holds.
@@ -126,33 +141,57 @@ fn searched(
 ) -> Option<ArmPlan> {
     let mut inner = options.clone();
     inner.angular_tolerance = Some(TURNED * options.angular_tolerance());
-    for _ in 0..ATTEMPTS {
+    let once = arm.rough || arm.onward.is_some();
+    for _ in 0..if once { 1 } else { ATTEMPTS } {
         let request = Request {
             poses,
             options: &inner,
             moving: None,
             finish: None,
-            effort: arm_effort(options.gap),
+            effort: effort(options, arm),
             coupled: true,
             known: None,
             arm: Some(arm),
         };
         let turns = request.moves()[1];
-        let (mut spans, control) = spline::plan_for_arm(&request)?;
+        let Found {
+            mut spans,
+            spare,
+            mut seed,
+        } = spline::plan_for_arm(&request)?;
         let whole = certify_slowed(&mut spans, (poses, false), options, SLOWED);
-        if !whole.0.holds() {
+        let enough = whole.0.holds() || arm.rough && is_rough(&whole);
+        if !enough {
             narrow(&mut inner, &whole.0, &whole.1, turns);
             continue;
         }
-        let spare = arm.spare.map(|_| SpareSpline {
-            spacing: spans.last().map_or(0.0, |span| span.end()) / spans.len() as f64,
-            control,
+        // It may have been slowed down.
+        let spacing = spans.last()?.end() / spans.len() as f64;
+        seed.spacing = spacing;
+        let spare = arm.has_spare.then_some(SpareSpline {
+            control: spare,
+            spacing,
         });
         let stop = exact_stop::duration(poses, &options.limits);
         let motion = Motion::new(spans, Method::Spline);
         let mut plan = SmoothPlan::new(poses, motion, whole, stop);
         plan.certificate.lower_bound = lower_bound(poses, options);
-        return Some(ArmPlan { plan, spare });
+        return Some(ArmPlan { plan, spare, seed });
     }
     None
+}
+
+/// How far a search goes.
+fn effort(options: &SmoothOptions, arm: &ArmMotion<'_>) -> Effort {
+    let aimed = if arm.rough { f64::INFINITY } else { AIMED };
+    arm_effort(options.gap, aimed, arm.onward.is_some())
+}
+
+/// Whether a motion is nearly one that holds.
+fn is_rough((certificate, crossings): &(Certificate, Vec<Crossing>)) -> bool {
+    let near = |crossing: &Crossing| {
+        crossing.deviation <= ROUGHLY * crossing.tolerance
+            && crossing.angle <= ROUGHLY * crossing.angular_tolerance
+    };
+    certificate.corridor.ratio <= ROUGHLY && crossings.iter().all(near)
 }

@@ -11,6 +11,7 @@ use super::joint::{Joint, dot};
 use super::problem::{Point, Problem, ways};
 use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};
+use crate::smooth::seed::Seed;
 
 /// Spans for each leg and the least number of them, the same where the tool turns, for which each costs several times as
 /// much, and the most of both.
@@ -18,15 +19,12 @@ const SPANS: [usize; 2] = [30, 100];
 const TURNING: [usize; 2] = [8, 40];
 const MOST: usize = 400;
 
-/// A bound that holds nothing.
-const UNLIMITED: f64 = 1e6;
-
 /// Knots that pass before the motion begins and after it has ended.
 const REST: usize = 3;
 /// Control points at either end that do not move.
 const FIXED: usize = 4;
 /// A joint that is beyond its range, or nearer to its end than this (rad, m), may stay there.
-const AT_END: f64 = 1e-2;
+const AT_END: f64 = 1e-3;
 
 /// What the arm has at the control points.
 struct Sampled {
@@ -68,6 +66,9 @@ impl Sampled {
     }
 }
 
+/// A first iterate, the control points that a spline through its places has, and the arm there.
+type Begin<const D: usize> = (Point<D>, Vec<[f64; D]>, Vec<ArmState>);
+
 impl Task<'_> {
     /// The first iterate along the motion of an arm, whose joints the problem gets; its vertices are where that motion sees
     /// the poses.
@@ -77,6 +78,26 @@ impl Task<'_> {
         arm: &ArmMotion<'_>,
         used: [bool; 2],
     ) -> Option<Point<D>> {
+        let seed = arm
+            .onward
+            .filter(|seed| seed.fits(D, problem.vertices.len()));
+        let (point, places, states) = match seed {
+            Some(seed) => self.onward(problem, arm, seed)?,
+            None => self.sampled(problem, arm, used)?,
+        };
+        problem.joints = (0..arm.bounds.len())
+            .map(|j| self.joint(&places, (arm, &states), (j, used)))
+            .collect();
+        Some(point)
+    }
+
+    /// An iterate through the places of an arm at even times, and the arm there.
+    fn sampled<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        arm: &ArmMotion<'_>,
+        used: [bool; 2],
+    ) -> Option<Begin<D>> {
         let sampled = Sampled::new(arm, (self.poses.len() - 1, Problem::<D>::TURNS))?;
         let states = &sampled.states;
         problem.scale = sampled.spacing;
@@ -114,13 +135,42 @@ impl Task<'_> {
             point.control[before][spare] = end[spare];
         }
         point.end_spare();
-        problem.joints = (0..arm.bounds.len())
-            .map(|j| self.joint(&point, (arm, states), (j, used)))
-            .collect();
-        problem
-            .joints
-            .extend(spare.zip(arm.spare).map(|spare| near(&point, spare)));
-        Some(point)
+        let places = point.control.clone();
+        Some((point, places, sampled.states))
+    }
+
+    /// The iterate with which a search ended, and the arm at its control points; the vertices are where it sees the poses.
+    fn onward<const D: usize>(
+        &self,
+        problem: &mut Problem<D>,
+        arm: &ArmMotion<'_>,
+        seed: &Seed,
+    ) -> Option<Begin<D>> {
+        let point = Point {
+            control: Seed::used(&seed.control),
+            z: 1.0,
+            crossings: seed.crossings.clone(),
+        };
+        problem.scale = seed.spacing;
+        problem.vertices = Seed::used(&seed.vertices);
+        if Problem::<D>::TURNS {
+            let aims = self.aims(problem, &point);
+            let last = problem.vertices.len() - 1;
+            problem.vertices[1..last].copy_from_slice(&aims);
+        }
+        problem.ways = ways(&problem.vertices);
+        if let Some(spare) = Problem::<D>::SPARE {
+            problem.start[0][spare] = point.control[0][spare];
+        }
+        let all = |state: &ArmState| state.joints.len() == arm.bounds.len();
+        let state = |k: usize| (arm.at)(seed.time(k).clamp(0.0, arm.duration)).filter(all);
+        let states = (0..point.control.len()).map(state).collect::<Option<_>>()?;
+        let place = |k: usize| point.at((k as f64 - 1.5).clamp(0.0, point.spans() as f64))[0];
+        let mut places: Vec<[f64; D]> = (0..point.control.len()).map(place).collect();
+        for d in 0..D {
+            sharpen(&mut places, |c| &mut c[d]);
+        }
+        Some((point, places, states))
     }
 
     /// Moves the vertices of orientations to where the motion of an arm sees the poses.
@@ -144,10 +194,10 @@ impl Task<'_> {
         Some(())
     }
 
-    /// How joint `j` moves with the control points of the first iterate.
+    /// How joint `j` moves with the control points of the first iterate, which are at these places.
     fn joint<const D: usize>(
         &self,
-        point: &Point<D>,
+        places: &[[f64; D]],
         (arm, states): (&ArmMotion<'_>, &[ArmState]),
         (j, used): (usize, [bool; 2]),
     ) -> Joint<D> {
@@ -168,31 +218,34 @@ impl Task<'_> {
                 change
             })
             .collect();
-        let all = positions.iter().zip(&changes).zip(&point.control);
+        let all = positions.iter().zip(&changes).zip(places);
         let base = all.map(|((q, change), c)| q - dot(change, c));
         let bounds = &arm.bounds[j];
         let [low, high] = bounds.position;
         let least = positions.iter().copied().fold(f64::INFINITY, f64::min);
         let most = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (low, high) = (low.min(least - AT_END), high.max(most + AT_END));
+        let range = |q: &f64| {
+            let (low, high) = (low.max(q - arm.far), high.min(q + arm.far));
+            [0.5 * (low + high), 0.5 * (high - low)]
+        };
         Joint {
             caps: bounds.rates,
-            range: [0.5 * (low + high), 0.5 * (high - low)],
+            range: positions.iter().map(range).collect(),
             base: base.collect(),
             changes,
         }
     }
 }
 
-/// The spare coordinate as one more joint, whose positions are by how much it is off the first iterate.
-fn near<const D: usize>(point: &Point<D>, (spare, most): (usize, f64)) -> Joint<D> {
-    let mut change = [0.0; D];
-    change[spare] = 1.0;
-    Joint {
-        caps: [UNLIMITED; 3],
-        range: [0.0, most],
-        base: point.control.iter().map(|c| -c[spare]).collect(),
-        changes: vec![change; point.control.len()],
+/// Where a search has ended.
+pub(super) fn seed<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Seed {
+    Seed {
+        coordinates: D,
+        control: Seed::widened(&point.control),
+        vertices: Seed::widened(&problem.vertices),
+        crossings: point.crossings.clone(),
+        spacing: problem.spacing(point.z),
     }
 }
 

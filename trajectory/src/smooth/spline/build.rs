@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use super::arm::seed;
 use super::basis;
 use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
@@ -13,6 +14,7 @@ use super::turns::turns;
 use crate::ToolPoint;
 use crate::line::body_turn;
 use crate::smooth::options::SmoothOptions;
+use crate::smooth::seed::Seed;
 use crate::smooth::span::Span;
 
 /// The inner tolerance: a little smaller, so that rounding in sampling does not exceed it.
@@ -60,13 +62,13 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
     };
-    found.map(|(spans, _)| spans)
+    found.map(|found| found.spans)
 }
 
-/// The same for an arm, between rests, and the control points of its spare coordinate; empty if it has none.
+/// The same for an arm, between rests.
 pub(crate) fn plan_for_arm(request: &Request<'_>) -> Option<Found> {
     let task = Task::new(request);
-    match (request.moves(), request.arm?.spare.is_some()) {
+    match (request.moves(), request.arm?.has_spare) {
         ([true, false], false) => task.run::<3, 20>([true, false]),
         ([true, false], true) => task.run::<4, 24>([true, false]),
         ([false, true], false) => task.run::<3, 20>([false, true]),
@@ -89,8 +91,13 @@ fn unroll(poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
     result
 }
 
-/// Spans, and the control points of a spare coordinate.
-type Found = (Vec<Span>, Vec<f64>);
+/// What a search ends with.
+pub(crate) struct Found {
+    pub(crate) spans: Vec<Span>,
+    /// Control points of a spare coordinate; empty without one.
+    pub(crate) spare: Vec<f64>,
+    pub(crate) seed: Seed,
+}
 
 pub(super) struct Task<'a> {
     request: &'a Request<'a>,
@@ -244,7 +251,11 @@ impl<'a> Task<'a> {
             .control
             .iter()
             .filter_map(|c| Some(c[Problem::<D>::SPARE?]));
-        Some((self.spans(&problem, &point, used), spare.collect()))
+        Some(Found {
+            spans: self.spans(&problem, &point, used),
+            spare: spare.collect(),
+            seed: seed(&problem, &point),
+        })
     }
 
     /// The first iterate of a problem, and how far and how long the search from there goes.

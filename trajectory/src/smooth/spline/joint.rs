@@ -22,8 +22,8 @@ pub(super) const BOUNDS: usize = 4;
 pub(crate) struct Joint<const D: usize> {
     /// Greatest speed, acceleration and jerk.
     pub(super) caps: [f64; 3],
-    /// Middle of its positions, and how far it may be from there.
-    pub(super) range: [f64; 2],
+    /// Middle of its positions at each control point, and how far it may be from there.
+    pub(super) range: Vec<[f64; 2]>,
     /// Its position where the coordinates of a control point are 0, and how it changes with each, by control point.
     pub(super) base: Vec<f64>,
     pub(super) changes: Vec<[f64; D]>,
@@ -62,27 +62,29 @@ impl<const D: usize> Joint<D> {
     ) -> Option<f64> {
         let positions = self.positions(control);
         let count = control.len();
-        let [middle, half] = self.range;
         let bounds = [1, 2, 3].map(|k| (self.caps[k - 1] * h.powi(k as i32)).powi(2));
-        let mut squares =
-            [half * half, bounds[0], bounds[1], bounds[2]].map(|b| F4::splat(simd, b));
+        let squares = bounds.map(|b| F4::splat(simd, b));
         for k in (0..count).step_by(LANES) {
             let near = &positions[k..];
             let (q0, q1) = (F4::load(simd, near), F4::load(simd, &near[1..]));
             let (q2, q3) = (F4::load(simd, &near[2..]), F4::load(simd, &near[3..]));
             let (first, second, third) = (q1 - q0, q2 - q1, q3 - q2);
             let (bend, next) = (second - first, third - second);
-            let away = q0 - F4::splat(simd, middle);
             // The last position counts once.
-            let inside = |i: usize| {
-                if k + i < count {
-                    half * half
-                } else {
-                    f64::INFINITY
-                }
+            let range = |i: usize| match self.range.get(k + i) {
+                Some([middle, half]) => [*middle, half * half],
+                None => [0.0, f64::INFINITY],
             };
-            squares[0] = F4::new(simd, std::array::from_fn(inside));
-            for (value, bound) in [away, first, bend, next - bend].into_iter().zip(squares) {
+            let [middle, half] =
+                [0, 1].map(|m| F4::new(simd, std::array::from_fn(|i| range(i)[m])));
+            let [speed, acceleration, jerk] = squares;
+            let all = [
+                (q0 - middle, half),
+                (first, speed),
+                (bend, acceleration),
+                (next - bend, jerk),
+            ];
+            for (value, bound) in all {
                 if !take(value * value, bound) {
                     return None;
                 }

@@ -29,11 +29,11 @@ impl<const D: usize> Joint<D> {
             curves: vec![[0.0; WIDE]; count],
             along_z: [0.0; 2],
         };
-        let [middle, half] = self.range;
-        for (k, q) in positions[..count].iter().enumerate() {
-            let slope = 2.0 * (q - middle) / (half * half - (q - middle).powi(2));
+        for (k, (q, [middle, half])) in positions.iter().zip(&self.range).enumerate() {
+            let (away, inverse) = (q - middle, 1.0 / (half * half - (q - middle).powi(2)));
+            let slope = 2.0 * away * inverse;
             terms.slopes[k] = slope;
-            terms.curves[k][0] = slope * slope + 2.0 / (half * half - (q - middle).powi(2));
+            terms.curves[k][0] = slope * slope + 2.0 * inverse;
         }
         let h = problem.spacing(point.z);
         let bound = |k: usize| (self.caps[k - 1] * h.powi(k as i32), k as f64 / 3.0);
@@ -209,7 +209,7 @@ mod tests {
         let count = point.control.len();
         let joint = |j: usize| Joint {
             caps: [0.5, 5.0, 100.0],
-            range: [0.0, 1.0],
+            range: vec![[0.0, 1.0]; count],
             base: (0..count).map(|k| 1e-4 * number(k, j)).collect(),
             changes: (0..count)
                 .map(|k| std::array::from_fn(|d| number(j, d) + 1e-3 * number(k, d)))

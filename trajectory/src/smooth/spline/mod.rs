@@ -34,7 +34,7 @@ mod turns;
 
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
-pub(crate) use build::{plan, plan_for_arm};
+pub(crate) use build::{Found, plan, plan_for_arm};
 pub(crate) use meet::meet_spans;
 pub(crate) use request::{Moving, Request};
 pub(crate) use solve::Effort;

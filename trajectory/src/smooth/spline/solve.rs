@@ -23,6 +23,8 @@ pub(crate) struct Effort {
     pub(crate) most: f64,
     /// Whether a search between two ends in motion goes on where they hold it.
     pub(crate) onward: bool,
+    /// By how much a pose may be seen beside its vertex at the end, in radii of its ball.
+    pub(crate) aimed: f64,
 }
 
 /// Growth of the weight on `z` at each centre, and the square of the Newton decrement at one.
@@ -90,7 +92,7 @@ impl Pace {
                 low: LOW,
                 keep: KEEP,
                 rounds: ROUNDS,
-                near: if effort.gap > ROUGH { 3.0 } else { 0.1 },
+                near: if effort.gap >= ROUGH { 3.0 } else { 0.1 },
             };
         }
         // Between two ends in motion the passes of a sharp corner wander, and an iterate that comes close
@@ -175,7 +177,7 @@ pub(crate) fn solve<const D: usize, const B: usize>(
             return None;
         }
         if iteration.is_at_its_end() {
-            let turned = moved && missed > AIMED;
+            let turned = moved && missed > iteration.effort.aimed;
             if turned || !done && iteration.goes_on_past_ends() {
                 continue;
             }
@@ -353,10 +355,8 @@ impl Bounds {
 /// Where the motion of an iterate sees the inner poses.
 pub(crate) type Aims<'a, const D: usize> = &'a dyn Fn(&Problem<D>, &Point<D>) -> Vec<[f64; D]>;
 
-/// Steps from one look at where the poses are seen to the next, and by how much a pose may be seen beside its vertex at
-/// the end, in radii of its ball.
+/// Steps from one look at where the poses are seen to the next.
 const AIMING: usize = 4;
-const AIMED: f64 = 1e-4;
 
 /// Share of each slack that moved vertices must leave.
 const LEAVE: f64 = 0.3;
