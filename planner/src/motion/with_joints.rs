@@ -128,14 +128,11 @@ impl<const N: usize> Planner<N> {
                 sure = holds.then_some(found.followed).or(sure);
             }
             let (saved, hoped) = (before - course.time, before - foretold);
-            if saved > GAIN * before {
-                if region.far >= FAR && course.time < (1.0 + GAIN) * foretold {
-                    break;
-                }
-            } else if hoped < 2.0 * GAIN * before || SHRINK * region.far < NOWHERE {
+            let gains = saved > GAIN * before;
+            if !gains && (hoped < 2.0 * GAIN * before || SHRINK * region.far < NOWHERE) {
                 break;
             }
-            if saved <= GAIN * before || saved < POOR * hoped {
+            if !gains || saved < POOR * hoped {
                 region.far *= SHRINK;
             }
         }

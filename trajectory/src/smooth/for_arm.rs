@@ -14,8 +14,7 @@ use super::spline::{self, Effort, Found, Request, power};
 use super::{exact_stop, method::Method, motion::Motion};
 use crate::poly::quartic;
 
-/// Searches, each with bounds narrowed by what the motion before exceeded. A rough one, or one that goes on, is done once: it is
-/// soon followed by another, or has a motion to fall back on.
+/// Searches, each with bounds narrowed by what the motion before exceeded. A rough one is done once: another follows it.
 const ATTEMPTS: usize = 3;
 
 /// Share of the angular tolerance that a search uses, and by how much of it a pose may then be seen elsewhere than where the
@@ -141,8 +140,7 @@ fn searched(
 ) -> Option<ArmPlan> {
     let mut inner = options.clone();
     inner.angular_tolerance = Some(TURNED * options.angular_tolerance());
-    let once = arm.rough || arm.onward.is_some();
-    for _ in 0..if once { 1 } else { ATTEMPTS } {
+    for _ in 0..if arm.rough { 1 } else { ATTEMPTS } {
         let request = Request {
             poses,
             options: &inner,
