@@ -173,6 +173,17 @@ impl Task<'_> {
         Some((point, places, states))
     }
 
+    /// Where a search has ended.
+    pub(super) fn seed<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Seed {
+        Seed {
+            coordinates: D,
+            control: Seed::widened(&point.control),
+            vertices: Seed::widened(&problem.vertices),
+            crossings: point.crossings.clone(),
+            spacing: problem.spacing(point.z),
+        }
+    }
+
     /// Moves the vertices of orientations to where the motion of an arm sees the poses.
     fn see_poses<const D: usize>(
         &self,
@@ -235,17 +246,6 @@ impl Task<'_> {
             base: base.collect(),
             changes,
         }
-    }
-}
-
-/// Where a search has ended.
-pub(super) fn seed<const D: usize>(problem: &Problem<D>, point: &Point<D>) -> Seed {
-    Seed {
-        coordinates: D,
-        control: Seed::widened(&point.control),
-        vertices: Seed::widened(&problem.vertices),
-        crossings: point.crossings.clone(),
-        spacing: problem.spacing(point.z),
     }
 }
 

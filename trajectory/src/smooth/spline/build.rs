@@ -2,7 +2,6 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::arm::seed;
 use super::basis;
 use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
@@ -254,7 +253,7 @@ impl<'a> Task<'a> {
         Some(Found {
             spans: self.spans(&problem, &point, used),
             spare: spare.collect(),
-            seed: seed(&problem, &point),
+            seed: Self::seed(&problem, &point),
         })
     }
 
