@@ -4,6 +4,7 @@
 
 use nalgebra::{Isometry3, SVector};
 
+use super::course::Course;
 use super::smooth::{Along, Search};
 use super::smooth_joints::Followed;
 use super::{PlannedMove, Planner};
@@ -70,7 +71,7 @@ impl<const N: usize> Planner<N> {
         // The time of the joints need not be known exactly.
         let course = self.course_along(&curve);
         let about = course.time;
-        if about <= RULED * curve.path.plan.duration() {
+        if !is_ruled(about, curve.path.plan.duration()) {
             return None;
         }
         let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
@@ -105,8 +106,7 @@ impl<const N: usize> Planner<N> {
             first
         };
         let planned = self.for_the_joints(motion, start, (first, curve));
-        let course = self.course_of(&planned);
-        let found = self.with_joints(motion, start, course);
+        let found = self.with_joints(motion, start, Course::of(&planned));
         found.unwrap_or(planned)
     }
 
@@ -132,7 +132,7 @@ impl<const N: usize> Planner<N> {
         (first, curve): (Along<N>, &Followed<N>),
     ) -> PlannedMove<N> {
         let time = first.planned.trajectory.duration();
-        if !is_ruled(&first) || motion.tolerance <= 0.0 || first.spans > CHEAP {
+        if !is_ruled(time, first.tool) || motion.tolerance <= 0.0 || first.spans > CHEAP {
             return first.planned;
         }
         let least = self.least_along(curve, motion).unwrap_or(time);
@@ -237,7 +237,7 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// Whether the joints rule a motion.
-fn is_ruled<const N: usize>(along: &Along<N>) -> bool {
-    along.planned.trajectory.duration() > RULED * along.tool
+/// Whether the joints rule a motion that takes so long, from how long the tool alone would.
+fn is_ruled(time: f64, tool: f64) -> bool {
+    time > RULED * tool
 }

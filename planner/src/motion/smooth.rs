@@ -7,6 +7,7 @@ use trajectory::smooth::RestCause;
 use trajectory::{Line, Trajectory};
 
 use super::cartesian::{Way, is_still};
+use super::course::Course;
 use super::draft::{Crossing, Draft};
 use super::smooth_joints::{Followed, HELPED};
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
@@ -95,7 +96,7 @@ impl<const N: usize> Planner<N> {
             }
         };
         let slower = planned.trajectory.duration() > HELPED * least;
-        let found = slower.then(|| self.with_joints(motion, start, self.course_of(&planned)));
+        let found = slower.then(|| self.with_joints(motion, start, Course::of(&planned)));
         let planned = found.flatten().unwrap_or(planned);
         self.or_straight(motion, start, planned)
     }

@@ -64,11 +64,14 @@ struct Found<const N: usize> {
     course: Course<N>,
 }
 
-/// The search of a move.
+/// What is the same in all searches of a move.
 #[derive(Clone, Copy)]
 struct Task<'a, const N: usize> {
     motion: &'a Move,
     start: &'a SVector<f64, N>,
+    /// The linear function of the joints that says where a spare joint is: the direction in which it is free in the middle of the
+    /// known motion.
+    spare: Option<SVector<f64, N>>,
 }
 
 /// Joint positions along a motion, its ends with them.
@@ -90,7 +93,13 @@ impl<const N: usize> Planner<N> {
         if !has_inverse || !POSES.contains(&motion.poses.len()) {
             return None;
         }
-        let (task, most) = (Task { motion, start }, known.time);
+        let (most, middle) = (known.time, 0.5 * known.trajectory.duration());
+        let middle = known.trajectory.sample(middle).position;
+        let task = Task {
+            motion,
+            start,
+            spare: follow::spare_direction(self.chain(), &middle),
+        };
         let mut region = self.region(&known.trajectory);
         let (course, sure) = self.fastest_course(task, known, &mut region);
         course.seed.as_ref()?;
@@ -100,7 +109,8 @@ impl<const N: usize> Planner<N> {
         all.find_map(|followed| {
             let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
             let trajectory = &planned.trajectory;
-            let taken = trajectory.duration() < most && self.is_eased(trajectory, &region);
+            let eased = self.missing_ease(trajectory, &region) <= 0.0;
+            let taken = trajectory.duration() < most && eased;
             taken.then_some(planned)
         })
     }
@@ -142,19 +152,20 @@ impl<const N: usize> Planner<N> {
     /// The joints along the plan of a search that begins at a course and ends at a gap to its optimum.
     fn searched(
         &self,
-        Task { motion, start }: Task<'_, N>,
+        task: Task<'_, N>,
         from: &Course<N>,
         (region, gap): (&Region, f64),
     ) -> Option<Found<N>> {
-        let spare = from.direction.unwrap_or_else(SVector::zeros);
-        let at = |time: f64| self.state(&from.trajectory.sample(time).position, &spare);
+        let (motion, start) = (task.motion, task.start);
+        let along = task.spare.unwrap_or_else(SVector::zeros);
+        let at = |time: f64| self.state(&from.trajectory.sample(time).position, &along);
         let arm = ArmMotion {
             duration: from.trajectory.duration(),
             at: &at,
             passes: &from.passes,
             bounds: &self.joint_bounds(region),
             far: region.far,
-            has_spare: from.direction.is_some(),
+            has_spare: task.spare.is_some(),
             rough: gap > GAP,
             onward: from.seed.as_ref(),
         };
@@ -163,12 +174,10 @@ impl<const N: usize> Planner<N> {
         options.gap = gap;
         let smooth::ArmPlan { plan, spare, seed } =
             smooth::plan_for_arm(&poses, &options, &arm).ok()??;
-        let spare = spare.zip(from.direction);
-        let spare = spare.map(|(spare, along)| NullMotion::given(along, move |t| spare.at(t)));
+        let spare = spare.map(|spare| NullMotion::given(along, move |t| spare.at(t)));
         let path = SmoothPath::new(plan, motion.tolerance, &poses);
         let followed = self.joints_on(path, start, spare.as_ref()).ok()?;
         let course = Course {
-            direction: from.direction,
             seed: Some(seed),
             ..self.course_along(&followed)
         };
@@ -224,23 +233,18 @@ impl<const N: usize> Planner<N> {
         region.room.iter().enumerate().map(joint).collect()
     }
 
-    /// Whether a motion has the ease that it must have.
-    fn is_eased(&self, trajectory: &Trajectory<N>, region: &Region) -> bool {
+    /// How much ease a motion lacks; not above 0 where it has enough.
+    fn missing_ease(&self, trajectory: &Trajectory<N>, region: &Region) -> f64 {
         let least = region.ease;
-        least.is_none_or(|least| self.ease_along(trajectory) >= least)
+        least.map_or(0.0, |least| least - self.ease_along(trajectory))
     }
 
-    /// The same; if not, the joints stay farther from their limits from now on, by what was missing.
+    /// Whether a motion has enough ease; if not, the joints stay farther from their limits from now on, by what was missing.
     fn is_admitted(&self, trajectory: &Trajectory<N>, region: &mut Region) -> bool {
-        let Some(least) = region.ease else {
-            return true;
-        };
-        let missing = least - self.ease_along(trajectory);
+        let missing = self.missing_ease(trajectory, region);
         if missing > 0.0 {
-            region
-                .room
-                .iter_mut()
-                .for_each(|room| *room += ROOM * missing);
+            let rooms = region.room.iter_mut();
+            rooms.for_each(|room| *room += ROOM * missing);
         }
         missing <= 0.0
     }

@@ -58,6 +58,14 @@ pub struct ArmMotion<'a> {
     pub onward: Option<&'a Seed>,
 }
 
+impl ArmMotion<'_> {
+    /// The arm at the time nearest to `time` (s) that the motion has, with all joints.
+    pub(super) fn state(&self, time: f64) -> Option<ArmState> {
+        let state = (self.at)(time.clamp(0.0, self.duration));
+        state.filter(|state| state.joints.len() == self.bounds.len())
+    }
+}
+
 impl std::fmt::Debug for ArmMotion<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("ArmMotion")

@@ -154,7 +154,6 @@ fn searched(
         let turns = request.moves()[1];
         let Found {
             mut spans,
-            spare,
             mut seed,
         } = spline::plan_for_arm(&request)?;
         let whole = certify_slowed(&mut spans, (poses, false), options, SLOWED);
@@ -164,11 +163,10 @@ fn searched(
             continue;
         }
         // It may have been slowed down.
-        let spacing = spans.last()?.end() / spans.len() as f64;
-        seed.spacing = spacing;
-        let spare = arm.has_spare.then_some(SpareSpline {
-            control: spare,
-            spacing,
+        seed.spacing = spans.last()?.end() / spans.len() as f64;
+        let spare = arm.has_spare.then(|| SpareSpline {
+            control: seed.last_coordinate(),
+            spacing: seed.spacing,
         });
         let stop = exact_stop::duration(poses, &options.limits);
         let motion = Motion::new(spans, Method::Spline);

@@ -35,8 +35,9 @@ impl Seed {
         self.coordinates == coordinates && self.vertices.len() == poses
     }
 
-    /// The time at which a control point counts most, s.
-    pub(super) fn time(&self, k: usize) -> f64 {
-        (k as f64 - 1.5) * self.spacing
+    /// The last coordinate of the control points.
+    pub(super) fn last_coordinate(&self) -> Vec<f64> {
+        let last = self.coordinates - 1;
+        self.control.iter().map(|c| c[last]).collect()
     }
 }

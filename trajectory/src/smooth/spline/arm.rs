@@ -41,9 +41,7 @@ impl Sampled {
         let spans = (each * legs).clamp(fewest, MOST);
         let spacing = arm.duration / spans as f64;
         let time = |k: usize| (k as f64 - REST as f64) * spacing;
-        let all = |state: &ArmState| state.joints.len() == arm.bounds.len();
-        let state = |k: usize| (arm.at)(time(k).clamp(0.0, arm.duration)).filter(all);
-        let states = (0..=spans + 2 * REST).map(state);
+        let states = (0..=spans + 2 * REST).map(|k| arm.state(time(k)));
         let states: Vec<ArmState> = states.collect::<Option<_>>()?;
         let mut turns = vec![Vector3::zeros()];
         for pair in states.windows(2) {
@@ -162,11 +160,12 @@ impl Task<'_> {
         if let Some(spare) = Problem::<D>::SPARE {
             problem.start[0][spare] = point.control[0][spare];
         }
-        let all = |state: &ArmState| state.joints.len() == arm.bounds.len();
-        let state = |k: usize| (arm.at)(seed.time(k).clamp(0.0, arm.duration)).filter(all);
-        let states = (0..point.control.len()).map(state).collect::<Option<_>>()?;
-        let place = |k: usize| point.at((k as f64 - 1.5).clamp(0.0, point.spans() as f64))[0];
-        let mut places: Vec<[f64; D]> = (0..point.control.len()).map(place).collect();
+        // The times at which the control points count most, in knots.
+        let times = (0..point.control.len()).map(|k| k as f64 - 1.5);
+        let states = times.clone().map(|time| arm.state(time * seed.spacing));
+        let states = states.collect::<Option<_>>()?;
+        let place = |time: f64| point.at(time.clamp(0.0, point.spans() as f64))[0];
+        let mut places: Vec<[f64; D]> = times.map(place).collect();
         for d in 0..D {
             sharpen(&mut places, |c| &mut c[d]);
         }
@@ -196,7 +195,7 @@ impl Task<'_> {
         }
         let times = arm.passes.iter().chain([&arm.duration]);
         for (i, time) in times.enumerate() {
-            let pose = (arm.at)(*time)?.pose;
+            let pose = arm.state(*time)?.pose;
             let off = body_turn(&pose.rotation, &self.poses[i + 1].rotation);
             let seen = sampled.turn(*time) + off;
             problem.vertices[i + 1][Problem::<D>::LAST..][..3].copy_from_slice(seen.as_slice());

@@ -93,8 +93,6 @@ fn unroll(poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
 /// What a search ends with.
 pub(crate) struct Found {
     pub(crate) spans: Vec<Span>,
-    /// Control points of a spare coordinate; empty without one.
-    pub(crate) spare: Vec<f64>,
     pub(crate) seed: Seed,
 }
 
@@ -246,13 +244,8 @@ impl<'a> Task<'a> {
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
         let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
         solve::<D, B>(&mut problem, &mut point, effort, aims)?;
-        let spare = point
-            .control
-            .iter()
-            .filter_map(|c| Some(c[Problem::<D>::SPARE?]));
         Some(Found {
             spans: self.spans(&problem, &point, used),
-            spare: spare.collect(),
             seed: Self::seed(&problem, &point),
         })
     }
