@@ -2,11 +2,13 @@
 //!
 //! Such a curve is found by a short search on few knots, as it stays far from its bounds.
 
+use std::cmp::Ordering;
+
 use nalgebra::{Isometry3, SVector};
 
 use super::course::Course;
 use super::smooth::{Along, Search};
-use super::smooth_joints::Followed;
+use super::smooth_joints::{Followed, HELPED};
 use super::{PlannedMove, Planner};
 use crate::task::Move;
 
@@ -16,6 +18,8 @@ const RULED: f64 = 1.3;
 const FIRST_GAP: f64 = 0.05;
 /// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
 const ENOUGH: f64 = 0.95;
+/// The same where the first curve is the fastest one for the tool: there more can be saved.
+const MUCH: f64 = 0.8;
 /// Other curves tried then, each planned under a share of the linear and one of the angular limits; if the first of a pair
 /// is better than the other first one, the second is tried, too.
 const OTHERS: [[[f64; 2]; 2]; 2] = [[[1.0, 0.6], [1.0, 0.4]], [[0.7, 1.0], [0.6, 0.6]]];
@@ -67,47 +71,52 @@ impl<const N: usize> Planner<N> {
             gap: Some(FIRST_GAP),
             most: f64::INFINITY,
         };
-        let mut curve = self.curve(start, (motion, search), true).ok()?;
+        let curve = self.curve(start, (motion, search), true).ok()?;
         // The time of the joints need not be known exactly.
         let course = self.course_along(&curve);
         let about = course.time;
         if !is_ruled(about, curve.path.plan.duration()) {
             return None;
         }
-        let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
+        // A search with the joints finds the null-space motion, too.
         let found = self.with_joints(motion, start, course);
         let planned = match found {
-            Some(found) if time(&found) <= ENOUGH * about => found,
+            Some(found) if found.trajectory.duration() <= ENOUGH * about => found,
             found => {
-                // A search with the joints would have found the null-space motion, too.
-                curve.may_be_helped = false;
                 let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
-                curve.may_be_helped = N > 6;
-                let other = self.on_others(motion, start, (first, &curve));
-                let all = found.into_iter().chain([other]);
-                all.min_by(|a, b| time(a).total_cmp(&time(b)))?
+                let other = self.for_the_joints(motion, start, (first, &curve));
+                let next = self.with_joints(motion, start, Course::of(&other));
+                let all = found.into_iter().chain(next).chain([other]);
+                all.min_by(sooner)?
             }
         };
         let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
         (!rests).then_some(planned)
     }
 
-    /// The fastest motion of searches with the joints that begin at the fastest one along other curves.
-    fn on_others(
+    /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
+    /// one along others.
+    pub(super) fn for_the_arm(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
         (first, curve): (Along<N>, &Followed<N>),
     ) -> PlannedMove<N> {
-        let first = if curve.may_be_helped {
-            let helped = self.on(curve, motion, (start, f64::INFINITY));
-            helped.unwrap_or(first)
-        } else {
-            first
-        };
-        let planned = self.for_the_joints(motion, start, (first, curve));
-        let found = self.with_joints(motion, start, Course::of(&planned));
-        found.unwrap_or(planned)
+        let time = first.planned.trajectory.duration();
+        if time <= HELPED * first.tool {
+            return first.planned;
+        }
+        let found = self.with_joints(motion, start, Course::of(&first.planned));
+        match found {
+            Some(found) if found.trajectory.duration() <= MUCH * time => found,
+            found => {
+                let other = self.for_the_joints(motion, start, (first, curve));
+                let differs = other.trajectory.duration() < time;
+                let next = differs.then(|| self.with_joints(motion, start, Course::of(&other)));
+                let all = found.into_iter().chain(next.flatten());
+                all.fold(other, |a, b| if sooner(&b, &a).is_lt() { b } else { a })
+            }
+        }
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
@@ -125,7 +134,7 @@ impl<const N: usize> Planner<N> {
     /// The fastest of the motion found and of those along curves planned for less speed along or about,
     /// where the joints rule: the fastest curve of the tool is not the fastest one for the joints. Only where
     /// a curve is cheap to plan.
-    pub(super) fn for_the_joints(
+    fn for_the_joints(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
@@ -235,6 +244,12 @@ impl<const N: usize> Planner<N> {
         }
         best
     }
+}
+
+/// Which of two motions ends first.
+fn sooner<const N: usize>(a: &PlannedMove<N>, b: &PlannedMove<N>) -> Ordering {
+    let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
+    time(a).total_cmp(&time(b))
 }
 
 /// Whether the joints rule a motion that takes so long, from how long the tool alone would.

@@ -9,7 +9,7 @@ use trajectory::{Line, Trajectory};
 use super::cartesian::{Way, is_still};
 use super::course::Course;
 use super::draft::{Crossing, Draft};
-use super::smooth_joints::{Followed, HELPED};
+use super::smooth_joints::Followed;
 use super::{Blend, MotionError, PlannedMove, Planner, ROUNDING};
 use crate::task::{Move, Shape};
 
@@ -77,27 +77,21 @@ impl<const N: usize> Planner<N> {
         if let Some(rounder) = self.rounder(motion, start) {
             return self.or_straight(motion, start, rounder);
         }
-        // The least time, if the tool alone needs it.
-        let mut least = 0.0;
         let planned = match self.blended(motion, start, motion) {
-            Ok((first, curve)) => {
-                least = first.tool;
-                self.for_the_joints(motion, start, (first, &curve))
-            }
+            Ok((first, curve)) => self.for_the_arm(motion, start, (first, &curve)),
             Err(Failure { error, spans }) => {
                 let error = self.blamed(error, motion, start);
                 if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
                     return Err(error);
                 }
-                match self.instead(motion, start, spans) {
+                let other = match self.instead(motion, start, spans) {
                     Some(other) => other,
                     None => self.nearer(motion, start, error)?,
-                }
+                };
+                let found = self.with_joints(motion, start, Course::of(&other));
+                found.unwrap_or(other)
             }
         };
-        let slower = planned.trajectory.duration() > HELPED * least;
-        let found = slower.then(|| self.with_joints(motion, start, Course::of(&planned)));
-        let planned = found.flatten().unwrap_or(planned);
         self.or_straight(motion, start, planned)
     }
 

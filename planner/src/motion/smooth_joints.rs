@@ -153,11 +153,17 @@ impl<const N: usize> Planner<N> {
     fn slowdown(&self, point: &FollowPoint<N>) -> f64 {
         let limits = &self.limits;
         let [_, velocity, acceleration, jerk] = &point.q;
-        (0..N).fold(1.0_f64, |most, j| {
-            most.max(velocity[j].abs() / limits.velocity[j])
-                .max((acceleration[j].abs() / limits.acceleration[j]).sqrt())
-                .max((jerk[j].abs() / limits.jerk[j]).cbrt())
-        })
+        let most = |rates: &SVector<f64, N>, limits: &SVector<f64, N>| {
+            let ratios = rates
+                .iter()
+                .zip(limits)
+                .map(|(rate, limit)| rate.abs() / limit);
+            ratios.fold(0.0, f64::max)
+        };
+        most(velocity, &limits.velocity)
+            .max(most(acceleration, &limits.acceleration).sqrt())
+            .max(most(jerk, &limits.jerk).cbrt())
+            .max(1.0)
     }
 
     /// A null-space motion with which the joints need about less time for a curve whose parameter is time.

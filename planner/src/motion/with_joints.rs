@@ -20,12 +20,16 @@ use super::{PlannedMove, Planner};
 use crate::task::Move;
 
 /// Most searches before the last, and the share of the time that one has to save for another like it.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 12;
 const GAIN: f64 = 0.01;
 
-/// Gaps to its optimum at which a search ends: before the last and the last.
-const ROUGH: f64 = 0.3;
+/// Gaps to its optimum at which a search ends: before the last, and the last where the tool turns or does not.
+const ROUGH: f64 = 0.4;
+const TURNING: f64 = 0.2;
 const GAP: f64 = 0.1;
+
+/// Angle (rad) from which on the tool turns, as a search sees it.
+const TURN: f64 = 1e-12;
 
 /// How far each joint may go from where it is looked at (rad, m) at first, the share of that where it leads nowhere, and how far is
 /// not worth a search.
@@ -42,8 +46,10 @@ const POSES: RangeInclusive<usize> = 2..=60;
 /// search of a null-space motion along a curve.
 const ROOM: f64 = 0.1;
 const NIMBLE: f64 = 0.05;
-/// Share of the ease of the known motion that another must have.
+/// Share of the ease of the known motion that another must have, and by how many times of what it lacks the joints stay farther
+/// from their limits then.
 const EASED: f64 = 0.95;
+const FARTHER: f64 = 3.0;
 
 /// Places along a motion at which its ease is looked at.
 const LOOKS: u32 = 24;
@@ -72,6 +78,8 @@ struct Task<'a, const N: usize> {
     /// The linear function of the joints that says where a spare joint is: the direction in which it is free in the middle of the
     /// known motion.
     spare: Option<SVector<f64, N>>,
+    /// Gap to its optimum at which the last search ends.
+    gap: f64,
 }
 
 /// Joint positions along a motion, its ends with them.
@@ -99,11 +107,16 @@ impl<const N: usize> Planner<N> {
             motion,
             start,
             spare: follow::spare_direction(self.chain(), &middle),
+            gap: if self.turns(motion, start) {
+                TURNING
+            } else {
+                GAP
+            },
         };
         let mut region = self.region(&known.trajectory);
         let (course, sure) = self.fastest_course(task, known, &mut region);
         course.seed.as_ref()?;
-        let last = self.searched(task, &course, (&region, GAP));
+        let last = self.searched(task, &course, (&region, task.gap));
         let last = last.map(|found| found.followed);
         let mut all = last.into_iter().chain(sure);
         all.find_map(|followed| {
@@ -115,6 +128,13 @@ impl<const N: usize> Planner<N> {
         })
     }
 
+    /// Whether the tool turns from one pose to the next.
+    fn turns(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+        let poses = self.through(motion, start);
+        let mut pairs = poses.windows(2);
+        pairs.any(|pair| pair[0].rotation.angle_to(&pair[1].rotation) > TURN)
+    }
+
     /// The course that needs the least time of those with which rough searches end, each of which begins where one before ended; and
     /// the joints along the last curve of them that is certified.
     fn fastest_course(
@@ -123,7 +143,7 @@ impl<const N: usize> Planner<N> {
         mut course: Course<N>,
         region: &mut Region,
     ) -> (Course<N>, Option<Followed<N>>) {
-        let mut sure = None;
+        let (mut sure, mut lacked) = (None, false);
         for _ in 0..ROUNDS {
             let found = self.searched(task, &course, (region, ROUGH));
             let before = course.time;
@@ -131,8 +151,14 @@ impl<const N: usize> Planner<N> {
             let foretold = found
                 .as_ref()
                 .map_or(0.0, |found| found.followed.path.plan.duration());
-            let found = found.filter(|found| self.is_admitted(&found.course.trajectory, region));
-            if let Some(found) = found.filter(|found| found.course.time < before) {
+            let mut found = found.filter(|found| found.course.time < before);
+            let lacks = |found: &mut Found<N>| !self.is_admitted(&found.course.trajectory, region);
+            let lacks = found.take_if(lacks).is_some();
+            // Once the limits that are farther away now are tried alone.
+            if lacks && !std::mem::replace(&mut lacked, true) {
+                continue;
+            }
+            if let Some(found) = found {
                 course = found.course;
                 let holds = found.followed.path.plan.certificate().holds();
                 sure = holds.then_some(found.followed).or(sure);
@@ -166,7 +192,7 @@ impl<const N: usize> Planner<N> {
             bounds: &self.joint_bounds(region),
             far: region.far,
             has_spare: task.spare.is_some(),
-            rough: gap > GAP,
+            rough: gap > task.gap,
             onward: from.seed.as_ref(),
         };
         let poses = self.through(motion, start);
@@ -239,12 +265,12 @@ impl<const N: usize> Planner<N> {
         least.map_or(0.0, |least| least - self.ease_along(trajectory))
     }
 
-    /// Whether a motion has enough ease; if not, the joints stay farther from their limits from now on, by what was missing.
+    /// Whether a motion has enough ease; if not, the joints stay farther from their limits from now on.
     fn is_admitted(&self, trajectory: &Trajectory<N>, region: &mut Region) -> bool {
         let missing = self.missing_ease(trajectory, region);
         if missing > 0.0 {
             let rooms = region.room.iter_mut();
-            rooms.for_each(|room| *room += ROOM * missing);
+            rooms.for_each(|room| *room += FARTHER * ROOM * missing);
         }
         missing <= 0.0
     }

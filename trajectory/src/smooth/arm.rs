@@ -53,8 +53,8 @@ pub struct ArmMotion<'a> {
     /// Whether the plan is no more than the known motion of a further search: it may exceed the tolerances and the corridor by a little, as
     /// its certificate then says.
     pub rough: bool,
-    /// Where the search of the plan ended that this motion follows in the time of the tool, if it does: the next goes on from there. Of
-    /// a plan for the same poses.
+    /// Where the search of the plan ended that this motion follows in the time of the tool, if it does: the next goes on from there, on
+    /// knots at half the distance where the tool turns and the search is not rough. Of a plan for the same poses.
     pub onward: Option<&'a Seed>,
 }
 

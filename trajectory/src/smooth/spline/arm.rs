@@ -80,6 +80,10 @@ impl Task<'_> {
             .onward
             .filter(|seed| seed.fits(D, problem.vertices.len()));
         let (point, places, states) = match seed {
+            // What a rough search has found needs more knots to come nearer to the optimum.
+            Some(seed) if !arm.rough && Problem::<D>::TURNS => {
+                self.onward(problem, arm, &seed.refined())?
+            }
             Some(seed) => self.onward(problem, arm, seed)?,
             None => self.sampled(problem, arm, used)?,
         };

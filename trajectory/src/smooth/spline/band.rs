@@ -133,16 +133,18 @@ fn subtract<S: Four, const B: usize>(
     [a, b, c, e]: &[[f64; ROOM]; PANEL],
     d: usize,
 ) {
-    let (a, b, c, e) = (&a[d + 3..], &b[d + 2..], &c[d + 1..], &e[d..]);
-    let factors = [a[0], b[0], c[0], e[0]].map(|x| simd.splat(x));
-    let count = (B - SPARE - d).div_ceil(LANES);
-    for (q, to) in simd_chunks(column).take(count).enumerate() {
-        let at = q * LANES;
+    let count = LANES * (B - SPARE - d).div_ceil(LANES);
+    // Slices of one length, so that no group of four is looked at for being whole.
+    let done = [&a[d + 3..], &b[d + 2..], &c[d + 1..], &e[d..]].map(|column| &column[..count]);
+    let factors = done.map(|column| simd.splat(column[0]));
+    let [a, b, c, e] = done.map(|column| column.chunks_exact(LANES));
+    let all = column[..count].chunks_exact_mut(LANES);
+    for ((((to, a), b), c), e) in all.zip(a).zip(b).zip(c).zip(e) {
         let mut value = simd.load(to);
-        value = simd.sub(value, simd.mul(factors[0], simd.load(&a[at..])));
-        value = simd.sub(value, simd.mul(factors[1], simd.load(&b[at..])));
-        value = simd.sub(value, simd.mul(factors[2], simd.load(&c[at..])));
-        value = simd.sub(value, simd.mul(factors[3], simd.load(&e[at..])));
+        value = simd.sub(value, simd.mul(factors[0], simd.load(a)));
+        value = simd.sub(value, simd.mul(factors[1], simd.load(b)));
+        value = simd.sub(value, simd.mul(factors[2], simd.load(c)));
+        value = simd.sub(value, simd.mul(factors[3], simd.load(e)));
         simd.store(value, to);
     }
 }

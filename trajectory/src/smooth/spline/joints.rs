@@ -1,5 +1,7 @@
 //! What the joints of an arm that follow a spline add to the Newton system.
 
+use simd::{Build, F4, Four, LANES, Op};
+
 use super::basis::{FIRST, SECOND, THIRD};
 use super::iterate::Iterate;
 use super::joint::{Joint, dot};
@@ -20,6 +22,13 @@ struct Terms {
 }
 
 impl<const D: usize> Joint<D> {
+    /// How it moves with control point `k`.
+    fn wide(&self, k: usize) -> Wide {
+        let mut wide = [[0.0; LANES]; 2];
+        wide.as_flattened_mut()[..D].copy_from_slice(&self.changes[k]);
+        wide
+    }
+
     /// The terms of an iterate.
     fn terms(&self, problem: &Problem<D>, point: &Point<D>) -> Terms {
         let (positions, count) = (self.positions(&point.control), point.control.len());
@@ -93,7 +102,11 @@ impl<const D: usize, const B: usize> System<D, B> {
             }
         }
         if !joints.is_empty() {
-            self.curves(joints, &all);
+            Build::detect().run(Curves {
+                columns: &mut self.band.columns,
+                joints,
+                terms: &all,
+            });
         }
         if let Some(spare) = Problem::<D>::SPARE {
             for (joint, terms) in joints.iter().zip(&all) {
@@ -128,29 +141,87 @@ impl<const D: usize, const B: usize> System<D, B> {
             }
         }
     }
+}
 
-    /// Adds the curvature of the bounds of all joints.
-    fn curves(&mut self, joints: &[Joint<D>], all: &[Terms]) {
-        let free = self.sides.len() / D;
-        for (k, columns) in self.band.columns.chunks_exact_mut(D).enumerate() {
+/// Adds the curvature of the bounds of all joints to the band.
+struct Curves<'a, const D: usize, const B: usize> {
+    columns: &'a mut [[f64; B]],
+    joints: &'a [Joint<D>],
+    terms: &'a [Terms],
+}
+
+/// How a joint moves with the coordinates of a control point, and zeros after them.
+type Wide = [[f64; LANES]; 2];
+
+impl<const D: usize, const B: usize> Op for Curves<'_, D, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) {
+        const { assert!(D <= 2 * LANES) };
+        let Self {
+            columns,
+            joints,
+            terms,
+        } = self;
+        let (count, free) = (joints.len(), columns.len() / D);
+        let wide: Vec<Wide> = (0..free)
+            .flat_map(|k| joints.iter().map(move |joint| joint.wide(k + 4)))
+            .collect();
+        let at = |k: usize| &wide[k * count..][..count];
+        let mut curves = vec![0.0; count];
+        for (k, columns) in columns.chunks_exact_mut(D).enumerate() {
             for back in 0..WIDE.min(free - k) {
+                for (curve, terms) in curves.iter_mut().zip(terms) {
+                    *curve = terms.curves[k + back + 4][back];
+                }
                 for (b, column) in columns.iter_mut().enumerate() {
-                    let mut sums = [0.0; D];
-                    for (joint, terms) in joints.iter().zip(all) {
-                        let curve = terms.curves[k + back + 4][back];
-                        let own = curve * joint.changes[k + 4][b];
-                        for (sum, other) in sums.iter_mut().zip(&joint.changes[k + back + 4]) {
-                            *sum += own * other;
-                        }
-                    }
-                    let from = if back == 0 { b } else { 0 };
-                    let entries = &mut column[back * D + from - b..][..D - from];
-                    for (entry, sum) in entries.iter_mut().zip(&sums[from..]) {
-                        *entry += sum;
-                    }
+                    let sums = products::<S, D>(simd, (at(k), b), at(k + back), &curves);
+                    add::<S, D, B>(sums, (b, back), column);
                 }
             }
         }
+    }
+}
+
+/// The sum over the joints of a curvature times coordinate `b` of one control point and all of another.
+#[inline(always)]
+fn products<S: Four, const D: usize>(
+    simd: S,
+    (own, b): (&[Wide], usize),
+    other: &[Wide],
+    curves: &[f64],
+) -> [F4<S>; 2] {
+    let mut sums = [F4::splat(simd, 0.0); 2];
+    for ((own, other), curve) in own.iter().zip(other).zip(curves) {
+        let factor = curve * own.as_flattened()[b];
+        sums[0] += F4::new(simd, other[0]) * factor;
+        if D > LANES {
+            sums[1] += F4::new(simd, other[1]) * factor;
+        }
+    }
+    sums
+}
+
+/// Adds the entries of coordinate `b` of a control point with all of the one that is `back` after it.
+#[inline(always)]
+fn add<S: Four, const D: usize, const B: usize>(
+    sums: [F4<S>; 2],
+    (b, back): (usize, usize),
+    column: &mut [f64; B],
+) {
+    if back == 0 {
+        // Those above the diagonal stand in the columns before.
+        let sums = sums.map(F4::array);
+        for (entry, sum) in column[..D - b].iter_mut().zip(&sums.as_flattened()[b..]) {
+            *entry += sum;
+        }
+        return;
+    }
+    // The entries after them get zeros.
+    let entries = column[back * D - b..].chunks_exact_mut(LANES);
+    for (entries, sum) in entries.zip(&sums[..D.div_ceil(LANES)]) {
+        (F4::load(sum.build(), entries) + *sum).put(entries, 0);
     }
 }
 
