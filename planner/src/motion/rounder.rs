@@ -2,8 +2,6 @@
 //!
 //! Such a curve is found by a short search on few knots, as it stays far from its bounds.
 
-use std::cmp::Ordering;
-
 use nalgebra::{Isometry3, SVector};
 
 use super::course::Course;
@@ -78,16 +76,12 @@ impl<const N: usize> Planner<N> {
         if !is_ruled(about, curve.path.plan.duration()) {
             return None;
         }
-        // A search with the joints finds the null-space motion, too.
         let found = self.with_joints(motion, start, course);
         let planned = match found {
             Some(found) if found.trajectory.duration() <= ENOUGH * about => found,
             found => {
                 let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
-                let other = self.for_the_joints(motion, start, (first, &curve));
-                let next = self.with_joints(motion, start, Course::of(&other));
-                let all = found.into_iter().chain(next).chain([other]);
-                all.min_by(sooner)?
+                sooner(found, self.on_others(motion, start, (first, &curve), false))
             }
         };
         let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
@@ -109,14 +103,26 @@ impl<const N: usize> Planner<N> {
         let found = self.with_joints(motion, start, Course::of(&first.planned));
         match found {
             Some(found) if found.trajectory.duration() <= MUCH * time => found,
-            found => {
-                let other = self.for_the_joints(motion, start, (first, curve));
-                let differs = other.trajectory.duration() < time;
-                let next = differs.then(|| self.with_joints(motion, start, Course::of(&other)));
-                let all = found.into_iter().chain(next.flatten());
-                all.fold(other, |a, b| if sooner(&b, &a).is_lt() { b } else { a })
-            }
+            found => sooner(found, self.on_others(motion, start, (first, curve), true)),
         }
+    }
+
+    /// The fastest motion of a search with the joints that begins at the fastest one along a curve and others; none begins
+    /// again at the one along the curve if that was `searched`.
+    fn on_others(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (first, curve): (Along<N>, &Followed<N>),
+        searched: bool,
+    ) -> PlannedMove<N> {
+        let time = first.planned.trajectory.duration();
+        let other = self.for_the_joints(motion, start, (first, curve));
+        if searched && other.trajectory.duration() >= time {
+            return other;
+        }
+        let found = self.with_joints(motion, start, Course::of(&other));
+        found.unwrap_or(other)
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
@@ -246,10 +252,11 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// Which of two motions ends first.
-fn sooner<const N: usize>(a: &PlannedMove<N>, b: &PlannedMove<N>) -> Ordering {
-    let time = |planned: &PlannedMove<N>| planned.trajectory.duration();
-    time(a).total_cmp(&time(b))
+/// The motion that ends first.
+fn sooner<const N: usize>(found: Option<PlannedMove<N>>, other: PlannedMove<N>) -> PlannedMove<N> {
+    let time = other.trajectory.duration();
+    let found = found.filter(|found| found.trajectory.duration() <= time);
+    found.unwrap_or(other)
 }
 
 /// Whether the joints rule a motion that takes so long, from how long the tool alone would.

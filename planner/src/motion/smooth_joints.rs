@@ -232,7 +232,7 @@ pub(super) struct Followed<const N: usize> {
     pub(super) path: SmoothPath,
     pub(super) points: Vec<FollowPoint<N>>,
     /// Whether another null-space motion may be searched that helps the joints.
-    pub(super) may_be_helped: bool,
+    may_be_helped: bool,
 }
 
 /// The smooth motion of the tool that the joints are to follow.

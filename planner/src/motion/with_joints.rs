@@ -151,14 +151,16 @@ impl<const N: usize> Planner<N> {
             let foretold = found
                 .as_ref()
                 .map_or(0.0, |found| found.followed.path.plan.duration());
-            let mut found = found.filter(|found| found.course.time < before);
-            let lacks = |found: &mut Found<N>| !self.is_admitted(&found.course.trajectory, region);
-            let lacks = found.take_if(lacks).is_some();
-            // Once the limits that are farther away now are tried alone.
-            if lacks && !std::mem::replace(&mut lacked, true) {
+            let found = found.filter(|found| found.course.time < before);
+            let lacks = found
+                .as_ref()
+                .is_some_and(|found| !self.is_admitted(&found.course.trajectory, region));
+            if lacks && !lacked {
+                // The limits that are farther away now are tried alone, once.
+                lacked = true;
                 continue;
             }
-            if let Some(found) = found {
+            if let Some(found) = found.filter(|_| !lacks) {
                 course = found.course;
                 let holds = found.followed.path.plan.certificate().holds();
                 sure = holds.then_some(found.followed).or(sure);
