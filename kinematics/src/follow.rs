@@ -7,11 +7,11 @@
 //! [`FollowOptions::accuracy`]: points are added where the given grid is too coarse,
 //! for example near a singular pose, where joints turn fast over a short distance.
 
-mod connected;
 mod differential;
 mod error;
 mod linear;
 mod null_space;
+mod null_space_grid;
 mod null_space_path;
 mod redundancy;
 mod spare;
@@ -77,8 +77,8 @@ type Resolve<const N: usize> =
 /// grid and those added between them.
 ///
 /// For arms with more than six joints, the null-space motion is chosen over the whole path: none if
-/// that stays well inside the limits, otherwise the smooth polynomial that stays farthest from
-/// limits and singular poses.
+/// that stays well inside the limits and away from singular poses, otherwise a smooth polynomial that
+/// does so where it can, and moves the joints little.
 ///
 /// # Errors
 /// [`FollowError`]: where, which joint, why, and by how much.

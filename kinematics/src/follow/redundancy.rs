@@ -1,49 +1,39 @@
 //! The null-space motion of arms with more than six joints: chosen over the whole path.
 
-use super::connected;
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
-use crate::measure;
+use crate::measure::{self, NIMBLE, ROOM};
 use nalgebra::{SMatrix, SVector};
-
-/// Distance from a limit, rad or m, from which a joint counts as well inside.
-const ROOM: f64 = 0.1;
-/// Smallest singular value that counts as well away from singular poses.
-const NIMBLE: f64 = 0.05;
 
 /// A joint path and its null-space motion.
 pub(super) type Resolved<const N: usize> = (Vec<FollowPoint<N>>, NullSpace<N>);
 
-/// The same with its quality, or why there is none.
-type Attempt<const N: usize> = (f64, Result<Resolved<N>, FollowError>);
-
 /// Follows without null-space motion if the quality is good, otherwise along the polynomial that a
-/// search over the whole path finds. The null-space motion is measured along the direction in which
-/// the arm can move at the start. Where that direction becomes one that moves the tool, the path
-/// seems singular though the arm is not; then single joints are tried as the measure. Where the closed
-/// form shows that no joints follow the path, they are not.
+/// search over the whole path finds.
 pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
 ) -> Result<Resolved<N>, FollowError> {
     let (_, jacobian) = task.solver.chain().jacobian(start);
-    let directions = null_space(&jacobian);
-    let (mut best, mut answer) = along(task, start, &directions);
-    if answer.is_ok() || is_beyond(&answer) || connected::is_cut(task, start) {
+    let still = resting(task, start, &null_space(&jacobian));
+    let first = task.trace(start, &still);
+    let ease = first
+        .as_ref()
+        .map_or(f64::NEG_INFINITY, |points| quality(task, points));
+    // A path cannot be expected to be better than its start.
+    let answer = first.map(|points| (points, still.clone()));
+    if ease >= 1.0 || is_beyond(&answer) {
         return answer;
     }
-    for joint in measures(&directions[0]) {
-        let mut single = directions;
-        single[0] = SVector::from_fn(|row, _| if row == joint { 1.0 } else { 0.0 });
-        let (found, points) = along(task, start, &single);
-        if points.is_ok() && found > best {
-            (best, answer) = (found, points);
-        }
-        if best >= ENOUGH {
+    for (found, moving) in judged(task, start, null_space_path::search(task, start, &still)) {
+        if found <= ease {
             break;
+        }
+        if let Ok(points) = task.trace(start, &moving) {
+            return Ok((points, moving));
         }
     }
     answer
@@ -55,47 +45,44 @@ fn is_beyond<P>(traced: &Result<P, FollowError>) -> bool {
     matches!(cause, Some(FollowCause::Unreachable(_)))
 }
 
-/// A path of this quality ends the search along single joints.
-const ENOUGH: f64 = 0.2;
-/// Least share of a joint in the null-space motion at the start, if it is to measure it.
-const SHARE: f64 = 0.1;
-
-/// The joints that can measure the null-space motion, those that move most first.
-fn measures<const N: usize>(direction: &SVector<f64, N>) -> Vec<usize> {
-    let mut joints: Vec<usize> = (0..N).filter(|i| direction[*i].abs() >= SHARE).collect();
-    joints.sort_by(|a, b| direction[*b].abs().total_cmp(&direction[*a].abs()));
-    joints
-}
-
-/// The best path whose null-space motion is measured along the first direction.
-fn along<const N: usize>(
+/// Null-space motions with the quality of their paths at a few places, the best first; those after a good one, and those
+/// that lead nowhere, are left out.
+fn judged<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-    directions: &[SVector<f64, N>; 2],
-) -> Attempt<N> {
-    let still = resting(task, start, directions);
-    let first = task.trace(start, &still);
-    let quality = |points: &Vec<FollowPoint<N>>| quality(task, points);
-    let mut best = first.as_ref().map_or(f64::NEG_INFINITY, quality);
-    // A path cannot be expected to be better than its start.
-    let mut answer = first.map(|points| (points, still.clone()));
-    if (answer.is_ok() && best >= 1.0) || is_beyond(&answer) {
-        return (best, answer);
-    }
-    for null_space_path in null_space_path::search(task, start, &still) {
-        let mut moving = still.clone();
-        moving.polynomials[0] = null_space_path;
-        if let Ok(points) = task.trace(start, &moving) {
-            let found = quality(&points);
-            if found > best {
-                (best, answer) = (found, Ok((points, moving)));
-            }
-            if best >= 1.0 {
-                break;
-            }
+    motions: Vec<NullSpace<N>>,
+) -> Vec<(f64, NullSpace<N>)> {
+    let (grid, options) = coarse(task);
+    let coarse = Task {
+        grid: &grid,
+        options: &options,
+        ..*task
+    };
+    let mut found: Vec<(f64, NullSpace<N>)> = Vec::new();
+    for moving in motions {
+        let Ok(points) = coarse.trace(start, &moving) else {
+            continue;
+        };
+        let ease = quality(&coarse, &points).min(1.0);
+        found.push((ease, moving));
+        if ease >= 1.0 {
+            break;
         }
     }
-    (best, answer)
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found
+}
+
+/// A few places of a path, and how closely it is followed there to be judged.
+fn coarse<const N: usize>(task: &Task<'_, N>) -> (Vec<f64>, FollowOptions) {
+    let last = task.grid.len() - 1;
+    let steps = (last / EVERY).clamp(JUDGED[0], JUDGED[1]).min(last);
+    let grid = (0..=steps).map(|k| task.grid[k * last / steps]).collect();
+    let options = FollowOptions {
+        accuracy: COARSE,
+        ..*task.options
+    };
+    (grid, options)
 }
 
 /// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
@@ -131,13 +118,7 @@ pub(super) fn cheapest<const N: usize>(
     start: &SVector<f64, N>,
     cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
 ) -> Option<NullSpace<N>> {
-    let last = task.grid.len() - 1;
-    let steps = (last / EVERY).clamp(JUDGED[0], JUDGED[1]).min(last);
-    let grid: Vec<f64> = (0..=steps).map(|k| task.grid[k * last / steps]).collect();
-    let options = FollowOptions {
-        accuracy: COARSE,
-        ..*task.options
-    };
+    let (grid, options) = coarse(task);
     let coarse = Task {
         grid: &grid,
         options: &options,

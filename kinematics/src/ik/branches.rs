@@ -39,30 +39,6 @@ impl<const N: usize> Solver<N> {
         best.map(|(_, solution)| solution)
     }
 
-    /// The place of the free parameter at `q` in its range, from 0 to 1; `None` where there is no exact closed
-    /// form with one.
-    pub(crate) fn free_fraction(&self, q: &SVector<f64, N>) -> Option<f64> {
-        let free = |closed: &&Closed| closed.exact() && closed.is_redundant();
-        let closed = self.closed.as_ref().filter(free)?;
-        let [low, high] = [0.0, 1.0].map(|fraction| self.parameter_at(closed, fraction));
-        Some((closed.parameter(q) - low) / (high - low))
-    }
-
-    /// The branches inside the limits at a fraction of the range of the free parameter, from 0 to 1; none
-    /// without a closed form.
-    pub(crate) fn inside_at(
-        &self,
-        pose: &Isometry3<f64>,
-        fraction: f64,
-        seed: &SVector<f64, N>,
-    ) -> impl Iterator<Item = SVector<f64, N>> + use<N> {
-        let raw = self.closed.as_ref().map(|closed| {
-            self.raw_branches(closed, pose, seed, self.parameter_at(closed, fraction))
-        });
-        raw.into_iter()
-            .flat_map(|raw| (0..8_u8).filter_map(move |id| raw.inside(id)))
-    }
-
     /// What the closed form gives at one value (rad) of its free parameter, before any polishing.
     #[inline(always)]
     pub(super) fn raw_branches(

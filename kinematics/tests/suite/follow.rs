@@ -377,3 +377,55 @@ fn spare_motion_keeps_inside_the_limits() {
         "the arm had to move: {moved}"
     );
 }
+
+/// A straight line of the tool between two poses, `u` from 0 to 1.
+fn line_between(from: &Isometry3<f64>, to: &Isometry3<f64>) -> impl Fn(f64) -> TwistPoint + use<> {
+    let (from, way) = (*from, to.translation.vector - from.translation.vector);
+    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
+    move |u| TwistPoint {
+        pose: Isometry3::from_parts(
+            Translation3::from(from.translation.vector + way * u),
+            UnitQuaternion::from_scaled_axis(turn * u) * from.rotation,
+        ),
+        linear: [way, Vector3::zeros(), Vector3::zeros()],
+        angular: [turn, Vector3::zeros(), Vector3::zeros()],
+    }
+}
+
+/// Straight lines that take a long self-motion, or one that no single measure of it can follow: from joints, to the pose of
+/// others.
+#[test]
+fn long_self_motions_are_found() {
+    let solver = Solver::new(arms::chain::<7>("panda"));
+    let lines = [
+        (
+            [2.1652, -1.6233, 0.0415, -2.9150, 1.3215, 2.8727, -2.6115],
+            [0.5578, -1.7275, 0.7504, -2.5534, 2.7723, 2.1474, -2.8627],
+        ),
+        (
+            [0.4609, -0.1162, 0.6617, -1.3636, 2.5698, 3.0182, -2.4814],
+            [-1.0867, -1.0144, 1.3631, -1.1772, 1.6961, 3.0089, -0.6632],
+        ),
+        (
+            [-0.3064, 0.0989, -0.8512, -2.6332, 1.9286, 2.8665, -1.6424],
+            [-0.6160, -0.9103, -0.9656, -2.9215, 2.0530, 3.4874, -2.5180],
+        ),
+        (
+            [-2.7309, -0.7632, 0.5499, -0.8998, -1.0824, 2.7244, 2.3033],
+            [-0.1091, 0.2293, -0.3610, -0.5285, -2.7370, 1.8243, 2.3575],
+        ),
+    ];
+    for (start, end) in lines {
+        let (start, end) = (SVector::from(start), SVector::from(end));
+        let chain = solver.chain();
+        let tool = line_between(&chain.forward(&start), &chain.forward(&end));
+        let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
+        let points = follow(&solver, &tool, &grid, &start, &FollowOptions::default())
+            .unwrap_or_else(|error| panic!("{start}: {error}"));
+        assert!(room(&solver, &points) > 0.0, "{start}");
+        for point in &points {
+            let (position, rotation) = error(&chain.forward(&point.q[0]), &tool(point.u).pose);
+            assert!(position < 1e-10 && rotation < 1e-9, "{start}");
+        }
+    }
+}
