@@ -152,6 +152,21 @@ impl<const N: usize> Chain<N> {
         &self.prismatic
     }
 
+    /// Distance (rad, m) of a joint at `position` from the nearer of its limits, less than 0 beyond it; infinite without
+    /// limits.
+    ///
+    /// ```
+    /// # let text = include_str!("../../robots/panda/robot.urdf");
+    /// let chain = kinematics::urdf::read(text, None)?.chain::<7>()?;
+    /// // Joint 4 turns from -3.0718 to -0.0698 rad.
+    /// assert!((chain.room(3, -3.0) - 0.0718).abs() < 1e-9);
+    /// # Ok::<(), kinematics::UrdfError>(())
+    /// ```
+    #[must_use]
+    pub fn room(&self, joint: usize, position: f64) -> f64 {
+        (self.upper[joint] - position).min(position - self.lower[joint])
+    }
+
     /// Whether `q` (rad, m) is inside the limits widened by `slack`.
     #[must_use]
     pub fn within_limits(&self, q: &SVector<f64, N>, slack: f64) -> bool {

@@ -8,6 +8,7 @@ use super::linear::solve_once;
 use super::null_space::NullSpace;
 use super::trace::{Guess, Task};
 use crate::measure::{LENGTH, NIMBLE, ROOM};
+use arrayvec::ArrayVec;
 use nalgebra::{Isometry3, SMatrix, SVector};
 
 /// Size of a grid.
@@ -42,6 +43,8 @@ const HALVINGS: i32 = 5;
 const STEP: f64 = 0.1;
 /// Distance of the tool at which a cell counts as reached, m (rad times 0.3 m).
 const CLOSE: f64 = 1e-5;
+/// Most cells of a column through which a polynomial foretells the next.
+const KNOWN: usize = 3;
 /// Largest difference of a joint from one cell of the grid to the next, rad.
 const CELL_CHANGE: f64 = 0.8;
 /// Difference of a joint from the cell before in its column from which on another branch is suspected.
@@ -171,11 +174,14 @@ impl<const N: usize> Grid<'_, N> {
 
     /// Fills a layer from one cell of it to both sides.
     fn spread(&self, layers: &[Layer<N>], next: &mut Layer<N>, from: usize, ends: (usize, usize)) {
-        let below: Vec<usize> = (ends.0..from).rev().collect();
-        let above: Vec<usize> = (from + 1..=ends.1).collect();
-        for (columns, distance) in [(below, -STEP), (above, STEP)] {
+        for (count, distance) in [(from - ends.0, -STEP), (ends.1 - from, STEP)] {
             let mut inner = next.cells[from];
-            for column in columns {
+            for step in 1..=count {
+                let column = if distance < 0.0 {
+                    from - step
+                } else {
+                    from + step
+                };
                 let (Some(last), None) = (inner, &next.cells[column]) else {
                     break;
                 };
@@ -229,12 +235,12 @@ impl<const N: usize> Grid<'_, N> {
     }
 }
 
-/// Where the joints of a column are about to be at `x`, by the polynomial through its last cells, up to three.
+/// Where the joints of a column are about to be at `x`, by the polynomial through its last cells, up to [`KNOWN`].
 fn ahead<const N: usize>(layers: &[Layer<N>], column: usize, x: f64) -> Option<SVector<f64, N>> {
-    let known: Vec<(f64, SVector<f64, N>)> = layers
+    let known: ArrayVec<(f64, SVector<f64, N>), KNOWN> = layers
         .iter()
         .rev()
-        .take(3)
+        .take(KNOWN)
         .map_while(|layer| layer.cells[column].map(|cell| (layer.x, cell.q)))
         .collect();
     let term = |(i, (at, q)): (usize, &(f64, SVector<f64, N>))| {
@@ -295,7 +301,7 @@ fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>, smallest: f64) 
     let missing = |ease: f64| MISSING * (EASE - ease).max(0.0).powi(2);
     let mut sum = (0.08 / smallest.max(1e-4)).powi(2) + missing(smallest / NIMBLE);
     for i in 0..N {
-        let room = (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]);
+        let room = chain.room(i, q[i]);
         if room <= 0.0 {
             return f64::INFINITY;
         }
@@ -305,7 +311,7 @@ fn cost<const N: usize>(task: &Task<'_, N>, q: &SVector<f64, N>, smallest: f64) 
 }
 
 /// About the smallest singular value of a Jacobian, lengths in units of [`LENGTH`], by some steps from the direction `along`,
-/// which comes nearer to the one that belongs to it; never less than it.
+/// which comes nearer to the one that belongs to it; never less than it, and zero where it cannot be told from zero.
 ///
 /// # Source
 /// G. Golub, C. Van Loan, "Matrix Computations", 4th edition 2013, 8.2.2 (power method of the inverse).

@@ -17,8 +17,7 @@ pub(super) fn resolve<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
 ) -> Result<Resolved<N>, FollowError> {
-    let (_, jacobian) = task.solver.chain().jacobian(start);
-    let still = resting(task, start, &null_space(&jacobian));
+    let still = resting_from(task, start);
     let first = task.trace(start, &still);
     let ease = first
         .as_ref()
@@ -124,8 +123,7 @@ pub(super) fn cheapest<const N: usize>(
         options: &options,
         ..*task
     };
-    let (_, jacobian) = task.solver.chain().jacobian(start);
-    let still = resting(task, start, &null_space(&jacobian));
+    let still = resting_from(task, start);
     let first = coarse.trace(start, &still).ok()?;
     let ease = quality(&coarse, &first).min(1.0);
     let judge = |moving: &NullSpace<N>| {
@@ -215,6 +213,12 @@ impl<const N: usize> Search<'_, N> {
     }
 }
 
+/// No null-space motion, measured along the directions in which the arm can move at the start.
+fn resting_from<const N: usize>(task: &Task<'_, N>, start: &SVector<f64, N>) -> NullSpace<N> {
+    let (_, jacobian) = task.solver.chain().jacobian(start);
+    resting(task, start, &null_space(&jacobian))
+}
+
 /// No null-space motion, measured along directions.
 fn resting<const N: usize>(
     task: &Task<'_, N>,
@@ -239,10 +243,7 @@ fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64
     // The smaller of the quality at a point and `least`, which is known.
     let one = |least: f64, point: &FollowPoint<N>| {
         let q = &point.q[0];
-        let room = (0..N).fold(f64::INFINITY, |room, i| {
-            room.min(chain.upper()[i] - q[i])
-                .min(q[i] - chain.lower()[i])
-        });
+        let room = (0..N).fold(f64::INFINITY, |room, i| room.min(chain.room(i, q[i])));
         let least = least.min(room / ROOM);
         if measure::surely_nimble(chain, q, least * NIMBLE) {
             return least;

@@ -277,14 +277,23 @@ fn a_wrist_singularity_is_passed() {
 
 /// A straight line of the tool, `u` from -1 to 1, `way` long to either side of a pose.
 fn line(pose: &Isometry3<f64>, way: Vector3<f64>) -> impl Fn(f64) -> TwistPoint + use<> {
+    steady(pose, way, Vector3::zeros())
+}
+
+/// A steady motion of the tool, that is at a pose at `u` 0, and moves by `way` and turns by `turn` in a unit of `u`.
+fn steady(
+    pose: &Isometry3<f64>,
+    way: Vector3<f64>,
+    turn: Vector3<f64>,
+) -> impl Fn(f64) -> TwistPoint + use<> {
     let pose = *pose;
     move |u| TwistPoint {
         pose: Isometry3::from_parts(
             Translation3::from(pose.translation.vector + way * u),
-            pose.rotation,
+            UnitQuaternion::from_scaled_axis(turn * u) * pose.rotation,
         ),
         linear: [way, Vector3::zeros(), Vector3::zeros()],
-        angular: [Vector3::zeros(); 3],
+        angular: [turn, Vector3::zeros(), Vector3::zeros()],
     }
 }
 
@@ -338,9 +347,7 @@ fn room<const N: usize>(solver: &Solver<N>, points: &[kinematics::FollowPoint<N>
     let chain = solver.chain();
     points
         .iter()
-        .flat_map(|p| {
-            (0..N).map(|i| (chain.upper()[i] - p.q[0][i]).min(p.q[0][i] - chain.lower()[i]))
-        })
+        .flat_map(|p| (0..N).map(|i| chain.room(i, p.q[0][i])))
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -352,14 +359,7 @@ fn spare_motion_keeps_inside_the_limits() {
     let pose = solver.chain().forward(&start);
     // Joint 7 has 0.69 rad left, the flange turns by more about its own axis.
     let axis = Unit::new_normalize(pose.rotation * Vector3::z());
-    let spin = |u: f64| TwistPoint {
-        pose: Isometry3::from_parts(
-            pose.translation,
-            UnitQuaternion::from_axis_angle(&axis, 0.85 * u) * pose.rotation,
-        ),
-        linear: [Vector3::zeros(); 3],
-        angular: [axis.into_inner() * 0.85, Vector3::zeros(), Vector3::zeros()],
-    };
+    let spin = steady(&pose, Vector3::zeros(), axis.into_inner() * 0.85);
     let grid: Vec<f64> = (0..=50).map(|i| f64::from(i) / 50.0).collect();
     let points = follow(&solver, &spin, &grid, &start, &FollowOptions::default()).unwrap();
     assert!(
@@ -380,16 +380,9 @@ fn spare_motion_keeps_inside_the_limits() {
 
 /// A straight line of the tool between two poses, `u` from 0 to 1.
 fn line_between(from: &Isometry3<f64>, to: &Isometry3<f64>) -> impl Fn(f64) -> TwistPoint + use<> {
-    let (from, way) = (*from, to.translation.vector - from.translation.vector);
+    let way = to.translation.vector - from.translation.vector;
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
-    move |u| TwistPoint {
-        pose: Isometry3::from_parts(
-            Translation3::from(from.translation.vector + way * u),
-            UnitQuaternion::from_scaled_axis(turn * u) * from.rotation,
-        ),
-        linear: [way, Vector3::zeros(), Vector3::zeros()],
-        angular: [turn, Vector3::zeros(), Vector3::zeros()],
-    }
+    steady(from, way, turn)
 }
 
 /// Straight lines that take a long self-motion, or one that no single measure of it can follow: from joints, to the pose of

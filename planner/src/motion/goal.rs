@@ -139,7 +139,7 @@ impl<const N: usize> Planner<N> {
     pub(super) fn ease_within(&self, q: &SVector<f64, N>, [well, nimble]: [f64; 2]) -> f64 {
         let chain = self.chain();
         let room = (0..N)
-            .map(|i| (chain.upper()[i] - q[i]).min(q[i] - chain.lower()[i]))
+            .map(|i| chain.room(i, q[i]))
             .fold(f64::INFINITY, f64::min);
         let smallest = kinematics::measure::dexterity(chain, q).smallest;
         (room / well).min(smallest / nimble).min(1.0)

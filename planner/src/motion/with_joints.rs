@@ -240,8 +240,8 @@ impl<const N: usize> Planner<N> {
         let chain = self.chain();
         let places: Vec<_> = places(known).collect();
         let room = |j: usize| {
-            let room = |q: &SVector<f64, N>| (chain.upper()[j] - q[j]).min(q[j] - chain.lower()[j]);
-            places.iter().map(room).fold(ROOM, f64::min).max(0.0)
+            let room = places.iter().map(|q| chain.room(j, q[j]));
+            room.fold(ROOM, f64::min).max(0.0)
         };
         Region {
             far: FAR,
