@@ -10,8 +10,10 @@ use super::smooth_joints::{Followed, HELPED};
 use super::{PlannedMove, Planner};
 use crate::task::Move;
 
-/// Time of the motion over that of the tool alone from which on the joints rule.
+/// Time of the motion over that of the tool alone from which on the joints rule, and the same along a long list that turns, if only
+/// about known: the law of time along it loses much more there.
 const RULED: f64 = 1.3;
+const RULED_LONG: f64 = 1.05;
 /// Gap to the optimum at which the search of the curve that is tried first ends.
 const FIRST_GAP: f64 = 0.05;
 /// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
@@ -33,6 +35,9 @@ const FORETOLD: f64 = 1.1;
 /// Most spans of a curve, and most poses of a list, that is cheap enough for others.
 const CHEAP: usize = 400;
 const FEW: usize = 20;
+/// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, and one that is
+/// dense is not searched with the joints.
+const MANY: usize = 60;
 
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
@@ -61,10 +66,61 @@ impl<const N: usize> Planner<N> {
     /// The fastest motion along curves that are rounder than the fastest one for the tool, where the joints rule; none that
     /// rests without need.
     pub(super) fn rounder(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        let few = motion.tolerance > 0.0 && motion.poses.len() <= FEW;
-        if !few || !self.foretells_joints(motion, start) {
+        if motion.tolerance <= 0.0 {
             return None;
         }
+        let planned = if motion.poses.len() <= FEW {
+            self.rounder_of_few(motion, start)
+        } else {
+            self.rounder_of_many(motion, start)
+        }?;
+        let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
+        (!rests).then_some(planned)
+    }
+
+    /// The fastest motion of a search with the joints that begins at the one along a rounder curve and, where that saves
+    /// little, at the one along others.
+    fn rounder_of_few(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
+        if !self.foretells_joints(motion, start) {
+            return None;
+        }
+        let (curve, course) = self.ruled(motion, start, RULED)?;
+        let about = course.time;
+        let found = self.with_joints(motion, start, course);
+        match found {
+            Some(found) if found.trajectory.duration() <= ENOUGH * about => Some(found),
+            found => {
+                let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
+                let other = self.on_others(motion, start, (first, &curve), false);
+                Some(sooner(found, other))
+            }
+        }
+    }
+
+    /// The motion of a search with the joints that begins at the one along a rounder curve through a list of many poses that
+    /// turns. There the fastest curve of the tool takes ten times the planning, and is of no use. A long list that does not turn is
+    /// searched better from that curve.
+    fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
+        let many = motion.poses.len() > MANY && self.is_searched(motion);
+        if !many || !self.turns(motion, start) {
+            return None;
+        }
+        let (curve, course) = self.ruled(motion, start, RULED_LONG)?;
+        if curve.path.is_fitted() {
+            return None;
+        }
+        let about = course.time;
+        let found = self.with_joints(motion, start, course)?;
+        (found.trajectory.duration() <= about).then_some(found)
+    }
+
+    /// The joints along a curve that is found by a short search, if about their time over that of the tool is above `share`.
+    fn ruled(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        share: f64,
+    ) -> Option<(Followed<N>, Course<N>)> {
         let search = Search {
             gap: Some(FIRST_GAP),
             most: f64::INFINITY,
@@ -72,20 +128,8 @@ impl<const N: usize> Planner<N> {
         let curve = self.curve(start, (motion, search), true).ok()?;
         // The time of the joints need not be known exactly.
         let course = self.course_along(&curve);
-        let about = course.time;
-        if !is_ruled(about, curve.path.plan.duration()) {
-            return None;
-        }
-        let found = self.with_joints(motion, start, course);
-        let planned = match found {
-            Some(found) if found.trajectory.duration() <= ENOUGH * about => found,
-            found => {
-                let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
-                sooner(found, self.on_others(motion, start, (first, &curve), false))
-            }
-        };
-        let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
-        (!rests).then_some(planned)
+        let ruled = course.time > share * curve.path.plan.duration();
+        ruled.then_some((curve, course))
     }
 
     /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
@@ -100,7 +144,7 @@ impl<const N: usize> Planner<N> {
         if time <= HELPED * first.tool {
             return first.planned;
         }
-        let found = self.with_joints(motion, start, Course::of(&first.planned));
+        let found = self.with_joints_near(motion, start, (&first.planned, curve));
         match found {
             Some(found) if found.trajectory.duration() <= MUCH * time => found,
             found => sooner(found, self.on_others(motion, start, (first, curve), true)),
@@ -121,8 +165,23 @@ impl<const N: usize> Planner<N> {
         if searched && other.trajectory.duration() >= time {
             return other;
         }
-        let found = self.with_joints(motion, start, Course::of(&other));
+        let found = self.with_joints_near(motion, start, (&other, curve));
         found.unwrap_or(other)
+    }
+
+    /// [`Planner::with_joints`] near a motion, but through no dense list of many poses, whose curve was fitted: where its poses
+    /// leave it no room, nothing is to be found.
+    fn with_joints_near(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (planned, curve): (&PlannedMove<N>, &Followed<N>),
+    ) -> Option<PlannedMove<N>> {
+        let dense = motion.poses.len() > MANY && curve.path.is_fitted();
+        if dense {
+            return None;
+        }
+        self.with_joints(motion, start, Course::of(planned))
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
@@ -147,7 +206,7 @@ impl<const N: usize> Planner<N> {
         (first, curve): (Along<N>, &Followed<N>),
     ) -> PlannedMove<N> {
         let time = first.planned.trajectory.duration();
-        if !is_ruled(time, first.tool) || motion.tolerance <= 0.0 || first.spans > CHEAP {
+        if time <= RULED * first.tool || motion.tolerance <= 0.0 || first.spans > CHEAP {
             return first.planned;
         }
         let least = self.least_along(curve, motion).unwrap_or(time);
@@ -257,9 +316,4 @@ fn sooner<const N: usize>(found: Option<PlannedMove<N>>, other: PlannedMove<N>) 
     let time = other.trajectory.duration();
     let found = found.filter(|found| found.trajectory.duration() <= time);
     found.unwrap_or(other)
-}
-
-/// Whether the joints rule a motion that takes so long, from how long the tool alone would.
-fn is_ruled(time: f64, tool: f64) -> bool {
-    time > RULED * tool
 }

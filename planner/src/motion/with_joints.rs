@@ -39,8 +39,8 @@ const NOWHERE: f64 = 0.01;
 /// Less than this share of what was foretold to be saved says that the joints were looked at too far away.
 const POOR: f64 = 0.25;
 
-/// Poses of a list for which it is not too dear; one pose is reached straight.
-const POSES: RangeInclusive<usize> = 2..=60;
+/// Poses of a list that is searched as a whole; one pose is reached straight.
+const POSES: RangeInclusive<usize> = 2..=1000;
 
 /// Distance from a limit (rad) and smallest singular value from which a spare joint is well where it is, as in the
 /// search of a null-space motion along a curve.
@@ -97,8 +97,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         known: Course<N>,
     ) -> Option<PlannedMove<N>> {
-        let has_inverse = N == 6 || N == 7;
-        if !has_inverse || !POSES.contains(&motion.poses.len()) {
+        if !self.is_searched(motion) {
             return None;
         }
         let (most, middle) = (known.time, 0.5 * known.trajectory.duration());
@@ -117,7 +116,9 @@ impl<const N: usize> Planner<N> {
         let (course, sure) = self.fastest_course(task, known, &mut region);
         course.seed.as_ref()?;
         let last = self.searched(task, &course, (&region, task.gap));
-        let last = last.map(|found| found.followed);
+        // On the knots of the searches before it may find no way inside of the bounds, on others it does.
+        let anew = || self.searched(task, &course.anew(), (&region, task.gap));
+        let last = last.or_else(anew).map(|found| found.followed);
         let mut all = last.into_iter().chain(sure);
         all.find_map(|followed| {
             let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
@@ -128,8 +129,14 @@ impl<const N: usize> Planner<N> {
         })
     }
 
+    /// Whether a motion is searched with the joints, where they rule.
+    pub(super) fn is_searched(&self, motion: &Move) -> bool {
+        let has_inverse = N == 6 || N == 7;
+        has_inverse && POSES.contains(&motion.poses.len())
+    }
+
     /// Whether the tool turns from one pose to the next.
-    fn turns(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+    pub(super) fn turns(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
         let poses = self.through(motion, start);
         let mut pairs = poses.windows(2);
         pairs.any(|pair| pair[0].rotation.angle_to(&pair[1].rotation) > TURN)

@@ -13,11 +13,12 @@ use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};
 use crate::smooth::seed::Seed;
 
-/// Spans for each leg and the least number of them, the same where the tool turns, for which each costs several times as
-/// much, and the most of both.
-const SPANS: [usize; 2] = [30, 100];
-const TURNING: [usize; 2] = [8, 40];
-const MOST: usize = 400;
+/// Spans for each leg, for each of a long list, and the least number of all; the same where the tool turns, for which each costs
+/// several times as much.
+const SPANS: [usize; 3] = [30, 8, 100];
+const TURNING: [usize; 3] = [8, 6, 40];
+/// Spans from which on a list is long.
+const LONG: usize = 400;
 
 /// Knots that pass before the motion begins and after it has ended.
 const REST: usize = 3;
@@ -37,8 +38,8 @@ struct Sampled {
 
 impl Sampled {
     fn new(arm: &ArmMotion<'_>, (legs, turns): (usize, bool)) -> Option<Self> {
-        let [each, fewest] = if turns { TURNING } else { SPANS };
-        let spans = (each * legs).clamp(fewest, MOST);
+        let [each, at_least, fewest] = if turns { TURNING } else { SPANS };
+        let spans = (each * legs).clamp(fewest, LONG.max(at_least * legs));
         let spacing = arm.duration / spans as f64;
         let time = |k: usize| (k as f64 - REST as f64) * spacing;
         let states = (0..=spans + 2 * REST).map(|k| arm.state(time(k)));
