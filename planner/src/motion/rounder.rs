@@ -38,6 +38,8 @@ const FEW: usize = 20;
 /// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, and one that is
 /// dense is not searched with the joints.
 const MANY: usize = 60;
+/// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
+const DENSE: f64 = 4.0;
 
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
@@ -106,7 +108,7 @@ impl<const N: usize> Planner<N> {
             return None;
         }
         let (curve, course) = self.ruled(motion, start, RULED_LONG)?;
-        if curve.path.is_fitted() {
+        if is_dense(&curve) {
             return None;
         }
         let about = course.time;
@@ -169,16 +171,15 @@ impl<const N: usize> Planner<N> {
         found.unwrap_or(other)
     }
 
-    /// [`Planner::with_joints`] near a motion, but through no dense list of many poses, whose curve was fitted: where its poses
-    /// leave it no room, nothing is to be found.
+    /// [`Planner::with_joints`] near a motion, but through no dense list of many poses: they leave little room, and a search
+    /// takes longer than it saves.
     fn with_joints_near(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        let dense = motion.poses.len() > MANY && curve.path.is_fitted();
-        if dense {
+        if motion.poses.len() > MANY && is_dense(curve) {
             return None;
         }
         self.with_joints(motion, start, Course::of(planned))
@@ -316,4 +317,10 @@ fn sooner<const N: usize>(found: Option<PlannedMove<N>>, other: PlannedMove<N>) 
     let time = other.trajectory.duration();
     let found = found.filter(|found| found.trajectory.duration() <= time);
     found.unwrap_or(other)
+}
+
+/// Whether the poses of a curve are so near to each other that a tool that stops at each of them takes much longer.
+fn is_dense<const N: usize>(curve: &Followed<N>) -> bool {
+    let plan = &curve.path.plan;
+    curve.path.is_fitted() || plan.exact_stop() > DENSE * plan.duration()
 }
