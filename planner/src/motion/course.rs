@@ -29,16 +29,6 @@ impl<const N: usize> Course<N> {
             seed: None,
         }
     }
-
-    /// The same course for a search that does not go on where another ended.
-    pub(super) fn anew(&self) -> Self {
-        Self {
-            trajectory: self.trajectory.clone(),
-            passes: self.passes.clone(),
-            time: self.time,
-            seed: None,
-        }
-    }
 }
 
 impl<const N: usize> Planner<N> {

@@ -117,7 +117,13 @@ impl<const N: usize> Planner<N> {
         course.seed.as_ref()?;
         let last = self.searched(task, &course, (&region, task.gap));
         // On the knots of the searches before it may find no way inside of the bounds, on others it does.
-        let anew = || self.searched(task, &course.anew(), (&region, task.gap));
+        let anew = || {
+            let course = Course {
+                seed: None,
+                ..course
+            };
+            self.searched(task, &course, (&region, task.gap))
+        };
         let last = last.or_else(anew).map(|found| found.followed);
         let mut all = last.into_iter().chain(sure);
         all.find_map(|followed| {
