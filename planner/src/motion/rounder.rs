@@ -38,6 +38,8 @@ const FEW: usize = 20;
 /// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, and one that is
 /// dense is not searched with the joints.
 const MANY: usize = 60;
+/// Poses of a list from which on its parts may be searched better than the whole.
+const LONG: usize = 80;
 /// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
 const DENSE: f64 = 4.0;
 
@@ -100,10 +102,10 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The motion of a search with the joints that begins at the one along a rounder curve through a list of many poses that
-    /// turns. There the fastest curve of the tool takes ten times the planning, and is of no use. A long list that does not turn is
-    /// searched better from that curve.
+    /// turns, or of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
+    /// list that does not turn is searched better from that curve.
     fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        let many = motion.poses.len() > MANY && self.is_searched(motion);
+        let many = motion.poses.len() > MANY && Self::has_inverse();
         if !many || !self.turns(motion, start) {
             return None;
         }
@@ -112,8 +114,15 @@ impl<const N: usize> Planner<N> {
             return None;
         }
         let about = course.time;
-        let found = self.with_joints(motion, start, course)?;
-        (found.trajectory.duration() <= about).then_some(found)
+        let useful = |found: &PlannedMove<N>| found.trajectory.duration() <= about;
+        let found = self.with_joints(motion, start, course).filter(useful);
+        if found.is_some() && motion.poses.len() <= LONG {
+            return found;
+        }
+        match self.in_parts(motion, start).filter(useful) {
+            Some(in_parts) => Some(sooner(found, in_parts)),
+            None => found,
+        }
     }
 
     /// The joints along a curve that is found by a short search, if about their time over that of the tool is above `share`.
@@ -147,6 +156,7 @@ impl<const N: usize> Planner<N> {
             return first.planned;
         }
         let found = self.with_joints_near(motion, start, (&first.planned, curve));
+        let found = found.or_else(|| self.in_parts_near(motion, start, (&first.planned, curve)));
         match found {
             Some(found) if found.trajectory.duration() <= MUCH * time => found,
             found => sooner(found, self.on_others(motion, start, (first, curve), true)),
@@ -183,6 +193,23 @@ impl<const N: usize> Planner<N> {
             return None;
         }
         self.with_joints(motion, start, Course::of(planned))
+    }
+
+    /// [`Planner::in_parts`] where that is faster than a motion that is known, through a list of many poses that is not dense. One that
+    /// turns was tried before.
+    fn in_parts_near(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (planned, curve): (&PlannedMove<N>, &Followed<N>),
+    ) -> Option<PlannedMove<N>> {
+        let many = motion.poses.len() > MANY && Self::has_inverse();
+        if !many || motion.tolerance <= 0.0 || is_dense(curve) || self.turns(motion, start) {
+            return None;
+        }
+        let most = planned.trajectory.duration();
+        let found = self.in_parts(motion, start)?;
+        (found.trajectory.duration() < most).then_some(found)
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.

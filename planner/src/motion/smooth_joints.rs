@@ -105,13 +105,13 @@ impl<const N: usize> Planner<N> {
 
     /// The fastest motion of the joints along a smooth motion of the tool, that is never faster;
     /// [`MotionError::NoWay`], for less work, where none is shorter than `most` (s).
-    fn fastest_along(
+    pub(super) fn fastest_along(
         &self,
-        plan: &smooth::SmoothPlan,
+        curve: &dyn ToolCurve,
         (points, most): (&[FollowPoint<N>], f64),
         (crossings, motion): (&[Crossing], &Move),
     ) -> Result<Draft<N>, MotionError> {
-        let free = plan.duration();
+        let free = curve.end();
         let enough = free * (1.0 + ENOUGH);
         let slowed = || {
             let direct = Trajectory::new(pieces(points));
@@ -124,7 +124,7 @@ impl<const N: usize> Planner<N> {
         if let Some(direct) = direct.take_if(|direct| direct.trajectory.duration() <= enough) {
             return Ok(direct);
         }
-        let path = joint_path(plan, points)?;
+        let path = joint_path(curve, points)?;
         let timed = self.retimed(&path, (crossings, most), motion);
         let time = |draft: &Draft<N>| draft.trajectory.duration();
         let least = direct.as_ref().map_or(sure, time);

@@ -14,6 +14,7 @@ use nalgebra::{SVector, Vector3};
 use trajectory::Trajectory;
 use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
 
+use super::cartesian::pieces;
 use super::course::Course;
 use super::smooth_joints::{Followed, SmoothPath};
 use super::{PlannedMove, Planner};
@@ -97,10 +98,55 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         known: Course<N>,
     ) -> Option<PlannedMove<N>> {
-        if !self.is_searched(motion) {
-            return None;
-        }
-        let (most, middle) = (known.time, 0.5 * known.trajectory.duration());
+        let (most, region) = (known.time, self.region(&known.trajectory));
+        let mut all = self.searches(motion, start, known);
+        all.find_map(|followed| {
+            let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
+            let trajectory = &planned.trajectory;
+            let eased = self.missing_ease(trajectory, &region) <= 0.0;
+            let taken = trajectory.duration() < most && eased;
+            taken.then_some(planned)
+        })
+    }
+
+    /// The joints along the curve with which such searches end, if they need about less time for it.
+    pub(super) fn searched_along(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        known: Course<N>,
+    ) -> Option<Followed<N>> {
+        let (most, region) = (known.time, self.region(&known.trajectory));
+        let mut all = self.searches(motion, start, known);
+        all.find(|followed| {
+            let trajectory = Trajectory::new(pieces(&followed.points));
+            let eased = self.missing_ease(&trajectory, &region) <= 0.0;
+            self.about_time(&followed.points) < most && eased
+        })
+    }
+
+    /// The joints along the curve with which searches end, and those along one that was found before and is certified.
+    fn searches(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        known: Course<N>,
+    ) -> impl Iterator<Item = Followed<N>> {
+        let all = self
+            .is_searched(motion)
+            .then(|| self.search(motion, start, known));
+        let [last, sure] = all.unwrap_or_default();
+        last.into_iter().chain(sure)
+    }
+
+    /// The same, of a motion that is searched.
+    fn search(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        known: Course<N>,
+    ) -> [Option<Followed<N>>; 2] {
+        let middle = 0.5 * known.trajectory.duration();
         let middle = known.trajectory.sample(middle).position;
         let task = Task {
             motion,
@@ -114,7 +160,9 @@ impl<const N: usize> Planner<N> {
         };
         let mut region = self.region(&known.trajectory);
         let (course, sure) = self.fastest_course(task, known, &mut region);
-        course.seed.as_ref()?;
+        if course.seed.is_none() {
+            return [None, None];
+        }
         let last = self.searched(task, &course, (&region, task.gap));
         // On the knots of the searches before it may find no way inside of the bounds, on others it does.
         let anew = || {
@@ -125,20 +173,17 @@ impl<const N: usize> Planner<N> {
             self.searched(task, &course, (&region, task.gap))
         };
         let last = last.or_else(anew).map(|found| found.followed);
-        let mut all = last.into_iter().chain(sure);
-        all.find_map(|followed| {
-            let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
-            let trajectory = &planned.trajectory;
-            let eased = self.missing_ease(trajectory, &region) <= 0.0;
-            let taken = trajectory.duration() < most && eased;
-            taken.then_some(planned)
-        })
+        [last, sure]
     }
 
     /// Whether a motion is searched with the joints, where they rule.
-    pub(super) fn is_searched(&self, motion: &Move) -> bool {
-        let has_inverse = N == 6 || N == 7;
-        has_inverse && POSES.contains(&motion.poses.len())
+    fn is_searched(&self, motion: &Move) -> bool {
+        Self::has_inverse() && POSES.contains(&motion.poses.len())
+    }
+
+    /// Whether the joints follow a tool, with one to spare or none.
+    pub(super) fn has_inverse() -> bool {
+        N == 6 || N == 7
     }
 
     /// Whether the tool turns from one pose to the next.
