@@ -7,9 +7,9 @@
 use std::ops::Range;
 
 use kinematics::follow::FollowPoint;
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::SVector;
 use trajectory::bounds::JointsToTool;
-use trajectory::smooth::angular_tolerance;
+use trajectory::smooth::{angular_tolerance, off_segment};
 use trajectory::{JointPoint, ToolCurve, ToolPoint};
 
 use super::certificate::{Arm, corridor};
@@ -45,6 +45,8 @@ struct AlongParts<'a, const N: usize> {
     seams: &'a [Seam],
     /// When each part would begin, s.
     starts: Vec<f64>,
+    /// The joints along all of it, whose parameter is time.
+    points: Vec<FollowPoint<N>>,
 }
 
 impl<const N: usize> ToolCurve for AlongParts<'_, N> {
@@ -54,7 +56,7 @@ impl<const N: usize> ToolCurve for AlongParts<'_, N> {
     }
 
     fn knots(&self) -> Vec<f64> {
-        self.points().iter().map(|point| point.u).collect()
+        self.points.iter().map(|point| point.u).collect()
     }
 
     fn at(&self, u: f64) -> ToolPoint {
@@ -78,12 +80,15 @@ impl<'a, const N: usize> AlongParts<'a, N> {
         for seam in seams {
             starts.push(starts[starts.len() - 1] - seam.shift);
         }
-        Self {
+        let mut all = Self {
             planner,
             parts,
             seams,
             starts,
-        }
+            points: Vec::new(),
+        };
+        all.points = all.joints();
+        all
     }
 
     /// A part and the next one.
@@ -92,7 +97,7 @@ impl<'a, const N: usize> AlongParts<'a, N> {
     }
 
     /// The joints along all of it, whose parameter is time.
-    fn points(&self) -> Vec<FollowPoint<N>> {
+    fn joints(&self) -> Vec<FollowPoint<N>> {
         let mut all: Vec<FollowPoint<N>> = Vec::new();
         for (p, part) in self.parts.iter().enumerate() {
             let start = self.starts[p];
@@ -133,14 +138,6 @@ impl<'a, const N: usize> AlongParts<'a, N> {
         let all = all.into_iter();
         all.map(|time| Crossing { time, rests: None }).collect()
     }
-}
-
-/// Distance of a place from a leg, m.
-fn off_leg(place: &Vector3<f64>, [from, to]: [&Isometry3<f64>; 2]) -> f64 {
-    let way = to.translation.vector - from.translation.vector;
-    let off = place - from.translation.vector;
-    let share = off.dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
-    (off - way * share.clamp(0.0, 1.0)).norm()
 }
 
 impl<const N: usize> Planner<N> {
@@ -263,8 +260,8 @@ impl<const N: usize> Planner<N> {
         sees && times.all(|time| {
             let next = inner.start + passes.partition_point(|pass| *pass <= time);
             let place = seen(time).translation.vector;
-            let leg = [&motion.poses[next - 1], &motion.poses[next]];
-            off_leg(&place, leg) <= corridor(motion)
+            let leg = [next - 1, next].map(|pose| motion.poses[pose].translation.vector);
+            off_segment(&place, &leg) <= corridor(motion)
         })
     }
 
@@ -276,8 +273,8 @@ impl<const N: usize> Planner<N> {
         (parts, seams): (&[Part<N>], &[Seam]),
     ) -> Option<PlannedMove<N>> {
         let curve = AlongParts::new(self, parts, seams);
-        let (points, crossings) = (curve.points(), curve.crossings());
-        let draft = self.fastest_along(&curve, (&points, f64::INFINITY), (&crossings, motion));
+        let along = (curve.points.as_slice(), f64::INFINITY);
+        let draft = self.fastest_along(&curve, along, (&curve.crossings(), motion));
         let planned = self.certify(motion, start, draft.ok()?).ok()?;
         let plans = parts.iter().map(|part| part.followed.path.blend());
         let jerks = plans.map(|blend| blend.jerk_ratio);

@@ -105,8 +105,7 @@ impl<const N: usize> Planner<N> {
     /// turns, or of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
     /// list that does not turn is searched better from that curve.
     fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        let many = motion.poses.len() > MANY && Self::has_inverse();
-        if !many || !self.turns(motion, start) {
+        if !Self::has_many(motion) || !self.turns(motion, start) {
             return None;
         }
         let (curve, course) = self.ruled(motion, start, RULED_LONG)?;
@@ -203,13 +202,18 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        let many = motion.poses.len() > MANY && Self::has_inverse();
-        if !many || motion.tolerance <= 0.0 || is_dense(curve) || self.turns(motion, start) {
+        let is_open = motion.tolerance > 0.0 && !is_dense(curve);
+        if !Self::has_many(motion) || !is_open || self.turns(motion, start) {
             return None;
         }
         let most = planned.trajectory.duration();
         let found = self.in_parts(motion, start)?;
         (found.trajectory.duration() < most).then_some(found)
+    }
+
+    /// Whether a list has many poses for a search with the joints.
+    fn has_many(motion: &Move) -> bool {
+        motion.poses.len() > MANY && Self::has_inverse()
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.

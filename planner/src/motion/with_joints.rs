@@ -56,6 +56,7 @@ const FARTHER: f64 = 3.0;
 const LOOKS: u32 = 24;
 
 /// How far a search may go.
+#[derive(Clone)]
 struct Region {
     /// How far each joint may go from where it is looked at, rad or m.
     far: f64,
@@ -99,7 +100,7 @@ impl<const N: usize> Planner<N> {
         known: Course<N>,
     ) -> Option<PlannedMove<N>> {
         let (most, region) = (known.time, self.region(&known.trajectory));
-        let mut all = self.searches(motion, start, known);
+        let mut all = self.searches(motion, start, (known, &region));
         all.find_map(|followed| {
             let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
             let trajectory = &planned.trajectory;
@@ -117,7 +118,7 @@ impl<const N: usize> Planner<N> {
         known: Course<N>,
     ) -> Option<Followed<N>> {
         let (most, region) = (known.time, self.region(&known.trajectory));
-        let mut all = self.searches(motion, start, known);
+        let mut all = self.searches(motion, start, (known, &region));
         all.find(|followed| {
             let trajectory = Trajectory::new(pieces(&followed.points));
             let eased = self.missing_ease(&trajectory, &region) <= 0.0;
@@ -130,8 +131,8 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        known: Course<N>,
-    ) -> impl Iterator<Item = Followed<N>> {
+        known: (Course<N>, &Region),
+    ) -> impl Iterator<Item = Followed<N>> + use<N> {
         let all = self
             .is_searched(motion)
             .then(|| self.search(motion, start, known));
@@ -144,7 +145,7 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        known: Course<N>,
+        (known, region): (Course<N>, &Region),
     ) -> [Option<Followed<N>>; 2] {
         let middle = 0.5 * known.trajectory.duration();
         let middle = known.trajectory.sample(middle).position;
@@ -158,7 +159,7 @@ impl<const N: usize> Planner<N> {
                 GAP
             },
         };
-        let mut region = self.region(&known.trajectory);
+        let mut region = region.clone();
         let (course, sure) = self.fastest_course(task, known, &mut region);
         if course.seed.is_none() {
             return [None, None];

@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Vector3};
+use trajectory::smooth::off_segment;
 
 use super::arm::{ToolState, angle_between};
 use super::between::{Quintic, from_rest, off_quintic};
@@ -217,14 +218,7 @@ impl SmoothMove<'_> {
             Some(before) => self.motion.poses[before].translation.vector,
             None => self.span.start.translation.vector,
         };
-        let way = self.motion.poses[leg].translation.vector - from;
-        let square = way.norm_squared();
-        let share = if square > 0.0 {
-            ((point - from).dot(&way) / square).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        (point - from - way * share).norm()
+        off_segment(point, &[from, self.motion.poses[leg].translation.vector])
     }
 
     /// How near the motion comes to the pose at the end of a leg between row `row` and the next; if

@@ -8,7 +8,7 @@ use super::MotionBounds;
 use super::stretch::Stretch;
 use crate::found::Found;
 use crate::poly::halve;
-use crate::smooth::to_segment;
+use crate::smooth::off_segment;
 
 /// A straight leg of the path, and the time in which it is travelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +53,7 @@ impl<const N: usize> MotionBounds<N> {
         };
         let mut first = 0;
         for leg in legs {
-            let size = |place: &Vector3<f64>| to_segment(place, &leg.ends);
+            let size = |place: &Vector3<f64>| off_segment(place, &leg.ends);
             while self
                 .stretches
                 .get(first)

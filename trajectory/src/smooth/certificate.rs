@@ -327,7 +327,7 @@ fn corridor(spans: &[Span], poses: &[Isometry3<f64>], crossings: &[Crossing], wi
 fn away(control: &[Vector3<f64>; 5], ends: &[Vector3<f64>; 2], room: f64, depth: u32) -> f64 {
     let mut bound = 0.0;
     for c in control {
-        let distance = to_segment(c, ends);
+        let distance = off_segment(c, ends);
         if distance > bound || distance.is_nan() {
             bound = distance;
         }
@@ -339,8 +339,18 @@ fn away(control: &[Vector3<f64>; 5], ends: &[Vector3<f64>; 2], room: f64, depth:
     away(&left, ends, room, depth - 1).max(away(&right, ends, room, depth - 1))
 }
 
-/// Distance of a point from a segment, m.
-pub(crate) fn to_segment(point: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
+/// Distance of a point from a segment that is given by its ends, all in m in one frame.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use trajectory::smooth::off_segment;
+///
+/// let leg = [Vector3::zeros(), Vector3::x()];
+/// assert_eq!(off_segment(&Vector3::new(0.5, 0.2, 0.0), &leg), 0.2);
+/// assert_eq!(off_segment(&Vector3::new(4.0, 4.0, 0.0), &leg), 5.0);
+/// ```
+#[must_use]
+pub fn off_segment(point: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
     let way = ends[1] - ends[0];
     let square = way.norm_squared();
     let share = if square > 0.0 {

@@ -45,8 +45,7 @@ mod windows;
 
 use crate::poly;
 pub use arm::{ArmMotion, ArmState, JointBounds, JointState};
-pub(crate) use certificate::to_segment;
-pub use certificate::{Certificate, Peak};
+pub use certificate::{Certificate, Peak, off_segment};
 pub use crossing::{Crossing, RESOLUTION};
 pub use dense::{FittedCurve, FittedPart};
 pub use for_arm::{ArmPlan, SpareSpline, plan_for_arm};
