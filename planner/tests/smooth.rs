@@ -203,11 +203,11 @@ fn a_long_list_is_as_fast_as_its_halves() {
     assert!(whole <= halves, "{whole} s, {halves} s in halves");
 }
 
-/// The same of lists where a search of the whole finds nothing, so that their parts are searched: the halves may be a little
-/// better by luck. These took 5 to 16 % longer.
+/// The same of lists where a search of the whole found nothing, so that their parts are searched: the halves may be a little
+/// better by luck. These took 5 to 16 % longer, two of them also when parts were searched, where no search found anything.
 #[test]
 fn a_list_in_parts_is_as_fast_as_its_halves() {
-    for seed in 2..=4 {
+    for seed in [2, 3, 4, 5, 8] {
         let [whole, halves] = whole_and_halves(seed);
         let most = 1.01 * halves;
         assert!(

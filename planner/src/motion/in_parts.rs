@@ -14,14 +14,15 @@ use trajectory::{JointPoint, ToolCurve, ToolPoint};
 
 use super::certificate::{Arm, corridor};
 use super::draft::Crossing;
+use super::rounder::sooner;
 use super::seam::{Part, Seam};
 use super::smooth::Search;
 use super::smooth_joints::{Followed, HELPED};
 use super::{Blend, PlannedMove, Planner};
 use crate::task::Move;
 
-/// Poses of a part, and how many of them are those of the next one, too.
-const PART: usize = 32;
+/// Poses of a part, as two divisions of a list have them, and how many of them are those of the next one, too.
+const PARTS: [usize; 2] = [24, 32];
 const OVERLAP: usize = 10;
 /// Most legs over which a seam reaches at either side of its pose.
 const LEGS: usize = 3;
@@ -140,11 +141,34 @@ impl<'a, const N: usize> AlongParts<'a, N> {
     }
 }
 
+/// Whether so many poses are no more than one part of about this size.
+fn is_whole(size: usize, poses: usize) -> bool {
+    poses <= size + size / 2
+}
+
 impl<const N: usize> Planner<N> {
-    /// The motion through a list whose parts are searched for themselves; `None` where two of them do not meet, and where one rests
-    /// on its way.
+    /// The motion through a list whose parts are searched for themselves: the faster one of those along two divisions of it.
     pub(super) fn in_parts(
         &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Option<PlannedMove<N>> {
+        let [few, many] = PARTS;
+        let found = self.in_parts_of(few, motion, start);
+        if is_whole(few, motion.poses.len()) {
+            return found;
+        }
+        match self.in_parts_of(many, motion, start) {
+            Some(other) => Some(sooner(found, other)),
+            None => found,
+        }
+    }
+
+    /// The motion through a list whose parts of so many poses are searched for themselves; `None` where two of them do not meet, and
+    /// where one rests on its way.
+    fn in_parts_of(
+        &self,
+        size: usize,
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Option<PlannedMove<N>> {
@@ -152,8 +176,8 @@ impl<const N: usize> Planner<N> {
         let (mut parts, mut seams) = (Vec::<Part<N>>::new(), Vec::new());
         let (mut from, mut joints) = (0, *start);
         loop {
-            let short = from + PART + PART / 2 >= count;
-            let end = if short { count } else { from + PART };
+            let short = is_whole(size, count - from);
+            let end = if short { count } else { from + size };
             let part = Part::new(from..end, self.part(motion, from..end, &joints)?);
             let moves = !part.followed.points.is_empty();
             if !moves || part.followed.path.blend().fallbacks > 0 {

@@ -28,6 +28,7 @@ mod rounder;
 mod screw;
 mod seam;
 mod singular;
+mod slow_time;
 mod smooth;
 mod smooth_joints;
 mod soonest;

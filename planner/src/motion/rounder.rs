@@ -35,11 +35,9 @@ const FORETOLD: f64 = 1.1;
 /// Most spans of a curve, and most poses of a list, that is cheap enough for others.
 const CHEAP: usize = 400;
 const FEW: usize = 20;
-/// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, and one that is
-/// dense is not searched with the joints.
+/// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, also with a spare joint, and
+/// one that is dense is not searched with the joints.
 const MANY: usize = 60;
-/// Poses of a list from which on its parts may be searched better than the whole.
-const LONG: usize = 80;
 /// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
 const DENSE: f64 = 4.0;
 
@@ -101,11 +99,13 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The motion of a search with the joints that begins at the one along a rounder curve through a list of many poses that
-    /// turns, or of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
-    /// list that does not turn is searched better from that curve.
+    /// The faster motion of a search with the joints that begins at the one along a rounder curve through a list of many poses that
+    /// turns, and of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
+    /// list that does not turn is searched better from that curve, and one that is less long for an arm with a spare joint.
     fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        if !Self::has_many(motion) || !self.turns(motion, start) {
+        let most = if N > 6 { MANY } else { FEW };
+        let many = motion.poses.len() > most && Self::has_inverse();
+        if !many || !self.turns(motion, start) {
             return None;
         }
         let (curve, course) = self.ruled(motion, start, RULED_LONG)?;
@@ -115,9 +115,6 @@ impl<const N: usize> Planner<N> {
         let about = course.time;
         let useful = |found: &PlannedMove<N>| found.trajectory.duration() <= about;
         let found = self.with_joints(motion, start, course).filter(useful);
-        if found.is_some() && motion.poses.len() <= LONG {
-            return found;
-        }
         match self.in_parts(motion, start).filter(useful) {
             Some(in_parts) => Some(sooner(found, in_parts)),
             None => found,
@@ -344,7 +341,10 @@ impl<const N: usize> Planner<N> {
 }
 
 /// The motion that ends first.
-fn sooner<const N: usize>(found: Option<PlannedMove<N>>, other: PlannedMove<N>) -> PlannedMove<N> {
+pub(super) fn sooner<const N: usize>(
+    found: Option<PlannedMove<N>>,
+    other: PlannedMove<N>,
+) -> PlannedMove<N> {
     let time = other.trajectory.duration();
     let found = found.filter(|found| found.trajectory.duration() <= time);
     found.unwrap_or(other)

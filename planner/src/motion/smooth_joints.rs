@@ -150,7 +150,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The factor by which time has to be stretched so that the joints keep their limits at a point.
-    fn slowdown(&self, point: &FollowPoint<N>) -> f64 {
+    pub(super) fn slowdown(&self, point: &FollowPoint<N>) -> f64 {
         let limits = &self.limits;
         let [_, velocity, acceleration, jerk] = &point.q;
         let most = |rates: &SVector<f64, N>, limits: &SVector<f64, N>| {

@@ -161,20 +161,14 @@ impl<const N: usize> Planner<N> {
         };
         let mut region = region.clone();
         let (course, sure) = self.fastest_course(task, known, &mut region);
-        if course.seed.is_none() {
-            return [None, None];
-        }
         let last = self.searched(task, &course, (&region, task.gap));
         // On the knots of the searches before it may find no way inside of the bounds, on others it does.
-        let anew = || {
-            let course = Course {
-                seed: None,
-                ..course
-            };
-            self.searched(task, &course, (&region, task.gap))
+        let last = if last.is_none() && course.seed.is_some() {
+            self.searched(task, &course.anew(), (&region, task.gap))
+        } else {
+            last
         };
-        let last = last.or_else(anew).map(|found| found.followed);
-        [last, sure]
+        [last.map(|found| found.followed), sure]
     }
 
     /// Whether a motion is searched with the joints, where they rule.
@@ -245,11 +239,11 @@ impl<const N: usize> Planner<N> {
     ) -> Option<Found<N>> {
         let (motion, start) = (task.motion, task.start);
         let along = task.spare.unwrap_or_else(SVector::zeros);
-        let at = |time: f64| self.state(&from.trajectory.sample(time).position, &along);
+        let at = |time: f64| self.state(&from.joints(time), &along);
         let arm = ArmMotion {
-            duration: from.trajectory.duration(),
+            duration: from.duration(),
             at: &at,
-            passes: &from.passes,
+            passes: &from.passes(),
             bounds: &self.joint_bounds(region),
             far: region.far,
             has_spare: task.spare.is_some(),
@@ -264,10 +258,8 @@ impl<const N: usize> Planner<N> {
         let spare = spare.map(|spare| NullMotion::given(along, move |t| spare.at(t)));
         let path = SmoothPath::new(plan, motion.tolerance, &poses);
         let followed = self.joints_on(path, start, spare.as_ref()).ok()?;
-        let course = Course {
-            seed: Some(seed),
-            ..self.course_along(&followed)
-        };
+        let foretold = followed.path.plan.duration();
+        let course = self.course_along(&followed).onward(seed, foretold);
         Some(Found { followed, course })
     }
 

@@ -7,10 +7,13 @@ use nalgebra::Vector3;
 
 use super::basis;
 use super::build::Task;
+use super::frame::Frame;
 use super::joint::{Joint, dot};
 use super::problem::{Point, Problem, ways};
+use super::solve::{Aims, Effort, solve};
 use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};
+use crate::smooth::crossing::crossings;
 use crate::smooth::seed::Seed;
 
 /// Spans for each leg, for each of a long list, and the least number of all; the same where the tool turns, for which each costs
@@ -26,6 +29,9 @@ const REST: usize = 3;
 const FIXED: usize = 4;
 /// A joint that is beyond its range, or nearer to its end than this (rad, m), may stay there.
 const AT_END: f64 = 1e-3;
+/// Further searches where a pose is not passed on the first approach, and times in knots that are the same.
+const AGAIN: usize = 2;
+const SAME: f64 = 0.1;
 
 /// What the arm has at the control points.
 struct Sampled {
@@ -83,9 +89,9 @@ impl Task<'_> {
         let (point, places, states) = match seed {
             // What a rough search has found needs more knots to come nearer to the optimum.
             Some(seed) if !arm.rough && Problem::<D>::TURNS => {
-                self.onward(problem, arm, &seed.refined())?
+                self.onward(problem, (arm, used), &seed.refined())?
             }
-            Some(seed) => self.onward(problem, arm, seed)?,
+            Some(seed) => self.onward(problem, (arm, used), seed)?,
             None => self.sampled(problem, arm, used)?,
         };
         problem.joints = (0..arm.bounds.len())
@@ -114,6 +120,7 @@ impl Task<'_> {
             control.push(c);
         }
         self.see_poses(problem, (arm, &sampled), used)?;
+        problem.frames = frames(states, (&sampled.turns, used));
         if let Some(spare) = spare {
             problem.start[0][spare] = control[0][spare];
         }
@@ -146,7 +153,7 @@ impl Task<'_> {
     fn onward<const D: usize>(
         &self,
         problem: &mut Problem<D>,
-        arm: &ArmMotion<'_>,
+        (arm, used): (&ArmMotion<'_>, [bool; 2]),
         seed: &Seed,
     ) -> Option<Begin<D>> {
         let point = Point {
@@ -156,25 +163,57 @@ impl Task<'_> {
         };
         problem.scale = seed.spacing;
         problem.vertices = Seed::used(&seed.vertices);
-        if Problem::<D>::TURNS {
-            let aims = self.aims(problem, &point);
-            let last = problem.vertices.len() - 1;
-            problem.vertices[1..last].copy_from_slice(&aims);
-        }
-        problem.ways = ways(&problem.vertices);
         if let Some(spare) = Problem::<D>::SPARE {
             problem.start[0][spare] = point.control[0][spare];
         }
         // The times at which the control points count most, in knots.
         let times = (0..point.control.len()).map(|k| k as f64 - 1.5);
         let states = times.clone().map(|time| arm.state(time * seed.spacing));
-        let states = states.collect::<Option<_>>()?;
+        let states: Vec<ArmState> = states.collect::<Option<_>>()?;
         let place = |time: f64| point.at(time.clamp(0.0, point.spans() as f64))[0];
         let mut places: Vec<[f64; D]> = times.map(place).collect();
+        let turns: Vec<Vector3<f64>> = places.iter().map(Problem::<D>::turn).collect();
+        problem.frames = frames(&states, (&turns, used));
+        self.see_aims(problem, &point);
         for d in 0..D {
             sharpen(&mut places, |c| &mut c[d]);
         }
         Some((point, places, states))
+    }
+
+    /// Moves the inner vertices of orientations to where an iterate sees the poses.
+    fn see_aims<const D: usize>(&self, problem: &mut Problem<D>, point: &Point<D>) {
+        if Problem::<D>::TURNS {
+            let aims = self.aims(problem, point);
+            let last = problem.vertices.len() - 1;
+            problem.vertices[1..last].copy_from_slice(&aims);
+        }
+        problem.ways = ways(&problem.vertices);
+    }
+
+    /// Searches on from a solution that approaches a pose where it is not turned as it has to be before it passes it: a pose counts as
+    /// passed on the first approach. The solution stays where that does not help.
+    pub(super) fn pass_first<const D: usize, const B: usize>(
+        &self,
+        (problem, point): (&mut Problem<D>, &mut Point<D>),
+        (effort, aims): (Effort, Option<Aims<'_, D>>),
+        used: [bool; 2],
+    ) {
+        for _ in 0..AGAIN {
+            let h = problem.spacing(point.z);
+            let passes = crossings(&self.spans(problem, point, used), self.poses, self.options);
+            let mut all = passes.iter().zip(&point.crossings);
+            if all.all(|(pass, time)| pass.holds() || (pass.time / h - time).abs() < SAME) {
+                return;
+            }
+            let (mut other, mut first) = (problem.clone(), point.clone());
+            first.crossings = passes.iter().map(|pass| pass.time / h).collect();
+            self.see_aims(&mut other, &first);
+            if solve::<D, B>(&mut other, &mut first, effort, aims).is_none() {
+                return;
+            }
+            (*problem, *point) = (other, first);
+        }
     }
 
     /// Where a search has ended.
@@ -251,6 +290,16 @@ impl Task<'_> {
             changes,
         }
     }
+}
+
+/// The known motion at the control points, which stand for these rotation vectors; none where it does not turn.
+fn frames(states: &[ArmState], (turns, used): (&[Vector3<f64>], [bool; 2])) -> Vec<Frame> {
+    let all = states.iter().zip(turns).filter(|_| used[1]);
+    let frame = |(state, turn): (&ArmState, &Vector3<f64>)| Frame {
+        rotation: state.pose.rotation,
+        vector: *turn,
+    };
+    all.map(frame).collect()
 }
 
 /// [`basis::reproduce`] of all places but those that do not move.

@@ -235,6 +235,7 @@ impl<'a> Task<'a> {
                 Vec::new()
             },
             joints: Vec::new(),
+            frames: Vec::new(),
         };
         if let Some(moving) = self.moving {
             let spacing = moving.spacing;
@@ -244,6 +245,9 @@ impl<'a> Task<'a> {
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
         let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
         solve::<D, B>(&mut problem, &mut point, effort, aims)?;
+        if self.request.arm.is_some() {
+            self.pass_first::<D, B>((&mut problem, &mut point), (effort, aims), used);
+        }
         Some(Found {
             spans: self.spans(&problem, &point, used),
             seed: Self::seed(&problem, &point),
@@ -304,7 +308,7 @@ impl<'a> Task<'a> {
     }
 
     /// Spans of a solution.
-    fn spans<const D: usize>(
+    pub(super) fn spans<const D: usize>(
         &self,
         problem: &Problem<D>,
         point: &Point<D>,
@@ -349,8 +353,8 @@ impl<'a> Task<'a> {
             .collect()
     }
 
-    /// Control orientations: the control points rolled out from the start; the small drift from the
-    /// poses is distributed over the path.
+    /// Control orientations: those beside the known motion of an arm, or the control points rolled out from the start; the small
+    /// drift from the poses is then distributed over the path.
     ///
     /// Rolling a polygon of rotation vectors keeps every angular rate; cutting its corners changes
     /// its end by the square of the tolerance.
@@ -360,11 +364,13 @@ impl<'a> Task<'a> {
         point: &Point<D>,
         h: f64,
     ) -> Vec<UnitQuaternion<f64>> {
-        let (knots, first) = (point.control.len(), Problem::<D>::LAST);
-        let vector = |k: usize| {
-            let c = &point.control[k];
-            Vector3::new(c[first], c[first + 1], c[first + 2])
-        };
+        let last = self.poses.len() - 1;
+        if !problem.frames.is_empty() {
+            let ends = [0, last].map(|pose| self.poses[pose].rotation);
+            return problem.turned(point, ends);
+        }
+        let knots = point.control.len();
+        let vector = |k: usize| Problem::<D>::turn(&point.control[k]);
         let mut result = match self.moving {
             Some(moving) => rotations(&moving.state, h),
             None => [self.poses[0].rotation; 4],
@@ -375,15 +381,11 @@ impl<'a> Task<'a> {
             result.push(result[k - 1] * step);
         }
         let mut from = 3;
-        // The orientations of an arm's motion are not those of the legs.
-        let mut anchors = match self.request.arm {
-            Some(_) => Vec::new(),
-            None => anchors(problem, point),
-        };
-        anchors.push((knots - 4, self.poses.len() - 1));
+        let mut anchors = anchors(problem, point);
+        anchors.push((knots - 4, last));
         let end = match self.request.finish {
             Some(finish) => rotations(finish, h),
-            None => [self.poses[self.poses.len() - 1].rotation; 4],
+            None => [self.poses[last].rotation; 4],
         };
         for (to, leg) in anchors {
             let target = if to == knots - 4 {

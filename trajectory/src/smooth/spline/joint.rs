@@ -40,6 +40,13 @@ impl<const D: usize> Joint<D> {
         positions
     }
 
+    /// Whether it is within its range at all control points.
+    pub(super) fn is_within(&self, control: &[[f64; D]]) -> bool {
+        let positions = self.positions(control);
+        let mut all = positions.iter().zip(&self.range);
+        all.all(|(q, [middle, half])| (q - middle).abs() < *half)
+    }
+
     /// Greatest ratio of speed, acceleration and jerk to their bounds.
     pub(super) fn ratios(&self, control: &[[f64; D]], h: f64) -> [f64; 3] {
         let positions = self.positions(control);

@@ -260,6 +260,7 @@ mod tests {
             anchor: None,
             led: Vec::new(),
             joints: Vec::new(),
+            frames: Vec::new(),
         }
     }
 

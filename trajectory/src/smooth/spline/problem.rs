@@ -9,6 +9,7 @@
 use simd::{F4, Four};
 
 use super::basis::{self, START, weights};
+use super::frame::Frame;
 use super::joint::{BOUNDS, Joint};
 
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
@@ -48,6 +49,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) led: Vec<bool>,
     /// The joints of an arm that follow.
     pub(crate) joints: Vec<Joint<D>>,
+    /// The known motion of an arm that turns, at each control point; empty: orientations are rolled out.
+    pub(crate) frames: Vec<Frame>,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much

@@ -3,6 +3,7 @@
 
 use super::barrier::{Barrier, KEEP, Seen};
 use super::newton::{Step, System};
+use super::nudge::nudge;
 use super::problem::{Point, Problem, Room, spreading, ways};
 use super::project::project;
 
@@ -532,6 +533,9 @@ fn begin<const D: usize>(problem: &mut Problem<D>, point: &mut Point<D>, effort:
     }
     problem.pin(point);
     project(problem, point, None, 20);
+    if !problem.joints.is_empty() {
+        nudge(problem, point);
+    }
     if problem.anchor.is_some() || !problem.moving() {
         slow_down(problem, point);
     }
