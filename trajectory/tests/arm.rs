@@ -1,10 +1,10 @@
-//! Smooth motions for an arm, whose joints are affine functions of the tool here, so that what is asked of them can be
-//! checked by sampling alone.
+//! Smooth motions for an arm, whose joints are affine functions of the tool's position and rotation vector here, so that what is
+//! asked of them can be checked by sampling alone.
 //!
 //! `ARM_LISTS=2000 cargo test -p trajectory --release --test arm` is the long run.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use trajectory::smooth::{
     ArmMotion, ArmPlan, ArmState, JointBounds, JointState, Seed, SmoothOptions, SmoothPlan, plan,
     plan_for_arm,
@@ -42,8 +42,6 @@ struct Case {
     poses: Vec<Isometry3<f64>>,
     options: SmoothOptions,
     tool: SmoothPlan,
-    /// The orientations of the tool's motion at even times, rolled out: the sums of its turns in its own axes.
-    turns: Vec<Vector3<f64>>,
     slower: f64,
     changes: [[f64; 7]; JOINTS],
     bounds: [JointBounds; JOINTS],
@@ -80,7 +78,6 @@ impl Case {
         let mut case = Self {
             poses,
             options,
-            turns: rolled(&tool),
             tool,
             slower: 1.0,
             changes,
@@ -94,13 +91,24 @@ impl Case {
     /// The arm at a time of the motion that is known.
     fn state(&self, time: f64) -> ArmState {
         let pose = self.tool.at(time / self.slower).pose;
-        let at = (time / self.slower / self.tool.duration()).clamp(0.0, 1.0) * STEPS as f64;
-        let k = (at as usize).min(STEPS - 1);
-        let turn = self.turns[k].lerp(&self.turns[k + 1], at - k as f64);
-        let joint = |j: usize| JointState {
-            position: dot(&self.changes[j][..3], pose.translation.vector.as_slice())
-                + dot(&self.changes[j][3..6], turn.as_slice()),
-            changes: self.changes[j],
+        let vector = pose.rotation.scaled_axis();
+        let turned = vector_with_turns(&pose.rotation);
+        let joint = |j: usize| {
+            let with = &self.changes[j];
+            let about = |d: usize| dot(&with[3..6], turned.column(d).as_slice());
+            JointState {
+                position: dot(&with[..3], pose.translation.vector.as_slice())
+                    + dot(&with[3..6], vector.as_slice()),
+                changes: [
+                    with[0],
+                    with[1],
+                    with[2],
+                    about(0),
+                    about(1),
+                    about(2),
+                    with[6],
+                ],
+            }
         };
         ArmState {
             pose,
@@ -171,10 +179,7 @@ impl Case {
     /// Speed, acceleration and jerk of a joint along a plan at a time.
     fn rates(&self, plan: &SmoothPlan, spare: [f64; 4], (j, time): (usize, f64)) -> [f64; 3] {
         let point = plan.at(time);
-        let back = point.pose.rotation.inverse();
-        let [w, a, b] = point.angular.map(|x| back * x);
-        // Rates in the axes of the tool, which turn with it.
-        let angular = [w, a, b - w.cross(&a)];
+        let angular = vector_rates(plan, time);
         std::array::from_fn(|k| {
             dot(&self.changes[j][..3], point.linear[k].as_slice())
                 + dot(&self.changes[j][3..6], angular[k].as_slice())
@@ -212,18 +217,28 @@ impl Case {
     }
 }
 
-/// Steps in which orientations are rolled out.
-const STEPS: usize = 4000;
+/// By how much the rotation vector of an orientation changes, to first order, with turns about x, y and z of the tool.
+fn vector_with_turns(rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    let step = 1e-5;
+    let turned = |axis: Vector3<f64>| {
+        let by =
+            |angle: f64| (rotation * UnitQuaternion::from_scaled_axis(axis * angle)).scaled_axis();
+        (by(step) - by(-step)) / (2.0 * step)
+    };
+    Matrix3::from_columns(&[Vector3::x(), Vector3::y(), Vector3::z()].map(turned))
+}
 
-fn rolled(tool: &SmoothPlan) -> Vec<Vector3<f64>> {
-    let step = tool.duration() / STEPS as f64;
-    let rotation = |k: usize| tool.at(step * k as f64).pose.rotation;
-    let mut turns = vec![Vector3::zeros()];
-    for k in 0..STEPS {
-        let turn = (rotation(k).inverse() * rotation(k + 1)).scaled_axis();
-        turns.push(turns[k] + turn);
-    }
-    turns
+/// The first three derivatives of the rotation vector along a plan, at the time nearest to one at which differences are inside of it.
+fn vector_rates(plan: &SmoothPlan, time: f64) -> [Vector3<f64>; 3] {
+    let step = 5e-4;
+    let time = time.clamp(2.0 * step, plan.duration() - 2.0 * step);
+    let at = |k: f64| plan.at(time + k * step).pose.rotation.scaled_axis();
+    let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(at);
+    [
+        (d - b) / (2.0 * step),
+        (d - c * 2.0 + b) / step.powi(2),
+        (e - d * 2.0 + b * 2.0 - a) / (2.0 * step.powi(3)),
+    ]
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
