@@ -5,8 +5,6 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::problem::{Point, Problem};
-
 /// The known motion at a control point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
@@ -20,27 +18,6 @@ impl Frame {
     /// The orientation of a control point with this rotation vector.
     pub(super) fn at(&self, vector: &Vector3<f64>) -> UnitQuaternion<f64> {
         self.rotation * UnitQuaternion::from_scaled_axis(vector - self.vector)
-    }
-}
-
-impl<const D: usize> Problem<D> {
-    /// The rotation vector of a control point.
-    pub(super) fn turn(control: &[f64; D]) -> Vector3<f64> {
-        Vector3::from_fn(|d, _| control[Self::LAST + d])
-    }
-
-    /// The control orientations of an iterate beside the known motion, from rest to rest between two orientations.
-    pub(super) fn turned(
-        &self,
-        point: &Point<D>,
-        [start, end]: [UnitQuaternion<f64>; 2],
-    ) -> Vec<UnitQuaternion<f64>> {
-        let all = self.frames.iter().zip(&point.control);
-        let mut all: Vec<_> = all.map(|(frame, c)| frame.at(&Self::turn(c))).collect();
-        let last = all.len() - 4;
-        all[..4].fill(start);
-        all[last..].fill(end);
-        all
     }
 }
 

@@ -6,6 +6,7 @@
 //! ball around a pose at the closest approach; the corridor is a distance from the leg at each knot
 //! and between knots.
 
+use nalgebra::{UnitQuaternion, Vector3};
 use simd::{F4, Four};
 
 use super::basis::{self, START, weights};
@@ -100,6 +101,25 @@ impl<const D: usize> Problem<D> {
     /// Knot spacing, s.
     pub(crate) fn spacing(&self, z: f64) -> f64 {
         self.scale * z.cbrt()
+    }
+
+    /// The rotation vector of a control point.
+    pub(super) fn turn(control: &[f64; D]) -> Vector3<f64> {
+        Vector3::from_fn(|d, _| control[Self::LAST + d])
+    }
+
+    /// The control orientations of an iterate beside the known motion, from rest to rest between two orientations.
+    pub(super) fn turned(
+        &self,
+        point: &Point<D>,
+        [start, end]: [UnitQuaternion<f64>; 2],
+    ) -> Vec<UnitQuaternion<f64>> {
+        let all = self.frames.iter().zip(&point.control);
+        let mut all: Vec<_> = all.map(|(frame, c)| frame.at(&Self::turn(c))).collect();
+        let last = all.len() - 4;
+        all[..4].fill(start);
+        all[last..].fill(end);
+        all
     }
 
     /// Whether the place alone says when inner vertex `i` is passed.
