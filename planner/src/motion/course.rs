@@ -66,6 +66,11 @@ impl<const N: usize> Course<N> {
         slow.unwrap_or_else(|| self.trajectory.duration())
     }
 
+    /// The time, s, of the motion at which a search begins, or about that of its joints if it is longer.
+    pub(super) fn begins(&self) -> f64 {
+        self.time.max(self.duration())
+    }
+
     /// Where its joints are at a time, s.
     pub(super) fn joints(&self, time: f64) -> SVector<f64, N> {
         let time = self.slow().map_or(time, |slow| slow.tool(time));

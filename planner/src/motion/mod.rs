@@ -24,6 +24,7 @@ mod legs;
 mod motion_error;
 mod moving;
 mod reach;
+mod region;
 mod rounder;
 mod screw;
 mod seam;

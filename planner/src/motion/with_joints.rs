@@ -3,26 +3,23 @@
 //!
 //! The joints are looked at to first order, so a search may go only so far; the joints are followed along its curve, and the next
 //! search begins there.
-//!
-//! # Source
-//! J. Nocedal, S. J. Wright, "Numerical Optimization", 2nd ed. 2006, algorithm 4.1 (trust region).
 
 use std::ops::RangeInclusive;
 
 use kinematics::follow::{self, NullMotion};
 use nalgebra::{SVector, Vector3};
 use trajectory::Trajectory;
-use trajectory::smooth::{self, ArmMotion, ArmState, JointBounds, JointState};
+use trajectory::smooth::{self, ArmMotion, ArmState, JointState};
 
 use super::cartesian::pieces;
 use super::course::Course;
+use super::region::Region;
 use super::smooth_joints::{Followed, SmoothPath};
 use super::{PlannedMove, Planner};
 use crate::task::Move;
 
-/// Most searches before the last, and the share of the time that one has to save for another like it.
+/// Most searches before the last.
 const ROUNDS: usize = 12;
-const GAIN: f64 = 0.01;
 
 /// Gaps to its optimum at which a search ends: before the last, and the last where the tool turns or does not.
 const ROUGH: f64 = 0.4;
@@ -32,39 +29,8 @@ const GAP: f64 = 0.1;
 /// Angle (rad) from which on the tool turns, as a search sees it.
 const TURN: f64 = 1e-12;
 
-/// How far each joint may go from where it is looked at (rad, m) at first, the share of that where it leads nowhere, and how far is
-/// not worth a search.
-const FAR: f64 = 0.6;
-const SHRINK: f64 = 0.25;
-const NOWHERE: f64 = 0.01;
-/// Less than this share of what was foretold to be saved says that the joints were looked at too far away.
-const POOR: f64 = 0.25;
-
 /// Poses of a list that is searched as a whole; one pose is reached straight.
 const POSES: RangeInclusive<usize> = 2..=1000;
-
-/// Distance from a limit (rad) and smallest singular value from which a spare joint is well where it is, as in the
-/// search of a null-space motion along a curve.
-const ROOM: f64 = 0.1;
-const NIMBLE: f64 = 0.05;
-/// Share of the ease of the known motion that another must have, and by how many times of what it lacks the joints stay farther
-/// from their limits then.
-const EASED: f64 = 0.95;
-const FARTHER: f64 = 3.0;
-
-/// Places along a motion at which its ease is looked at.
-const LOOKS: u32 = 24;
-
-/// How far a search may go.
-#[derive(Clone)]
-struct Region {
-    /// How far each joint may go from where it is looked at, rad or m.
-    far: f64,
-    /// The least ease of a motion; with a spare joint only.
-    ease: Option<f64>,
-    /// How far from their limits the joints of an arm with a spare one stay, rad or m.
-    room: Vec<f64>,
-}
 
 /// What a search has found.
 struct Found<const N: usize> {
@@ -82,12 +48,6 @@ struct Task<'a, const N: usize> {
     spare: Option<SVector<f64, N>>,
     /// Gap to its optimum at which the last search ends.
     gap: f64,
-}
-
-/// Joint positions along a motion, its ends with them.
-fn places<const N: usize>(trajectory: &Trajectory<N>) -> impl Iterator<Item = SVector<f64, N>> {
-    let step = trajectory.duration() / f64::from(LOOKS);
-    (0..=LOOKS).map(move |k| trajectory.sample(step * f64::from(k)).position)
 }
 
 impl<const N: usize> Planner<N> {
@@ -161,6 +121,8 @@ impl<const N: usize> Planner<N> {
         };
         let mut region = region.clone();
         let (course, sure) = self.fastest_course(task, known, &mut region);
+        // It leads farther than those before it, so the joints are to be known as well as they ever were.
+        let region = region.nearest();
         let last = self.searched(task, &course, (&region, task.gap));
         // On the knots of the searches before it may find no way inside of the bounds, on others it does.
         let last = if last.is_none() && course.seed.is_some() {
@@ -189,17 +151,17 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The course that needs the least time of those with which rough searches end, each of which begins where one before ended; and
-    /// the joints along the last curve of them that is certified.
+    /// the joints along the fastest curve of them that is certified.
     fn fastest_course(
         &self,
         task: Task<'_, N>,
         mut course: Course<N>,
         region: &mut Region,
     ) -> (Course<N>, Option<Followed<N>>) {
-        let (mut sure, mut lacked) = (None, false);
+        let (mut sure, mut lacked): (Option<(f64, Followed<N>)>, _) = (None, false);
         for _ in 0..ROUNDS {
             let found = self.searched(task, &course, (region, ROUGH));
-            let before = course.time;
+            let before = course.begins();
             // Where the joints cannot follow, nothing is saved of what was hoped for.
             let foretold = found
                 .as_ref()
@@ -213,21 +175,20 @@ impl<const N: usize> Planner<N> {
                 lacked = true;
                 continue;
             }
+            let mut after = before;
             if let Some(found) = found.filter(|_| !lacks) {
                 course = found.course;
+                after = course.time;
                 let holds = found.followed.path.plan.certificate().holds();
-                sure = holds.then_some(found.followed).or(sure);
+                if holds && sure.as_ref().is_none_or(|(time, _)| after < *time) {
+                    sure = Some((after, found.followed));
+                }
             }
-            let (saved, hoped) = (before - course.time, before - foretold);
-            let gains = saved > GAIN * before;
-            if !gains && (hoped < 2.0 * GAIN * before || SHRINK * region.far < NOWHERE) {
+            if !region.goes_on([before, foretold, after]) {
                 break;
             }
-            if !gains || saved < POOR * hoped {
-                region.far *= SHRINK;
-            }
         }
-        (course, sure)
+        (course, sure.map(|(_, followed)| followed))
     }
 
     /// The joints along the plan of a search that begins at a course and ends at a gap to its optimum.
@@ -245,7 +206,7 @@ impl<const N: usize> Planner<N> {
             at: &at,
             passes: &from.passes(),
             bounds: &self.joint_bounds(region),
-            far: region.far,
+            far: region.far(),
             has_spare: task.spare.is_some(),
             rough: gap > task.gap,
             onward: from.seed.as_ref(),
@@ -284,53 +245,5 @@ impl<const N: usize> Planner<N> {
             joints: joints.collect(),
             spare: spare.dot(q),
         })
-    }
-
-    /// Where searches may go that begin at a known motion.
-    fn region(&self, known: &Trajectory<N>) -> Region {
-        let chain = self.chain();
-        let places: Vec<_> = places(known).collect();
-        let room = |j: usize| {
-            let room = places.iter().map(|q| chain.room(j, q[j]));
-            room.fold(ROOM, f64::min).max(0.0)
-        };
-        Region {
-            far: FAR,
-            ease: (N > 6).then(|| EASED * self.ease_along(known)),
-            room: (0..N).map(|j| if N > 6 { room(j) } else { 0.0 }).collect(),
-        }
-    }
-
-    /// What the joints may do. With a spare joint they may be no nearer to limits than in the known motion, up to what counts as
-    /// well inside.
-    fn joint_bounds(&self, region: &Region) -> Vec<JointBounds> {
-        let (limits, chain) = (&self.limits, self.chain());
-        let joint = |(j, room): (usize, &f64)| JointBounds {
-            position: [chain.lower()[j] + room, chain.upper()[j] - room],
-            rates: [limits.velocity[j], limits.acceleration[j], limits.jerk[j]],
-        };
-        region.room.iter().enumerate().map(joint).collect()
-    }
-
-    /// How much ease a motion lacks; not above 0 where it has enough.
-    fn missing_ease(&self, trajectory: &Trajectory<N>, region: &Region) -> f64 {
-        let least = region.ease;
-        least.map_or(0.0, |least| least - self.ease_along(trajectory))
-    }
-
-    /// Whether a motion has enough ease; if not, the joints stay farther from their limits from now on.
-    fn is_admitted(&self, trajectory: &Trajectory<N>, region: &mut Region) -> bool {
-        let missing = self.missing_ease(trajectory, region);
-        if missing > 0.0 {
-            let rooms = region.room.iter_mut();
-            rooms.for_each(|room| *room += FARTHER * ROOM * missing);
-        }
-        missing <= 0.0
-    }
-
-    /// The least ease along a motion.
-    fn ease_along(&self, trajectory: &Trajectory<N>) -> f64 {
-        let all = places(trajectory).map(|q| self.ease_within(&q, [ROOM, NIMBLE]));
-        all.fold(f64::INFINITY, f64::min)
     }
 }
