@@ -29,7 +29,7 @@ const ROOM: f64 = 0.1;
 const NIMBLE: f64 = 0.05;
 /// Share of the ease of the known motion that another must have, and by how many times of what it lacks the joints stay farther
 /// from their limits then.
-const EASED: f64 = 0.95;
+const EASED: f64 = 0.9;
 const FARTHER: f64 = 3.0;
 
 /// Places along a motion at which its ease is looked at.
