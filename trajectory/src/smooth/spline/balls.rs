@@ -181,16 +181,8 @@ mod tests {
         };
         let moving = [speed, 0.0, 0.0, 3.0 * speed, 0.0, speed];
         Problem {
-            groups: [group(1.0, 0.01), group(4.0, 0.08)],
-            ways: ways(&vertices),
-            vertices: vertices.to_vec(),
             start: [vertices[0], moving, [0.0; 6], [0.0; 6]],
-            finish: None,
-            scale: 1.0,
-            anchor: None,
-            led: Vec::new(),
-            joints: Vec::new(),
-            frames: Vec::new(),
+            ..Problem::at_rest(vertices.to_vec(), [group(1.0, 0.01), group(4.0, 0.08)])
         }
     }
 

@@ -311,7 +311,7 @@ fn squares<S: Four>([x, y, z]: [F4<S>; 3]) -> F4<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smooth::spline::problem::{Group, ways};
+    use crate::smooth::spline::problem::Group;
     use crate::smooth::spline::project::{miss, project};
     use crate::smooth::spline::start;
 
@@ -326,16 +326,8 @@ mod tests {
         };
         let moving = std::array::from_fn(|d| speed * (vertices[1][d] - vertices[0][d]));
         Problem {
-            groups: [group; 2],
-            ways: ways(&vertices),
             start: [vertices[0], moving, [0.0; D], [0.0; D]],
-            vertices,
-            finish: None,
-            scale: 1.0,
-            anchor: None,
-            led: Vec::new(),
-            joints: Vec::new(),
-            frames: Vec::new(),
+            ..Problem::at_rest(vertices, [group; 2])
         }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::basis;
 use super::ends::{anchors, correct, rolled, rotations};
 use super::known::Known;
-use super::problem::{Group, Point, Problem, ways};
+use super::problem::{Group, Point, Problem};
 use super::request::{Moving, Request};
 use super::solve::{Aims, Effort, solve};
 use super::start::{self, KNOTS_PER_RAMP};
@@ -206,40 +206,24 @@ impl<'a> Task<'a> {
         let vertices: Vec<[f64; D]> = vertices
             .map(|(pose, turn)| self.pack(used, &pose.translation.vector, turn))
             .collect();
-        let mut begin = [vertices[0], [0.0; D], [0.0; D], [0.0; D]];
+        let mut problem = Problem::at_rest(vertices, self.groups(used));
+        if Problem::<D>::TURNS {
+            problem.led = self.led();
+        }
         if let Some(moving) = self.moving {
             let virtual_turn = rolled(&moving.state, moving.spacing);
             let offset = body_turn(&self.poses[0].rotation, &moving.state.pose.rotation);
             let state = &moving.state;
-            begin[0] = self.pack(
+            problem.start[0] = self.pack(
                 used,
                 &state.pose.translation.vector,
                 &(offset + virtual_turn[0]),
             );
             for k in 0..3 {
-                begin[k + 1] = self.pack(used, &state.linear[k], &virtual_turn[k + 1]);
+                problem.start[k + 1] = self.pack(used, &state.linear[k], &virtual_turn[k + 1]);
             }
-        }
-        let finish = self.request.finish;
-        let mut problem = Problem {
-            finish: None,
-            groups: self.groups(used),
-            ways: ways(&vertices),
-            vertices,
-            start: begin,
-            scale: 1.0,
-            anchor: None,
-            led: if Problem::<D>::TURNS {
-                self.led()
-            } else {
-                Vec::new()
-            },
-            joints: Vec::new(),
-            frames: Vec::new(),
-        };
-        if let Some(moving) = self.moving {
-            let spacing = moving.spacing;
-            problem.finish = finish.map(|finish| self.end(used, finish, spacing));
+            let finish = self.request.finish;
+            problem.finish = finish.map(|finish| self.end(used, finish, moving.spacing));
         }
         let (mut point, effort) = self.first(&mut problem, used)?;
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);

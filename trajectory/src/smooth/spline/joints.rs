@@ -230,7 +230,7 @@ mod tests {
     use super::*;
     use crate::smooth::spline::barrier::Barrier;
     use crate::smooth::spline::joint::DIFFERENCES;
-    use crate::smooth::spline::problem::{Group, Room, ways};
+    use crate::smooth::spline::problem::{Group, Room};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
@@ -250,18 +250,7 @@ mod tests {
             radius: 0.01,
             width: 0.02,
         };
-        Problem {
-            groups: [group; 2],
-            ways: ways(&vertices),
-            start: [vertices[0], [0.0; D], [0.0; D], [0.0; D]],
-            vertices,
-            finish: None,
-            scale: 1.0,
-            anchor: None,
-            led: Vec::new(),
-            joints: Vec::new(),
-            frames: Vec::new(),
-        }
+        Problem::at_rest(vertices, [group; 2])
     }
 
     /// Corners with joints that follow, and a first iterate inside of all bounds; `E` are the coordinates without a spare one.

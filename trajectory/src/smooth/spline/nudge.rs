@@ -84,7 +84,7 @@ fn bend<const D: usize>(point: &mut Point<D>, i: usize, way: &[f64; D]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smooth::spline::problem::{Group, ways};
+    use crate::smooth::spline::problem::Group;
     use crate::smooth::spline::start;
 
     /// A corner, with a first iterate that passes it beside its ball.
@@ -95,18 +95,7 @@ mod tests {
             width: 0.02,
         };
         let vertices = vec![[0.0; 3], [0.2, 0.0, 0.0], [0.2, 0.2, 0.0]];
-        let mut problem = Problem {
-            groups: [group; 2],
-            ways: ways(&vertices),
-            start: [vertices[0], [0.0; 3], [0.0; 3], [0.0; 3]],
-            vertices,
-            finish: None,
-            scale: 1.0,
-            anchor: None,
-            led: Vec::new(),
-            joints: Vec::new(),
-            frames: Vec::new(),
-        };
+        let mut problem = Problem::at_rest(vertices, [group; 2]);
         let mut point = start::first(&mut problem, None, start::KNOTS_PER_RAMP);
         project(&problem, &mut point, None, 20);
         problem.vertices[1][2] += 0.012;

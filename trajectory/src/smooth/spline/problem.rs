@@ -92,6 +92,22 @@ impl<const D: usize> Problem<D> {
     /// The coordinate of a spare joint, if there is one: after those of the groups.
     pub(crate) const SPARE: Option<usize> = if D % 3 == 1 { Some(D - 1) } else { None };
 
+    /// The problem from rest to rest through these corners, without an arm, in which no place alone leads.
+    pub(super) fn at_rest(vertices: Vec<[f64; D]>, groups: [Group; 2]) -> Self {
+        Self {
+            groups,
+            ways: ways(&vertices),
+            start: [vertices[0], [0.0; D], [0.0; D], [0.0; D]],
+            vertices,
+            finish: None,
+            scale: 1.0,
+            anchor: None,
+            led: Vec::new(),
+            joints: Vec::new(),
+            frames: Vec::new(),
+        }
+    }
+
     /// Whether the start or the end is in motion.
     pub(crate) fn moving(&self) -> bool {
         let start = self.start[1..].iter().flatten();
