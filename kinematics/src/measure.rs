@@ -6,9 +6,9 @@ use nalgebra::{SMatrix, SVector};
 /// Length that counts as much as one radian, m.
 pub(crate) const LENGTH: f64 = 0.3;
 /// Distance from a limit, rad or m, from which a joint counts as well inside.
-pub(crate) const ROOM: f64 = 0.1;
-/// Smallest singular value that counts as well away from singular poses.
-pub(crate) const NIMBLE: f64 = 0.05;
+pub const ROOM: f64 = 0.1;
+/// Smallest singular value ([`Dexterity::smallest`]) that counts as well away from singular poses.
+pub const NIMBLE: f64 = 0.05;
 
 /// How well an arm can move at one joint position. Lengths are in units of 0.3 m, so that
 /// translations and rotations can be compared.

@@ -3,6 +3,7 @@
 //! # Source
 //! J. Nocedal, S. J. Wright, "Numerical Optimization", 2nd ed. 2006, algorithm 4.1 (trust region).
 
+use kinematics::measure::{NIMBLE, ROOM};
 use nalgebra::SVector;
 use trajectory::Trajectory;
 use trajectory::smooth::JointBounds;
@@ -23,10 +24,6 @@ const NOWHERE: f64 = 0.01;
 const POOR: f64 = 0.25;
 const WELL: f64 = 0.75;
 
-/// Distance from a limit (rad) and smallest singular value from which a spare joint is well where it is, as in the
-/// search of a null-space motion along a curve.
-const ROOM: f64 = 0.1;
-const NIMBLE: f64 = 0.05;
 /// Share of the ease of the known motion that another must have, and by how many times of what it lacks the joints stay farther
 /// from their limits then.
 const EASED: f64 = 0.9;

@@ -120,7 +120,7 @@ impl<const N: usize> Planner<N> {
             },
         };
         let mut region = region.clone();
-        let (course, sure) = self.fastest_course(task, known, &mut region);
+        let (course, sure) = self.last_course(task, known, &mut region);
         // It leads farther than those before it, so the joints are to be known as well as they ever were.
         let region = region.nearest();
         let last = self.searched(task, &course, (&region, task.gap));
@@ -150,9 +150,9 @@ impl<const N: usize> Planner<N> {
         pairs.any(|pair| pair[0].rotation.angle_to(&pair[1].rotation) > TURN)
     }
 
-    /// The course that needs the least time of those with which rough searches end, each of which begins where one before ended; and
-    /// the joints along the fastest curve of them that is certified.
-    fn fastest_course(
+    /// The course with which the last of some rough searches ends, each of which begins where one before ended; and the joints
+    /// along the fastest of their curves that is certified.
+    fn last_course(
         &self,
         task: Task<'_, N>,
         mut course: Course<N>,
