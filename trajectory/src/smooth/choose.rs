@@ -10,9 +10,10 @@ use super::missed;
 use super::motion::Motion;
 use super::options::SmoothOptions;
 use super::rest::RestCause;
+use super::seed::Seed;
 use super::span::Span;
 pub(crate) use super::span::stretch;
-use super::spline::{self, Effort, Moving, Request};
+use super::spline::{self, Effort, Found, Moving, Request};
 use crate::{ToolLimits, ToolPoint};
 
 /// Effort of one spline, but for the gap to its optimum.
@@ -53,6 +54,9 @@ pub(super) const SLOWED: f64 = 1.3;
 
 /// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
 const TURNED: f64 = 4.0;
+
+/// Shares of the legs beside a pose on which the place goes forward only, one after the other.
+const SHARES: [f64; 2] = [0.5, 1.0];
 
 /// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
 const AT_END: f64 = 1.0 + 1e-3;
@@ -165,6 +169,20 @@ struct Attempts<'a> {
     turned: Option<(Vec<Span>, bool)>,
 }
 
+/// How a motion keeps what is asked of a window.
+struct Judged {
+    certificate: Certificate,
+    crossings: Vec<Crossing>,
+    /// Whether the passes do not change with what comes after it.
+    settled: bool,
+}
+
+impl Judged {
+    fn holds(&self) -> bool {
+        self.certificate.holds() && self.settled
+    }
+}
+
 impl<'a> Window<'a> {
     /// A window that starts at rest.
     pub(crate) fn from_rest(
@@ -249,21 +267,13 @@ impl Attempts<'_> {
     /// The same without the one that is `nearly` within its limits; bounds that one attempt breaks are narrowed for
     /// the next one.
     fn held(&mut self, nearly: &mut Option<(Vec<Span>, bool)>) -> Option<(Vec<Span>, bool)> {
-        let Window {
-            poses,
-            options,
-            moving,
-            finish,
-            then,
-            backwards,
-            ..
-        } = self.window;
+        let Window { moving, finish, .. } = self.window;
         let whole = self.inner.clone();
         let mut retried = false;
         for attempt in 0..5_usize {
             let narrowed = self.inner.clone();
             let mut request = Request {
-                poses,
+                poses: self.window.poses,
                 options: &narrowed,
                 moving,
                 finish,
@@ -274,18 +284,25 @@ impl Attempts<'_> {
             };
             let turns = request.moves()[1];
             request.coupled = self.couples(&request, turns)?;
-            let Some(mut spans) = spline::plan(&request) else {
+            let Some(Found { mut spans, seed }) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
                 retried = true;
                 continue;
             };
-            let most = if moving.is_none() { SLOWED } else { 1.0 };
-            let (certificate, crossings) =
-                certify_slowed(&mut spans, (poses, backwards), options, most);
-            let settled = then == Then::Stop || settled(&spans, poses, &crossings, options);
-            if certificate.holds() && settled {
+            let seen = self.judge(&mut spans);
+            if seen.holds() {
                 return Some((spans, retried));
             }
+            if attempt == 0
+                && let Some(spans) = self.forward(&request, (&seed, &seen))
+            {
+                return Some((spans, true));
+            }
+            let Judged {
+                certificate,
+                crossings,
+                settled,
+            } = seen;
             if self.keeps && settled {
                 self.keep(&spans, &crossings, retried);
             }
@@ -310,6 +327,37 @@ impl Attempts<'_> {
             self.narrow((&certificate, &crossings), request.coupled, settled)?;
         }
         None
+    }
+
+    /// How a motion keeps what is asked of the window, slowed down as a whole where that helps.
+    fn judge(&self, spans: &mut [Span]) -> Judged {
+        let Window {
+            poses,
+            options,
+            moving,
+            then,
+            backwards,
+            ..
+        } = self.window;
+        let most = if moving.is_none() { SLOWED } else { 1.0 };
+        let (certificate, crossings) = certify_slowed(spans, (poses, backwards), options, most);
+        Judged {
+            settled: then == Then::Stop || settled(spans, poses, &crossings, options),
+            certificate,
+            crossings,
+        }
+    }
+
+    /// A motion that holds, from where a search ended that approaches poses before the tool is turned: its place goes forward there.
+    fn forward(&self, request: &Request<'_>, (seed, seen): (&Seed, &Judged)) -> Option<Vec<Span>> {
+        if seen.crossings.iter().all(Crossing::holds) {
+            return None;
+        }
+        let found = |share: &f64| {
+            let mut spans = spline::forward(request, seed, (self.window.backwards, *share))?.spans;
+            self.judge(&mut spans).holds().then_some(spans)
+        };
+        SHARES.iter().find_map(found)
     }
 
     /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are

@@ -10,10 +10,8 @@ use super::build::Task;
 use super::frame::Frame;
 use super::joint::{Joint, dot};
 use super::problem::{Point, Problem, ways};
-use super::solve::{Aims, Effort, solve};
 use crate::line::body_turn;
 use crate::smooth::arm::{ArmMotion, ArmState};
-use crate::smooth::crossing::crossings;
 use crate::smooth::seed::Seed;
 
 /// Spans for each leg, for each of a long list, and the least number of all; the same where the tool turns, for which each costs
@@ -29,9 +27,6 @@ const REST: usize = 3;
 const FIXED: usize = 4;
 /// A joint that is beyond its range, or nearer to its end than this (rad, m), may stay there.
 const AT_END: f64 = 1e-3;
-/// Further searches where a pose is not passed on the first approach, and times in knots that are the same.
-const AGAIN: usize = 2;
-const SAME: f64 = 0.1;
 
 /// What the arm has at the control points.
 struct Sampled {
@@ -182,38 +177,13 @@ impl Task<'_> {
     }
 
     /// Moves the inner vertices of orientations to where an iterate sees the poses.
-    fn see_aims<const D: usize>(&self, problem: &mut Problem<D>, point: &Point<D>) {
+    pub(super) fn see_aims<const D: usize>(&self, problem: &mut Problem<D>, point: &Point<D>) {
         if Problem::<D>::TURNS {
             let aims = self.aims(problem, point);
             let last = problem.vertices.len() - 1;
             problem.vertices[1..last].copy_from_slice(&aims);
         }
         problem.ways = ways(&problem.vertices);
-    }
-
-    /// Searches on from a solution that approaches a pose where it is not turned as it has to be before it passes it: a pose counts as
-    /// passed on the first approach. The solution stays where that does not help.
-    pub(super) fn pass_first<const D: usize, const B: usize>(
-        &self,
-        (problem, point): (&mut Problem<D>, &mut Point<D>),
-        (effort, aims): (Effort, Option<Aims<'_, D>>),
-        used: [bool; 2],
-    ) {
-        for _ in 0..AGAIN {
-            let h = problem.spacing(point.z);
-            let passes = crossings(&self.spans(problem, point, used), self.poses, self.options);
-            let mut all = passes.iter().zip(&point.crossings);
-            if all.all(|(pass, time)| pass.holds() || (pass.time / h - time).abs() < SAME) {
-                return;
-            }
-            let (mut other, mut first) = (problem.clone(), point.clone());
-            first.crossings = passes.iter().map(|pass| pass.time / h).collect();
-            self.see_aims(&mut other, &first);
-            if solve::<D, B>(&mut other, &mut first, effort, aims).is_none() {
-                return;
-            }
-            (*problem, *point) = (other, first);
-        }
     }
 
     /// Where a search has ended.

@@ -82,16 +82,35 @@ impl<'a, S: Four> Slacks<'a, S> {
     #[inline(always)]
     fn take(&mut self, square: f64, bound: f64) -> bool {
         let slack = 1.0 - square / bound;
-        let before = self.before.get(self.seen.len());
-        let least = before.map_or(0.0, |s| self.keep * s);
-        if slack <= least || slack.is_nan() {
+        if !self.see(slack) {
             return false;
         }
-        self.seen.push(slack);
         let simd = self.product.build();
         self.product = self.product * F4::new(simd, [slack, 1.0, 1.0, 1.0]);
         self.fold();
         true
+    }
+
+    /// Adds a slack that may be greater than 1; false if too little is left.
+    #[inline(always)]
+    fn take_linear(&mut self, slack: f64) -> bool {
+        let seen = self.see(slack);
+        if seen {
+            self.sum += slack.ln();
+        }
+        seen
+    }
+
+    /// Whether enough is left of a slack, which is then one of those seen.
+    #[inline(always)]
+    fn see(&mut self, slack: f64) -> bool {
+        let before = self.before.get(self.seen.len());
+        let least = before.map_or(0.0, |s| self.keep * s);
+        let left = slack > least;
+        if left {
+            self.seen.push(slack);
+        }
+        left
     }
 
     /// Adds four slacks; false if too little is left of one.
@@ -155,6 +174,7 @@ impl<const D: usize> Op for Look<'_, D> {
             }
         }
         bounds += self.joints(&mut slacks)?;
+        bounds += self.forward(&mut slacks)?;
         Some(Seen {
             rest: -bounds - slacks.sum - slacks.logarithm(),
             slacks: slacks.seen,
@@ -217,6 +237,18 @@ impl<const D: usize> Look<'_, D> {
             })?;
         }
         Some(bounds)
+    }
+
+    /// Adds the slacks where the place goes forward only; returns the sum of the logarithms of their bounds, which depend on `z`.
+    #[inline(always)]
+    fn forward<S: Four>(&self, slacks: &mut Slacks<'_, S>) -> Option<f64> {
+        let Barrier { problem, room, .. } = *self.barrier;
+        for (ahead, behind) in problem.ahead(self.point).zip(&room.forward) {
+            if !slacks.take_linear(ahead + behind) {
+                return None;
+            }
+        }
+        Some(problem.forward.len() as f64 * problem.stride(self.point.z).ln())
     }
 
     /// Adds the slacks of the balls.

@@ -50,9 +50,9 @@ const FADE: f64 = 12.0;
 
 /// Time-optimal spline from the first pose to the last through balls around
 /// those between. `None` when no feasible spline was found.
-pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
+pub(crate) fn plan(request: &Request<'_>) -> Option<Found> {
     let task = Task::new(request);
-    let found = match request.moves() {
+    match request.moves() {
         [true, false] => task.run::<3, 20>([true, false]),
         [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
         [false, true] => task.run::<3, 20>([false, true]),
@@ -60,8 +60,25 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Vec<Span>> {
         [true, true] if request.poses.len() <= FEW => task.run::<6, 20>([true, true]),
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
-    };
-    found.map(|found| found.spans)
+    }
+}
+
+/// The same from where a search ended whose motion approaches poses before the tool is turned as it has to be: with a place that
+/// goes forward there. `backwards` if the motion will be made from its end to its start. `None` where that is of no use.
+pub(crate) fn forward(
+    request: &Request<'_>,
+    seed: &Seed,
+    (backwards, share): (bool, f64),
+) -> Option<Found> {
+    let task = Task::new(request);
+    match request.moves() {
+        [true, true] if !request.coupled => None,
+        [true, true] if request.poses.len() <= FEW => {
+            task.forward::<6, 20>(seed, [true, true], (backwards, share))
+        }
+        [true, true] => task.forward::<6, 36>(seed, [true, true], (backwards, share)),
+        _ => None,
+    }
 }
 
 /// The same for an arm, between rests.
@@ -201,7 +218,8 @@ impl<'a> Task<'a> {
         2.0 * most.max(1e-3)
     }
 
-    fn run<const D: usize, const B: usize>(&self, used: [bool; 2]) -> Option<Found> {
+    /// The problem, whose knot spacing is not known yet.
+    pub(super) fn problem<const D: usize>(&self, used: [bool; 2]) -> Problem<D> {
         let vertices = self.poses.iter().zip(&self.vectors);
         let vertices: Vec<[f64; D]> = vertices
             .map(|(pose, turn)| self.pack(used, &pose.translation.vector, turn))
@@ -225,6 +243,11 @@ impl<'a> Task<'a> {
             let finish = self.request.finish;
             problem.finish = finish.map(|finish| self.end(used, finish, moving.spacing));
         }
+        problem
+    }
+
+    fn run<const D: usize, const B: usize>(&self, used: [bool; 2]) -> Option<Found> {
+        let mut problem = self.problem(used);
         let (mut point, effort) = self.first(&mut problem, used)?;
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
         let aims: Option<Aims<'_, D>> = (used == [true, true]).then_some(&aims);
@@ -232,10 +255,31 @@ impl<'a> Task<'a> {
         if self.request.arm.is_some() {
             self.pass_first::<D, B>((&mut problem, &mut point), (effort, aims), used);
         }
-        Some(Found {
-            spans: self.spans(&problem, &point, used),
-            seed: Self::seed(&problem, &point),
-        })
+        Some(self.found(&problem, &point, used))
+    }
+
+    /// What a search that ended with an iterate has found.
+    pub(super) fn found<const D: usize>(
+        &self,
+        problem: &Problem<D>,
+        point: &Point<D>,
+        used: [bool; 2],
+    ) -> Found {
+        Found {
+            spans: self.spans(problem, point, used),
+            seed: Self::seed(problem, point),
+        }
+    }
+
+    /// How far and how long a search goes.
+    pub(super) fn effort(&self) -> Effort {
+        let effort = self.request.effort;
+        // A motion that is known is made feasible from where its start is.
+        let from_known = self.request.arm.is_none() && self.request.known.is_some();
+        Effort {
+            spread: effort.spread.filter(|_| !from_known),
+            ..effort
+        }
     }
 
     /// The first iterate of a problem, and how far and how long the search from there goes.
@@ -244,11 +288,10 @@ impl<'a> Task<'a> {
         problem: &mut Problem<D>,
         used: [bool; 2],
     ) -> Option<(Point<D>, Effort)> {
-        let mut effort = self.request.effort;
+        let mut effort = self.effort();
         let point = match (self.request.arm, self.request.known) {
             (Some(arm), _) => self.of_arm(problem, arm, used)?,
             (_, Some(spans)) => {
-                effort.spread = None;
                 if !Problem::<D>::TURNS && self.moving.is_none() {
                     (effort.steps, effort.search) = (STEPS, SEARCH);
                 }

@@ -118,6 +118,8 @@ impl<const D: usize, const B: usize> System<D, B> {
         }
         self.balls(at);
         self.joints(at);
+        self.forward(at);
+        self.legs(at);
         self.solve(&at.slides)
     }
 

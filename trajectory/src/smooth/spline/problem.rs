@@ -10,6 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use simd::{F4, Four};
 
 use super::basis::{self, START, weights};
+use super::forward::Forward;
 use super::frame::Frame;
 use super::joint::{BOUNDS, Joint};
 
@@ -52,6 +53,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) joints: Vec<Joint<D>>,
     /// The known motion of an arm that turns, at each control point; empty: orientations are rolled out.
     pub(crate) frames: Vec<Frame>,
+    /// Where the place goes forward only.
+    pub(crate) forward: Vec<Forward>,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -75,6 +78,8 @@ pub(crate) struct Room {
     pub(crate) widths: [Vec<f64>; 2],
     /// Leg of each corridor sample (index of its far vertex).
     pub(crate) legs: Vec<usize>,
+    /// By how much the place may go back where it goes forward only, in strides.
+    pub(crate) forward: Vec<f64>,
     /// Factor on what the iterate has of a quantity, for a widened bound.
     pub(crate) widen: f64,
 }
@@ -105,6 +110,7 @@ impl<const D: usize> Problem<D> {
             led: Vec::new(),
             joints: Vec::new(),
             frames: Vec::new(),
+            forward: Vec::new(),
         }
     }
 
@@ -270,7 +276,7 @@ impl<const D: usize> Problem<D> {
         way.way.map(|x| x * free)
     }
 
-    /// Barrier parameter: twice the number of constraints.
+    /// Barrier parameter: twice the number of constraints that are norms, and the number of those that are linear.
     pub(crate) fn parameter(&self, point: &Point<D>) -> f64 {
         let knots = point.control.len() as f64;
         let corridor = if self.groups[0].width.is_finite() {
@@ -281,7 +287,7 @@ impl<const D: usize> Problem<D> {
         let balls = self.heavy(point) * point.crossings.len() as f64;
         let norms = Self::GROUPS as f64 * (knots * (3.0 + corridor) + balls);
         let joints = (BOUNDS * self.joints.len()) as f64 * knots;
-        2.0 * (norms + joints)
+        2.0 * (norms + joints) + self.forward.len() as f64
     }
 
     /// Weight of a ball beside other constraints.

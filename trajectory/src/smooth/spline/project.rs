@@ -1,6 +1,7 @@
 //! Passing times: the closest approach to each ball, in order. Also how much an iterate exceeds its
 //! bounds.
 
+use super::forward::Forward;
 use super::problem::{Point, Problem, Room, part, square};
 
 /// Iterates are held this far inside the widened bounds.
@@ -240,6 +241,7 @@ impl Room {
             balls: [0, 1].map(|_| vec![f64::INFINITY; point.crossings.len()]),
             widths: [0, 1].map(|_| vec![f64::INFINITY; point.samples()]),
             legs: vec![0; point.samples()],
+            forward: vec![f64::INFINITY; problem.forward.len()],
             widen: WIDEN,
         };
         room.tighten(problem, point);
@@ -300,6 +302,10 @@ impl Room {
                 );
                 tight &= self.balls[g][i] <= radius;
             }
+        }
+        for (behind, ahead) in self.forward.iter_mut().zip(problem.ahead(point)) {
+            *behind = Forward::narrowed(*behind, ahead);
+            tight &= Forward::is_tight(*behind);
         }
         if problem.groups[0].width.is_finite() || problem.groups[1].width.is_finite() {
             tight &= self.tighten_widths(problem, point);
