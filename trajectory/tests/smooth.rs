@@ -393,3 +393,46 @@ fn corners_that_turn_are_passed_in_motion() {
     println!("{resting} of 20 lists rest");
     assert!(resting <= 2, "{resting} of 20 lists rest");
 }
+
+/// Six poses a quarter of a metre apart at most, each turned by up to 0.7 rad from the one before.
+fn turning(seed: u64) -> Vec<Isometry3<f64>> {
+    let mut random = Random(seed);
+    let mut poses = vec![Isometry3::identity()];
+    while poses.len() < 6 {
+        let mut pose = poses[poses.len() - 1];
+        pose.translation.vector += random.direction() * random.between(0.05, 0.25);
+        let turn = random.direction() * random.between(0.1, 0.7);
+        pose.rotation *= UnitQuaternion::from_scaled_axis(turn);
+        poses.push(pose);
+    }
+    poses
+}
+
+/// Where a tool has to turn for longer than its place needs, more tolerance is not slower. Searches in which the place went to and
+/// fro at a pose, before the tool was turned, were given up for slower ways, which depended on the tolerance by luck.
+#[test]
+fn more_tolerance_is_not_slower_where_the_tool_turns_for_longer() {
+    let limits = ToolLimits {
+        speed: 2.0,
+        acceleration: 13.0,
+        jerk: 6500.0,
+        angular_speed: 2.5,
+        angular_acceleration: 25.0,
+        angular_jerk: 12_500.0,
+    };
+    let mut broken = Vec::new();
+    for seed in 0..24 {
+        let poses = turning(seed);
+        let mut least = f64::INFINITY;
+        for tolerance in [2e-4, 5e-4, 1e-3, 2e-3] {
+            let plan = plan(&poses, &SmoothOptions::new(tolerance, limits)).unwrap();
+            assert!(plan.certificate().holds(), "{:?}", plan.certificate());
+            assert_eq!(plan.rests(), [], "list {seed} within {tolerance} m");
+            if plan.duration() > 1.01 * least {
+                broken.push((seed, tolerance, plan.duration() / least));
+            }
+            least = least.min(plan.duration());
+        }
+    }
+    assert!(broken.is_empty(), "{broken:?}");
+}

@@ -2,19 +2,20 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{Certificate, Peak, certify_made, certify_slowed};
+use super::certificate::{Certificate, certify_made, certify_slowed};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::method::Method;
 use super::missed;
 use super::motion::Motion;
+use super::narrowing::{between, broken, narrow};
 use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::seed::Seed;
 use super::span::Span;
 pub(crate) use super::span::stretch;
 use super::spline::{self, Effort, Found, Moving, Request};
-use crate::{ToolLimits, ToolPoint};
+use crate::ToolPoint;
 
 /// Effort of one spline, but for the gap to its optimum.
 const EFFORT: Effort = Effort {
@@ -54,12 +55,6 @@ pub(super) const SLOWED: f64 = 1.3;
 
 /// The most by which a motion may miss a pose by the angle for its orientations to be turned to it.
 const TURNED: f64 = 4.0;
-
-/// Shares of the legs beside a pose on which the place goes forward only, one after the other.
-const SHARES: [f64; 2] = [0.5, 1.0];
-
-/// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
-const AT_END: f64 = 1.0 + 1e-3;
 
 /// A motion between two ends in motion that exceeds a limit by no more may be slowed down as a whole.
 const NEARLY: f64 = 1.03;
@@ -353,11 +348,11 @@ impl Attempts<'_> {
         if seen.crossings.iter().all(Crossing::holds) {
             return None;
         }
-        let found = |share: &f64| {
-            let mut spans = spline::forward(request, seed, (self.window.backwards, *share))?.spans;
+        let backwards = self.window.backwards;
+        [false, true].into_iter().find_map(|both| {
+            let mut spans = spline::forward(request, seed, [backwards, both])?.spans;
             self.judge(&mut spans).holds().then_some(spans)
-        };
-        SHARES.iter().find_map(found)
+        })
     }
 
     /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are
@@ -440,80 +435,5 @@ impl Attempts<'_> {
             );
         }
         Some(())
-    }
-}
-
-/// The greatest ratio of a quantity to its bound.
-fn broken(certificate: &Certificate, crossings: &[Crossing]) -> f64 {
-    let miss = |crossing: &Crossing| {
-        (crossing.deviation / crossing.tolerance)
-            .max(crossing.angle / crossing.angular_tolerance.max(RESOLUTION))
-    };
-    let bounds = [certificate.corridor.ratio, certificate.worst_limit()];
-    bounds
-        .into_iter()
-        .chain(crossings.iter().map(miss))
-        .fold(0.0, f64::max)
-}
-
-/// Narrows the options by what a motion exceeded.
-pub(super) fn narrow(
-    options: &mut SmoothOptions,
-    certificate: &Certificate,
-    crossings: &[Crossing],
-    coupled: bool,
-) {
-    if certificate.corridor.ratio > 1.0 {
-        options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
-    }
-    let (mut far, mut turned) = (1.0_f64, 1.0_f64);
-    for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
-        far = far.max(crossing.deviation / crossing.tolerance);
-        turned = turned.max(crossing.angle / crossing.angular_tolerance);
-    }
-    if turned > 1.0 && coupled {
-        options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));
-    } else {
-        // An orientation that follows the path cuts corners as the path does.
-        far = far.max(turned);
-    }
-    if far > 1.0 {
-        options.tolerance *= 0.9 / far.min(10.0);
-    }
-    let over = certificate.worst_limit();
-    if over > 1.0 {
-        let share = 0.99 / over.min(4.0);
-        options.limits = options.limits.scaled(share, share);
-    }
-}
-
-/// The limits of a motion between two states, without a share of those that it exceeded. None is below what the
-/// states have: no motion would keep it.
-fn between(limits: &ToolLimits, certificate: &Certificate, ends: [&ToolPoint; 2]) -> ToolLimits {
-    let lower = |limit: f64, peak: Peak, rate: fn(&ToolPoint) -> f64| {
-        let least = ends.into_iter().map(rate).fold(0.0, f64::max);
-        if peak.ratio > 1.0 {
-            (limit * 0.99 / peak.ratio.min(4.0)).max(limit.min(AT_END * least))
-        } else {
-            limit
-        }
-    };
-    ToolLimits {
-        speed: lower(limits.speed, certificate.speed, |end| end.linear[0].norm()),
-        acceleration: lower(limits.acceleration, certificate.acceleration, |end| {
-            end.linear[1].norm()
-        }),
-        jerk: lower(limits.jerk, certificate.jerk, |end| end.linear[2].norm()),
-        angular_speed: lower(limits.angular_speed, certificate.angular_speed, |end| {
-            end.angular[0].norm()
-        }),
-        angular_acceleration: lower(
-            limits.angular_acceleration,
-            certificate.angular_acceleration,
-            |end| end.angular[1].norm(),
-        ),
-        angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
-            end.angular[2].norm()
-        }),
     }
 }

@@ -4,9 +4,10 @@ use nalgebra::Isometry3;
 
 use super::arm::ArmMotion;
 use super::certificate::{Certificate, certify_slowed};
-use super::choose::{SLOWED, arm_effort, narrow};
+use super::choose::{SLOWED, arm_effort};
 use super::crossing::{Crossing, RESOLUTION};
 use super::lower_bound::lower_bound;
+use super::narrowing::narrow;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::seed::Seed;

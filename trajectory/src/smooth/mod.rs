@@ -29,6 +29,7 @@ mod method;
 mod missed;
 mod motion;
 mod narrower;
+mod narrowing;
 mod normal_form;
 mod options;
 mod overlap;

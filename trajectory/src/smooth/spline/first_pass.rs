@@ -43,13 +43,13 @@ impl Task<'_> {
         }
     }
 
-    /// Searches on from where a search ended, with a place that goes forward only on a share of the legs beside the poses that
-    /// the tool approaches where it is not turned yet. `None` where there are none, or no such motion is found.
+    /// Searches on from where a search ended, with a place that goes forward only on the leg before each pose that the tool
+    /// approaches where it is not turned yet, or on `both` legs beside it. `None` where there are none, or no such motion is found.
     pub(super) fn forward<const D: usize, const B: usize>(
         &self,
         seed: &Seed,
         used: [bool; 2],
-        (backwards, share): (bool, f64),
+        [backwards, both]: [bool; 2],
     ) -> Option<Found> {
         let (mut problem, mut point) = self.ended(seed, used);
         let mut effort = self.effort();
@@ -73,7 +73,7 @@ impl Task<'_> {
                 vertices: &vertices,
                 nearer: &nearer,
                 backwards,
-                share,
+                both,
             };
             other.go_forward(&point, &stretch);
             self.see_aims(&mut other, &first);

@@ -18,8 +18,8 @@ const CLEAR: f64 = 1.5 * AHEAD;
 /// What an iterate leaves at least of a widened bound, as a share of how far it goes forward or back.
 const LEFT: f64 = 0.03;
 
-/// The share of a leg beside a vertex on which the place comes straight nearer to it; the distance, in radii of its ball, and the
-/// time before its pass, in knots, from which on it does not.
+/// The share of the time on a leg, before its vertex, in which the place comes nearer all the time; the distance, in radii of the
+/// ball, and the time to the pass, in knots, below which it need not.
 const BESIDE: f64 = 0.5;
 const NEAR: f64 = 0.3;
 const SOON: f64 = 1.5;
@@ -69,17 +69,17 @@ impl Forward {
     }
 }
 
-/// Where the place is to go forward only: on the legs before and after some inner vertices.
+/// Where the place is to go forward only: on the legs before some inner vertices, and perhaps on those after them.
 #[derive(Clone, Debug)]
 pub(super) struct Stretch<'a> {
     /// These inner vertices.
     pub(super) vertices: &'a BTreeSet<usize>,
-    /// Those of them to which the place comes nearer all the time until it passes them; from which it goes farther away if
-    /// the motion will be made from its end to its start.
+    /// Those of them to which the place comes nearer all the time, from the middle of the leg on.
     pub(super) nearer: &'a BTreeSet<usize>,
+    /// Whether the motion will be made from its end to its start: then a leg after a vertex is one before it.
     pub(super) backwards: bool,
-    /// The share of each leg, beside its vertex.
-    pub(super) share: f64,
+    /// Whether the place goes forward on both legs beside a vertex.
+    pub(super) both: bool,
 }
 
 /// One end of a leg.
@@ -93,22 +93,26 @@ struct End {
 }
 
 impl Stretch<'_> {
-    /// The ends of a leg at which the place goes forward after a share of the time on it; leg 0 begins at the start.
-    fn ends(&self, leg: usize, share: f64) -> impl Iterator<Item = End> {
-        let end = move |vertex: usize, sign: f64, away: f64| End { vertex, sign, away };
-        let end = move |vertex: usize| match leg {
-            _ if leg == vertex => Some(end(vertex, 1.0, 1.0 - share)),
-            _ if leg == vertex + 1 => Some(end(vertex, -1.0, share)),
-            _ => None,
-        };
-        let ends = self.vertices.iter().filter_map(move |vertex| end(*vertex));
-        ends.filter(|end| end.away <= self.share)
+    /// The sign of an end of a leg from which its vertex is approached.
+    fn first(&self) -> f64 {
+        if self.backwards { -1.0 } else { 1.0 }
     }
 
-    /// Whether the place comes nearer to an end all the time, or goes farther away from it.
+    /// The ends of a leg beside which the place goes forward, after a share of the time on it; leg 0 begins at the start.
+    fn ends(&self, leg: usize, share: f64) -> impl Iterator<Item = End> {
+        let end = move |vertex: usize, sign: f64, away: f64| End { vertex, sign, away };
+        let end = move |vertex: &usize| match leg {
+            _ if leg == *vertex => Some(end(*vertex, 1.0, 1.0 - share)),
+            _ if leg == vertex + 1 => Some(end(*vertex, -1.0, share)),
+            _ => None,
+        };
+        let ends = self.vertices.iter().filter_map(end);
+        ends.filter(|end| self.both || end.sign == self.first())
+    }
+
+    /// Whether the place comes nearer to an end all the time.
     fn is_nearer(&self, end: &End) -> bool {
-        let first = if self.backwards { -1.0 } else { 1.0 };
-        end.sign == first && end.away <= BESIDE && self.nearer.contains(&end.vertex)
+        end.sign == self.first() && end.away <= BESIDE && self.nearer.contains(&end.vertex)
     }
 }
 
@@ -156,7 +160,7 @@ impl<const D: usize> Problem<D> {
         [next].into_iter().chain(passed).collect()
     }
 
-    /// The straight way to a vertex, or from it, at a time that is not too near to its pass.
+    /// The direction of the straight way to a vertex, or from it, at a time that is not too near to its pass.
     fn straight(&self, point: &Point<D>, end: &End, time: f64) -> Option<[f64; 3]> {
         let (here, goal) = (
             point.place(time, 0),
@@ -236,4 +240,143 @@ impl<const D: usize, const B: usize> System<D, B> {
 /// The share of a point along a direction.
 fn along<const D: usize>(forward: &Forward, point: &[f64; D]) -> f64 {
     (0..3).map(|d| forward.along[d] * point[d]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::problem::{Group, Room};
+    use crate::smooth::spline::project::project;
+    use crate::smooth::spline::solve::go;
+    use crate::smooth::spline::start;
+
+    /// Corners whose place goes forward only, an end that moves so fast (m/s), and a first iterate.
+    fn problem(speed: f64) -> (Problem<6>, Point<6>) {
+        let vertices = [
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.1, 0.0, 0.0, 0.3, 0.0, 0.1],
+            [0.1, 0.1, 0.0, 0.3, 0.4, 0.0],
+            [0.0, 0.1, 0.1, 0.0, 0.4, 0.3],
+            [0.0, 0.2, 0.1, 0.1, 0.1, 0.3],
+        ];
+        let group = |scale: f64, radius: f64| Group {
+            caps: [0.5, 5.0, 100.0].map(|cap| cap * scale),
+            radius,
+            width: 2.0 * radius,
+        };
+        let mut problem = Problem::at_rest(vertices.to_vec(), [group(1.0, 0.01), group(4.0, 0.08)]);
+        let mut point = start::first(&mut problem, None, start::KNOTS_PER_RAMP);
+        if speed > 0.0 {
+            let moving = [0.0, speed, 0.0, 0.0, 0.0, speed];
+            problem.finish = Some([vertices[4], moving, [0.0; 6], [0.0; 6]]);
+        }
+        problem.pin(&mut point);
+        project(&problem, &mut point, None, 20);
+        let stretch = Stretch {
+            vertices: &BTreeSet::from([0, 2]),
+            nearer: &BTreeSet::from([2]),
+            backwards: false,
+            both: true,
+        };
+        problem.go_forward(&point, &stretch);
+        (problem, point)
+    }
+
+    /// With bounds that hold and with bounds that are widened the barrier falls along the Newton step as its decrement says, and
+    /// is curved so.
+    fn check<const B: usize>(speed: f64, back: bool) {
+        let (mut problem, point) = problem(speed);
+        if back {
+            for forward in &mut problem.forward {
+                forward.along = forward.along.map(|x| -x);
+            }
+        }
+        let room = Room::new(&problem, &point);
+        assert_eq!(room.forward.len(), problem.forward.len());
+        assert!(room.forward.iter().any(|behind| Forward::is_tight(*behind)) || back);
+        assert!(room.forward.iter().any(|behind| *behind > 0.0) || !back);
+        let weight = problem.parameter(&point) / point.z;
+        let step = System::<6, B>::new(&point).step(&problem, &point, &room, weight);
+        let step = step.unwrap();
+        let barrier = Barrier {
+            problem: &problem,
+            room: &room,
+            weight,
+            keep: 0.0,
+        };
+        let value = |share: f64| {
+            let mut moved = point.clone();
+            go(&problem, (&point, &mut moved), (&step, share));
+            project(&problem, &mut moved, Some(&room), 20);
+            let seen = barrier.look(&moved, &[]).unwrap();
+            barrier.value(&moved, &seen)
+        };
+        let wide = 1e-4;
+        let (before, here, after) = (value(-wide), value(0.0), value(wide));
+        let slope = (before - after) / (2.0 * wide) / step.decrement;
+        assert!((slope - 1.0).abs() < 1e-3, "{speed} {back}: {slope}");
+        let bend = (before + after - 2.0 * here) / (wide * wide) / step.decrement;
+        assert!((bend - 1.0).abs() < 0.05, "{speed} {back}: {bend}");
+    }
+
+    #[test]
+    fn the_barrier_falls_along_the_step_as_its_decrement_says() {
+        for back in [false, true] {
+            check::<20>(0.0, back);
+            check::<36>(0.0, back);
+            check::<20>(0.01, back);
+            check::<36>(0.01, back);
+        }
+    }
+
+    /// Each control point on a leg beside one of the vertices lies before the next one; those on the legs of a vertex before it,
+    /// and past it afterwards.
+    #[test]
+    fn bounds_are_on_the_legs_beside_the_vertices() {
+        let (mut problem, point) = problem(0.0);
+        let (vertices, nearer) = (BTreeSet::from([1]), BTreeSet::new());
+        for (both, backwards, legs) in [
+            (false, false, vec![1]),
+            (false, true, vec![2]),
+            (true, false, vec![1, 2]),
+        ] {
+            let stretch = Stretch {
+                vertices: &vertices,
+                nearer: &nearer,
+                backwards,
+                both,
+            };
+            problem.go_forward(&point, &stretch);
+            let leg = |forward: &Forward| point.leg(forward.control as f64 - 1.0).0;
+            let (mut seen, all): (Vec<usize>, _) =
+                (problem.forward.iter().map(leg).collect(), &problem.forward);
+            assert!(
+                all.chunks(2)
+                    .all(|pair| pair[0].place.is_none() && pair[1].place.is_some())
+            );
+            let sign = |forward: &Forward| {
+                let way = problem.way(leg(forward) + 1, 0).direction();
+                (0..3).map(|d| way[d] * forward.along[d]).sum::<f64>()
+            };
+            for forward in all {
+                let after = forward.place.is_some() && leg(forward) == 2;
+                assert!((sign(forward) - if after { -1.0 } else { 1.0 }).abs() < 1e-12);
+            }
+            seen.dedup();
+            assert_eq!(seen, legs);
+        }
+    }
+
+    /// A widened bound contains the iterate, is never wider than before, and is the true one where the iterate is well inside.
+    #[test]
+    fn bounds_are_narrowed_to_the_iterate() {
+        let mut behind = f64::INFINITY;
+        for ahead in [-0.5, -0.2, -1e-3, 0.0, 1.2e-4, 1e-3] {
+            let narrowed = Forward::narrowed(behind, ahead);
+            assert!(narrowed <= behind && narrowed > -ahead);
+            assert_eq!(Forward::is_tight(narrowed), ahead == 1e-3);
+            behind = narrowed;
+        }
+    }
 }

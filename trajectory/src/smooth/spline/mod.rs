@@ -29,6 +29,7 @@ mod meet;
 mod newton;
 mod norms;
 mod nudge;
+mod orientations;
 mod passes;
 mod problem;
 mod project;

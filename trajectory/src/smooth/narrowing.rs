@@ -1,0 +1,88 @@
+//! Bounds that are narrowed by what a motion exceeded.
+
+use super::certificate::{Certificate, Peak};
+use super::crossing::{Crossing, RESOLUTION};
+use super::options::SmoothOptions;
+use crate::{ToolLimits, ToolPoint};
+
+/// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
+const AT_END: f64 = 1.0 + 1e-3;
+
+/// The greatest ratio of a quantity to its bound.
+pub(super) fn broken(certificate: &Certificate, crossings: &[Crossing]) -> f64 {
+    let miss = |crossing: &Crossing| {
+        (crossing.deviation / crossing.tolerance)
+            .max(crossing.angle / crossing.angular_tolerance.max(RESOLUTION))
+    };
+    let bounds = [certificate.corridor.ratio, certificate.worst_limit()];
+    bounds
+        .into_iter()
+        .chain(crossings.iter().map(miss))
+        .fold(0.0, f64::max)
+}
+
+/// Narrows the options by what a motion exceeded.
+pub(super) fn narrow(
+    options: &mut SmoothOptions,
+    certificate: &Certificate,
+    crossings: &[Crossing],
+    coupled: bool,
+) {
+    if certificate.corridor.ratio > 1.0 {
+        options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
+    }
+    let (mut far, mut turned) = (1.0_f64, 1.0_f64);
+    for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
+        far = far.max(crossing.deviation / crossing.tolerance);
+        turned = turned.max(crossing.angle / crossing.angular_tolerance);
+    }
+    if turned > 1.0 && coupled {
+        options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));
+    } else {
+        // An orientation that follows the path cuts corners as the path does.
+        far = far.max(turned);
+    }
+    if far > 1.0 {
+        options.tolerance *= 0.9 / far.min(10.0);
+    }
+    let over = certificate.worst_limit();
+    if over > 1.0 {
+        let share = 0.99 / over.min(4.0);
+        options.limits = options.limits.scaled(share, share);
+    }
+}
+
+/// The limits of a motion between two states, without a share of those that it exceeded. None is below what the
+/// states have: no motion would keep it.
+pub(super) fn between(
+    limits: &ToolLimits,
+    certificate: &Certificate,
+    ends: [&ToolPoint; 2],
+) -> ToolLimits {
+    let lower = |limit: f64, peak: Peak, rate: fn(&ToolPoint) -> f64| {
+        let least = ends.into_iter().map(rate).fold(0.0, f64::max);
+        if peak.ratio > 1.0 {
+            (limit * 0.99 / peak.ratio.min(4.0)).max(limit.min(AT_END * least))
+        } else {
+            limit
+        }
+    };
+    ToolLimits {
+        speed: lower(limits.speed, certificate.speed, |end| end.linear[0].norm()),
+        acceleration: lower(limits.acceleration, certificate.acceleration, |end| {
+            end.linear[1].norm()
+        }),
+        jerk: lower(limits.jerk, certificate.jerk, |end| end.linear[2].norm()),
+        angular_speed: lower(limits.angular_speed, certificate.angular_speed, |end| {
+            end.angular[0].norm()
+        }),
+        angular_acceleration: lower(
+            limits.angular_acceleration,
+            certificate.angular_acceleration,
+            |end| end.angular[1].norm(),
+        ),
+        angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
+            end.angular[2].norm()
+        }),
+    }
+}
