@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::build::{Found, Task};
-use super::forward::Stretch;
 use super::problem::{Point, Problem, ways};
 use super::solve::{Aims, Effort, solve};
+use super::stretch::Stretch;
 use crate::smooth::crossing::{Crossing, crossings_made};
 use crate::smooth::seed::Seed;
 

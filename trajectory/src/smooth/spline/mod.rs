@@ -6,6 +6,7 @@
 //! uniform splines is convex, and its barrier method are this project's own;
 //! see docs/decisions/0050-smooth-spline.md.
 
+mod ahead;
 mod aims;
 mod arm;
 mod ball;
@@ -36,6 +37,7 @@ mod project;
 mod request;
 mod solve;
 mod start;
+mod stretch;
 mod turns;
 
 pub(crate) use band::Band;
