@@ -19,14 +19,28 @@ const BEGINS: usize = 4;
 const LONGER: usize = 2;
 
 impl Task<'_> {
-    /// Searches on with a solution that has not turned as it has to be on the first approach to a pose, so that it passes there. The
-    /// solution stays where that does not help.
+    /// Searches on for an arm with a solution that has not turned as it has to be on the first approach to a pose: with a place that
+    /// goes forward only on the leg before it, or else so that it passes there. The solution stays where that does not help.
     pub(super) fn pass_first<const D: usize, const B: usize>(
         &self,
         (problem, point): (&mut Problem<D>, &mut Point<D>),
         (effort, aims): (Effort, Option<Aims<'_, D>>),
         used: [bool; 2],
     ) {
+        if Problem::<D>::TURNS {
+            let ahead =
+                self.ahead::<D, B>((problem, point), (effort, aims), (used, [false, false]));
+            let holds = |(other, first): &(Problem<D>, Point<D>)| {
+                let passes = self.passes((other, first), used, false);
+                missed(&passes, first, other.spacing(first.z))
+                    .next()
+                    .is_none()
+            };
+            if let Some(ahead) = ahead.filter(holds) {
+                (*problem, *point) = ahead;
+                return;
+            }
+        }
         for _ in 0..AGAIN {
             let h = problem.spacing(point.z);
             let passes = self.passes((problem, point), used, false);
@@ -43,23 +57,40 @@ impl Task<'_> {
         }
     }
 
-    /// Searches on from where a search ended, with a place that goes forward only on the leg before each pose that the tool
-    /// approaches where it is not turned yet, or on `both` legs beside it. `None` where there are none, or no such motion is found.
+    /// Searches on from where a search of the tool alone ended, with a place that goes forward only on the leg before each pose that
+    /// it approaches where it is not turned yet, or on `both` legs beside it. `None` where there are none, or no such motion is found.
     pub(super) fn forward<const D: usize, const B: usize>(
         &self,
         seed: &Seed,
         used: [bool; 2],
         [backwards, both]: [bool; 2],
     ) -> Option<Found> {
-        let (mut problem, mut point) = self.ended(seed, used);
-        let mut effort = self.effort();
-        (effort.search, effort.steps) = (BEGINS * effort.search, LONGER * effort.steps);
+        let (problem, point) = self.ended(seed, used);
         let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
+        let aims: Aims<'_, D> = &aims;
+        let (problem, point) = self.ahead::<D, B>(
+            (&problem, &point),
+            (self.effort(), Some(aims)),
+            (used, [backwards, both]),
+        )?;
+        Some(self.found(&problem, &point, used))
+    }
+
+    /// Where searches end that go on from an iterate with a place that goes forward only. `None` where it need not, or no such
+    /// motion is found.
+    fn ahead<const D: usize, const B: usize>(
+        &self,
+        (problem, point): (&Problem<D>, &Point<D>),
+        (mut effort, aims): (Effort, Option<Aims<'_, D>>),
+        (used, [backwards, both]): ([bool; 2], [bool; 2]),
+    ) -> Option<(Problem<D>, Point<D>)> {
+        (effort.search, effort.steps) = (BEGINS * effort.search, LONGER * effort.steps);
         let (mut vertices, mut nearer) = (BTreeSet::new(), BTreeSet::new());
+        let mut ahead: Option<(Problem<D>, Point<D>)> = None;
         for _ in 0..FORWARD {
-            let h = problem.spacing(point.z);
-            let passes = self.passes((&problem, &point), used, backwards);
-            let missed: Vec<usize> = missed(&passes, &point, h).collect();
+            let (before, from) = ahead.as_ref().map_or((problem, point), |(a, b)| (a, b));
+            let passes = self.passes((before, from), used, backwards);
+            let missed: Vec<usize> = missed(&passes, from, before.spacing(from.z)).collect();
             if missed.is_empty() {
                 break;
             }
@@ -68,19 +99,19 @@ impl Task<'_> {
                 nearer.extend(missed.iter().copied());
             }
             vertices.extend(missed);
-            let (mut other, mut first) = (problem.clone(), point.clone());
             let stretch = Stretch {
                 vertices: &vertices,
                 nearer: &nearer,
                 backwards,
                 both,
             };
-            other.go_forward(&point, &stretch);
+            let (mut other, mut first) = (before.clone(), from.clone());
+            other.go_forward(from, &stretch);
             self.see_aims(&mut other, &first);
-            solve::<D, B>(&mut other, &mut first, effort, Some(&aims))?;
-            (problem, point) = (other, first);
+            solve::<D, B>(&mut other, &mut first, effort, aims)?;
+            ahead = Some((other, first));
         }
-        (!vertices.is_empty()).then(|| self.found(&problem, &point, used))
+        ahead
     }
 
     /// The problem of a search that has ended, and its last iterate.
