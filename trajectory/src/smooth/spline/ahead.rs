@@ -5,9 +5,6 @@ use super::iterate::Iterate;
 use super::newton::System;
 use super::problem::{Point, Problem};
 
-/// Control points at the start that a step does not move.
-const FIXED: usize = 4;
-
 impl<const D: usize> Problem<D> {
     /// What the place covers at its greatest speed in one knot interval, m.
     pub(super) fn stride(&self, z: f64) -> f64 {
@@ -48,14 +45,8 @@ impl<const D: usize, const B: usize> System<D, B> {
     fn ends(&mut self, forward: &Forward, [steep, rise]: [f64; 2], slack: f64) {
         let free = self.sides.len() / D;
         let slope = forward.along.map(|x| x / slack);
-        let row = |k: usize| {
-            Some(Self::row(
-                free,
-                k.checked_sub(FIXED).filter(|k| *k < free)?,
-                0,
-            ))
-        };
-        let ends = || forward.ends().filter_map(|(k, sign)| Some((row(k)?, sign)));
+        let row = |(k, sign)| Some((Self::free_row(free, k, 0)?, sign));
+        let ends = || forward.ends().filter_map(row);
         for (row, sign) in ends() {
             for d in 0..3 {
                 self.sides[row + d][0] -= steep * sign * slope[d];
@@ -78,32 +69,20 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::smooth::spline::barrier::Barrier;
-    use crate::smooth::spline::problem::{Group, Room};
+    use crate::smooth::spline::corners::{along, corners};
+    use crate::smooth::spline::problem::Room;
     use crate::smooth::spline::project::project;
-    use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
     use crate::smooth::spline::stretch::Stretch;
 
     /// Corners whose place goes forward only, an end that moves so fast (m/s), and a first iterate.
     fn problem(speed: f64) -> (Problem<6>, Point<6>) {
-        let vertices = [
-            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            [0.1, 0.0, 0.0, 0.3, 0.0, 0.1],
-            [0.1, 0.1, 0.0, 0.3, 0.4, 0.0],
-            [0.0, 0.1, 0.1, 0.0, 0.4, 0.3],
-            [0.0, 0.2, 0.1, 0.1, 0.1, 0.3],
-        ];
-        let group = |scale: f64, radius: f64| Group {
-            caps: [0.5, 5.0, 100.0].map(|cap| cap * scale),
-            radius,
-            width: 2.0 * radius,
-        };
-        let mut problem = Problem::at_rest(vertices.to_vec(), [group(1.0, 0.01), group(4.0, 0.08)]);
+        let mut problem = corners();
         let mut point = start::first(&mut problem, None, start::KNOTS_PER_RAMP);
         if speed > 0.0 {
             let moving = [0.0, speed, 0.0, 0.0, 0.0, speed];
-            problem.finish = Some([vertices[4], moving, [0.0; 6], [0.0; 6]]);
+            let end = problem.vertices[problem.vertices.len() - 1];
+            problem.finish = Some([end, moving, [0.0; 6], [0.0; 6]]);
         }
         problem.pin(&mut point);
         project(&problem, &mut point, None, 20);
@@ -133,19 +112,7 @@ mod tests {
         let weight = problem.parameter(&point) / point.z;
         let step = System::<6, B>::new(&point).step(&problem, &point, &room, weight);
         let step = step.unwrap();
-        let barrier = Barrier {
-            problem: &problem,
-            room: &room,
-            weight,
-            keep: 0.0,
-        };
-        let value = |share: f64| {
-            let mut moved = point.clone();
-            go(&problem, (&point, &mut moved), (&step, share));
-            project(&problem, &mut moved, Some(&room), 20);
-            let seen = barrier.look(&moved, &[]).unwrap();
-            barrier.value(&moved, &seen)
-        };
+        let value = along((&problem, &room), (&point, &step), weight);
         let wide = 1e-4;
         let (before, here, after) = (value(-wide), value(0.0), value(wide));
         let slope = (before - after) / (2.0 * wide) / step.decrement;

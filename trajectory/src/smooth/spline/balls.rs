@@ -51,10 +51,9 @@ impl<const D: usize, const B: usize> System<D, B> {
         let mut first = [0; 2];
         for g in 0..Problem::<D>::GROUPS {
             for i in 0..5 {
-                let Some(k) = (ball.first + i).checked_sub(4).filter(|k| *k < free) else {
+                let Some(row) = Self::free_row(free, ball.first + i, g) else {
                     continue;
                 };
-                let row = Self::row(free, k, g);
                 for d in 0..3 {
                     self.sides[row + d][0] += ball.weights[i] * ball.gradient[3 * g + d];
                     self.sides[row + d][1] += ball.weights[i] * border[3 * g + d];
@@ -91,14 +90,13 @@ impl<const D: usize, const B: usize> System<D, B> {
             .push(first, ball.stiff + tie, [drawn, ball.slope]);
         for g in 0..Problem::<D>::GROUPS {
             for i in 0..5 {
-                let Some(k) = (ball.first + i).checked_sub(4).filter(|k| *k < free) else {
+                let Some(row) = Self::free_row(free, ball.first + i, g) else {
                     continue;
                 };
                 for d in 0..3 {
                     let tied = ball.lead.as_ref().filter(|_| g == 0);
                     let tied = tied.map_or(0.0, |lead| lead.tie * lead.falls[i][d]);
-                    column[Self::row(free, k, g) + d] =
-                        ball.weights[i] * ball.bent[3 * g + d] + tied;
+                    column[row + d] = ball.weights[i] * ball.bent[3 * g + d] + tied;
                 }
             }
         }
@@ -158,31 +156,19 @@ impl<const D: usize, const B: usize> System<D, B> {
 
 #[cfg(test)]
 mod tests {
-    use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::corners::{along, corners};
     use crate::smooth::spline::newton::{Step, System};
-    use crate::smooth::spline::problem::{Group, Point, Problem, Room, ways};
+    use crate::smooth::spline::problem::{Point, Problem, Room, ways};
     use crate::smooth::spline::project::project;
     use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
 
     /// Corners in position and orientation, with and without motion at the start.
     fn problem(speed: f64) -> Problem<6> {
-        let vertices = [
-            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            [0.1, 0.0, 0.0, 0.3, 0.0, 0.1],
-            [0.1, 0.1, 0.0, 0.3, 0.4, 0.0],
-            [0.0, 0.1, 0.1, 0.0, 0.4, 0.3],
-            [0.0, 0.2, 0.1, 0.1, 0.1, 0.3],
-        ];
-        let group = |scale: f64, radius: f64| Group {
-            caps: [0.5, 5.0, 100.0].map(|cap| cap * scale),
-            radius,
-            width: 2.0 * radius,
-        };
         let moving = [speed, 0.0, 0.0, 3.0 * speed, 0.0, speed];
         Problem {
-            start: [vertices[0], moving, [0.0; 6], [0.0; 6]],
-            ..Problem::at_rest(vertices.to_vec(), [group(1.0, 0.01), group(4.0, 0.08)])
+            start: [[0.0; 6], moving, [0.0; 6], [0.0; 6]],
+            ..corners()
         }
     }
 
@@ -297,17 +283,7 @@ mod tests {
                 System::<6, 20>::new(&point).step(&problem, &point, &room, weight)
             };
             let step = step.unwrap();
-            let barrier = Barrier {
-                problem: &problem,
-                room: &room,
-                weight,
-                keep: 0.0,
-            };
-            let value = |share: f64| {
-                let moved = moved(&problem, &room, (&point, &step), share);
-                let seen = barrier.look(&moved, &[]).unwrap();
-                barrier.value(&moved, &seen)
-            };
+            let value = along((&problem, &room), (&point, &step), weight);
             let share = 1e-5;
             let slope = (value(share) - value(-share)) / (2.0 * share);
             let ratio = -slope / step.decrement;

@@ -27,14 +27,14 @@ impl Task<'_> {
         (effort, aims): (Effort, Option<Aims<'_, D>>),
         used: [bool; 2],
     ) {
+        if self.missed((problem, point), used, false).is_empty() {
+            return;
+        }
         if Problem::<D>::TURNS {
             let ahead =
                 self.ahead::<D, B>((problem, point), (effort, aims), (used, [false, false]));
             let holds = |(other, first): &(Problem<D>, Point<D>)| {
-                let passes = self.passes((other, first), used, false);
-                missed(&passes, first, other.spacing(first.z))
-                    .next()
-                    .is_none()
+                self.missed((other, first), used, false).is_empty()
             };
             if let Some(ahead) = ahead.filter(holds) {
                 (*problem, *point) = ahead;
@@ -44,7 +44,7 @@ impl Task<'_> {
         for _ in 0..AGAIN {
             let h = problem.spacing(point.z);
             let passes = self.passes((problem, point), used, false);
-            if missed(&passes, point, h).next().is_none() {
+            if missed(&passes, point, h).is_empty() {
                 return;
             }
             let (mut other, mut first) = (problem.clone(), point.clone());
@@ -89,8 +89,7 @@ impl Task<'_> {
         let mut ahead: Option<(Problem<D>, Point<D>)> = None;
         for _ in 0..FORWARD {
             let (before, from) = ahead.as_ref().map_or((problem, point), |(a, b)| (a, b));
-            let passes = self.passes((before, from), used, backwards);
-            let missed: Vec<usize> = missed(&passes, from, before.spacing(from.z)).collect();
+            let missed = self.missed((before, from), used, backwards);
             if missed.is_empty() {
                 break;
             }
@@ -131,6 +130,17 @@ impl Task<'_> {
         (problem, point)
     }
 
+    /// The inner poses that the motion of an iterate misses; see [`missed`].
+    fn missed<const D: usize>(
+        &self,
+        (problem, point): (&Problem<D>, &Point<D>),
+        used: [bool; 2],
+        backwards: bool,
+    ) -> Vec<usize> {
+        let passes = self.passes((problem, point), used, backwards);
+        missed(&passes, point, problem.spacing(point.z))
+    }
+
     /// How the motion of an iterate passes the poses.
     fn passes<const D: usize>(
         &self,
@@ -144,14 +154,11 @@ impl Task<'_> {
 }
 
 /// The inner poses that are not passed when an iterate with this knot spacing passes them, and not within their tolerances.
-fn missed<const D: usize>(
-    passes: &[Crossing],
-    point: &Point<D>,
-    spacing: f64,
-) -> impl Iterator<Item = usize> {
+fn missed<const D: usize>(passes: &[Crossing], point: &Point<D>, spacing: f64) -> Vec<usize> {
     let all = passes.iter().zip(&point.crossings).enumerate();
-    let missed = move |(pass, time): (&Crossing, &f64)| {
+    let missed = |(pass, time): (&Crossing, &f64)| {
         !pass.holds() && (pass.time / spacing - time).abs() >= SAME
     };
-    all.filter(move |(_, both)| missed(*both)).map(|(i, _)| i)
+    let missed = all.filter(|(_, both)| missed(*both));
+    missed.map(|(i, _)| i).collect()
 }

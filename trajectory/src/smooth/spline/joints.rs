@@ -228,11 +228,10 @@ fn add<S: Four, const D: usize, const B: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smooth::spline::barrier::Barrier;
+    use crate::smooth::spline::corners::along;
     use crate::smooth::spline::joint::DIFFERENCES;
     use crate::smooth::spline::problem::{Group, Room};
     use crate::smooth::spline::project::project;
-    use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
 
     fn number(i: usize, d: usize) -> f64 {
@@ -293,19 +292,7 @@ mod tests {
         let weight = problem.parameter(&point) / point.z;
         let step = System::<D, B>::new(&point).step(&problem, &point, &room, weight);
         let step = step.unwrap();
-        let barrier = Barrier {
-            problem: &problem,
-            room: &room,
-            weight,
-            keep: 0.0,
-        };
-        let value = |share: f64| {
-            let mut moved = point.clone();
-            go(&problem, (&point, &mut moved), (&step, share));
-            project(&problem, &mut moved, Some(&room), 20);
-            let seen = barrier.look(&moved, &[]).unwrap();
-            barrier.value(&moved, &seen)
-        };
+        let value = along((&problem, &room), (&point, &step), weight);
         let share = 1e-5;
         let (before, here, after) = (value(-share), value(0.0), value(share));
         let slope = (before - after) / (2.0 * share) / step.decrement;

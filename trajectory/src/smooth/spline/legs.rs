@@ -41,8 +41,7 @@ impl<const D: usize, const B: usize> System<D, B> {
                 let own = part(slide, g);
                 self.gradient_z += (0..3).map(|d| weight * pull[d] * own[d]).sum::<f64>();
             }
-            if let Some(k) = (first + i).checked_sub(4).filter(|k| *k < free) {
-                let row = Self::row(free, k, g);
+            if let Some(row) = Self::free_row(free, first + i, g) {
                 for d in 0..3 {
                     self.sides[row + d][0] += weight * pull[d];
                 }

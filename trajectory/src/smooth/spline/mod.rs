@@ -16,6 +16,8 @@ mod barrier;
 mod basis;
 mod build;
 mod coordinates;
+#[cfg(test)]
+mod corners;
 mod ends;
 mod first_pass;
 mod forward;

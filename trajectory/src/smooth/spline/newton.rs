@@ -70,6 +70,13 @@ impl<const D: usize, const B: usize> System<D, B> {
         }
     }
 
+    /// The same of control point `k` of all, if it is free.
+    #[inline(always)]
+    pub(super) fn free_row(free: usize, k: usize, g: usize) -> Option<usize> {
+        let k = k.checked_sub(4).filter(|k| *k < free)?;
+        Some(Self::row(free, k, g))
+    }
+
     /// The Newton step of the barrier with weight `t` on `z`.
     pub(crate) fn step(
         &mut self,
