@@ -8,10 +8,11 @@ use super::exact_stop;
 use super::method::Method;
 use super::missed;
 use super::motion::Motion;
-use super::narrowing::{between, broken, narrow};
+use super::narrowing::{between, broken, narrow, narrow_missed};
 use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::seed::Seed;
+use super::shares::Shares;
 use super::span::Span;
 pub(crate) use super::span::stretch;
 use super::spline::{self, Effort, Found, Moving, Request};
@@ -46,6 +47,9 @@ pub(super) fn arm_effort(gap: f64, aimed: f64, onward: bool) -> Effort {
 /// An attempt that breaks a bound by more than this (its first, a later one)
 /// is not followed by another.
 const HOPELESS: [f64; 2] = [10.0, 3.5];
+
+/// First attempts after which only the tolerances of poses that were missed are narrowed; later those of all.
+const SINGLY: usize = 2;
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
@@ -153,6 +157,8 @@ struct Attempts<'a> {
     most: f64,
     /// The options, narrowed by what was exceeded.
     inner: SmoothOptions,
+    /// Shares of the tolerances of single poses, narrowed where these were missed.
+    shares: Shares,
     effort: Effort,
     /// Whether the orientation has to be part of the optimum, once that is decided.
     coupled: Option<bool>,
@@ -224,6 +230,7 @@ impl<'a> Window<'a> {
             known,
             most,
             inner,
+            shares: Shares::default(),
             effort: Effort {
                 most,
                 gap: options.gap,
@@ -266,10 +273,11 @@ impl Attempts<'_> {
         let whole = self.inner.clone();
         let mut retried = false;
         for attempt in 0..5_usize {
-            let narrowed = self.inner.clone();
+            let (narrowed, shares) = (self.inner.clone(), self.shares.clone());
             let mut request = Request {
                 poses: self.window.poses,
                 options: &narrowed,
+                shares: &shares,
                 moving,
                 finish,
                 effort: self.effort,
@@ -297,9 +305,9 @@ impl Attempts<'_> {
                 certificate,
                 crossings,
                 settled,
-            } = seen;
-            if self.keeps && settled {
-                self.keep(&spans, &crossings, retried);
+            } = &seen;
+            if self.keeps && *settled {
+                self.keep(&spans, crossings, retried);
             }
             if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
                 *nearly = Some((spans.clone(), retried));
@@ -307,7 +315,7 @@ impl Attempts<'_> {
             // Narrower bounds make it slower still.
             let slow = spans.last().map_or(0.0, Span::end) > self.most;
             let last = request.coupled || !turns;
-            if last && (slow || broken(&certificate, &crossings) > HOPELESS[attempt.min(1)]) {
+            if last && (slow || broken(certificate, crossings) > HOPELESS[attempt.min(1)]) {
                 return None;
             }
             let fast = certificate.worst_limit() > SLOWED;
@@ -315,11 +323,12 @@ impl Attempts<'_> {
             self.coupled = Some(request.coupled || couple);
             if couple && !request.coupled {
                 // What an orientation exceeds that follows the path says nothing about the optimum.
-                self.inner = whole.clone();
+                (self.inner, self.shares) = (whole.clone(), Shares::default());
                 continue;
             }
-            retried |= broken(&certificate, &crossings) > FAR;
-            self.narrow((&certificate, &crossings), request.coupled, settled)?;
+            retried |= broken(certificate, crossings) > FAR;
+            let coupled = request.coupled && request.moves()[0];
+            self.narrow(attempt, &seen, coupled)?;
         }
         None
     }
@@ -394,16 +403,26 @@ impl Attempts<'_> {
     /// Prepares the attempt after one that broke bounds; `None` if it would be the same.
     fn narrow(
         &mut self,
-        (certificate, crossings): (&Certificate, &[Crossing]),
+        attempt: usize,
+        Judged {
+            certificate,
+            crossings,
+            settled,
+        }: &Judged,
         coupled: bool,
-        settled: bool,
     ) -> Option<()> {
         let Window { moving, finish, .. } = self.window;
-        let before = self.inner.clone();
-        narrow(&mut self.inner, certificate, crossings, coupled);
+        let before = (self.inner.clone(), self.shares.clone());
+        // With other bounds that are broken more poses are missed than those that show it.
+        let only = certificate.corridor.ratio <= 1.0 && certificate.worst_limit() <= 1.0;
+        if only && attempt < SINGLY {
+            narrow_missed(&mut self.shares, crossings, coupled);
+        } else {
+            narrow(&mut self.inner, certificate, crossings, coupled);
+        }
         if let Some((moving, finish)) = moving.zip(finish) {
-            self.inner.limits = between(&before.limits, certificate, [&moving.state, finish]);
-            if self.inner == before {
+            self.inner.limits = between(&before.0.limits, certificate, [&moving.state, finish]);
+            if (&self.inner, &self.shares) == (&before.0, &before.1) {
                 return None;
             }
         }

@@ -11,6 +11,7 @@ use super::narrowing::narrow;
 use super::options::{SmoothError, SmoothOptions};
 use super::plan::SmoothPlan;
 use super::seed::Seed;
+use super::shares::Shares;
 use super::spline::{self, Effort, Found, Request, power};
 use super::{exact_stop, method::Method, motion::Motion};
 use crate::poly::quartic;
@@ -143,6 +144,7 @@ fn searched(
     inner.angular_tolerance = Some(TURNED * options.angular_tolerance());
     for _ in 0..if arm.rough { 1 } else { ATTEMPTS } {
         let request = Request {
+            shares: &Shares::default(),
             poses,
             options: &inner,
             moving: None,

@@ -38,6 +38,7 @@ mod ramp;
 mod rest;
 mod retimed;
 mod seed;
+mod shares;
 mod span;
 mod spline;
 mod tool_law;

@@ -3,6 +3,7 @@
 use super::certificate::{Certificate, Peak};
 use super::crossing::{Crossing, RESOLUTION};
 use super::options::SmoothOptions;
+use super::shares::Shares;
 use crate::{ToolLimits, ToolPoint};
 
 /// Factor on what the ends of a motion have of a limit, below which no limit is narrowed.
@@ -37,18 +38,42 @@ pub(super) fn narrow(
         turned = turned.max(crossing.angle / crossing.angular_tolerance);
     }
     if turned > 1.0 && coupled {
-        options.angular_tolerance = Some(options.angular_tolerance() * 0.9 / turned.min(10.0));
+        options.angular_tolerance = Some(options.angular_tolerance() * within(turned));
     } else {
         // An orientation that follows the path cuts corners as the path does.
         far = far.max(turned);
     }
-    if far > 1.0 {
-        options.tolerance *= 0.9 / far.min(10.0);
-    }
+    options.tolerance *= within(far);
     let over = certificate.worst_limit();
     if over > 1.0 {
         let share = 0.99 / over.min(4.0);
         options.limits = options.limits.scaled(share, share);
+    }
+}
+
+/// The share of a tolerance within which a pose is searched for that was missed by so many of them.
+fn within(missed: f64) -> f64 {
+    if missed > 1.0 {
+        0.9 / missed.min(10.0)
+    } else {
+        1.0
+    }
+}
+
+/// Narrows the balls of the poses that a motion misses, and no others: less of the tolerance of all poses would make it slower
+/// everywhere.
+pub(super) fn narrow_missed(shares: &mut Shares, crossings: &[Crossing], coupled: bool) {
+    let missed = crossings.iter().enumerate();
+    for (i, crossing) in missed.filter(|(_, crossing)| !crossing.holds()) {
+        let far = crossing.deviation / crossing.tolerance;
+        let turned = crossing.angle / crossing.angular_tolerance;
+        let over = if coupled {
+            [far, turned]
+        } else {
+            // An orientation that follows the path cuts corners as the path does.
+            [far.max(turned), 1.0]
+        };
+        shares.narrow(i, over.map(within));
     }
 }
 
@@ -84,5 +109,56 @@ pub(super) fn between(
         angular_jerk: lower(limits.angular_jerk, certificate.angular_jerk, |end| {
             end.angular[2].norm()
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pass that is off by so many tolerances.
+    fn pass(far: f64, turned: f64) -> Crossing {
+        Crossing {
+            index: 1,
+            time: 0.0,
+            deviation: 1e-3 * far,
+            tolerance: 1e-3,
+            angle: 1e-2 * turned,
+            angular_tolerance: 1e-2,
+        }
+    }
+
+    /// Only the balls of poses that are missed are narrowed, twice if they are missed twice; where an orientation follows, those of
+    /// the place.
+    #[test]
+    fn only_what_is_missed_is_narrowed() {
+        let passes = [pass(0.9, 0.2), pass(0.5, 2.0), pass(1.5, 20.0)];
+        let check = |coupled: bool, times: i32, expected: [[f64; 2]; 4]| {
+            let mut shares = Shares::default();
+            for _ in 0..times {
+                narrow_missed(&mut shares, &passes, coupled);
+            }
+            for (i, expected) in expected.iter().enumerate() {
+                for (part, expected) in expected.iter().enumerate() {
+                    let got = shares.ball(i, part);
+                    assert!(
+                        (got - expected.powi(times)).abs() < 1e-12,
+                        "{i} {part}: {got}"
+                    );
+                }
+            }
+        };
+        for times in [1, 2] {
+            check(
+                true,
+                times,
+                [[1.0, 1.0], [1.0, 0.45], [0.6, 0.09], [1.0, 1.0]],
+            );
+            check(
+                false,
+                times,
+                [[1.0, 1.0], [0.45, 1.0], [0.09, 1.0], [1.0, 1.0]],
+            );
+        }
     }
 }

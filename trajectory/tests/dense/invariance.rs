@@ -462,6 +462,33 @@ fn slow_motions_are_known_and_searched_from_within_less() {
     }
 }
 
+/// Within more tolerance a list took up to 6.3 % longer: where its orientation follows the place it missed six of 357 poses, and
+/// was planned again within a third of the tolerance of all.
+#[test]
+fn few_missed_poses_do_not_narrow_all() {
+    let list = random(616..617, 400.0).next().unwrap();
+    let factor = 2.0_f64.sqrt();
+    let less = List {
+        tolerance: list.tolerance * factor.powi(-5),
+        ..list
+    };
+    let times = sweep(&less, 3, factor);
+    assert!(slower_with_more(&times) <= 1.001, "{times:?}");
+}
+
+/// A motion of 3.94 s was taken, and none faster within a tolerance a fourth as large: the place came back to a corner that it had
+/// passed, which counts as the approach to the next pose. Now it goes forward only, in 2.68 s.
+#[test]
+fn the_place_does_not_come_back_to_a_corner() {
+    let list = random(610..611, 400.0).next().unwrap();
+    let within = List {
+        tolerance: 0.25 * list.tolerance,
+        angular_tolerance: angular_tolerance(0.25 * list.tolerance),
+        ..list
+    };
+    assert!(within.time() <= 3.0);
+}
+
 #[test]
 #[ignore = "takes hours of processor time"]
 fn nothing_changes_over_many_lists() {

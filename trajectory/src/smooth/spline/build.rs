@@ -54,8 +54,8 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Found> {
     }
 }
 
-/// The same from where a search ended whose motion approaches poses before the tool is turned as it has to be: with a place that
-/// goes forward only on the legs before these poses, or on `both` beside them. `backwards` if the motion will be made from its end
+/// The same from where a search ended whose motion approaches poses before it passes them: with a place that goes forward only on
+/// the legs before these poses, or on `both` beside them. `backwards` if the motion will be made from its end
 /// to its start. `None` where that is of no use.
 pub(crate) fn forward(
     request: &Request<'_>,
@@ -63,11 +63,11 @@ pub(crate) fn forward(
     [backwards, both]: [bool; 2],
 ) -> Option<Found> {
     let task = Task::new(request);
-    let (used, how) = ([true, true], [backwards, both]);
+    let (place, all, how) = ([true, false], [true; 2], [backwards, both]);
     match request.moves() {
-        [true, true] if !request.coupled => None,
-        [true, true] if request.poses.len() <= FEW => task.forward::<6, 20>(seed, used, how),
-        [true, true] => task.forward::<6, 36>(seed, used, how),
+        [true, turns] if !turns || !request.coupled => task.forward::<3, 20>(seed, place, how),
+        [true, true] if request.poses.len() <= FEW => task.forward::<6, 20>(seed, all, how),
+        [true, true] => task.forward::<6, 36>(seed, all, how),
         _ => None,
     }
 }
@@ -216,6 +216,7 @@ impl<'a> Task<'a> {
             .map(|(pose, turn)| self.pack(used, &pose.translation.vector, turn))
             .collect();
         let mut problem = Problem::at_rest(vertices, self.groups(used));
+        problem.shares = self.request.shares.clone();
         if Problem::<D>::TURNS {
             problem.led = self.led();
         }

@@ -130,15 +130,36 @@ impl Task<'_> {
         (problem, point)
     }
 
-    /// The inner poses that the motion of an iterate misses; see [`missed`].
+    /// The inner poses that the motion of an iterate misses; see [`missed`]. Where the place alone is searched, those before them, too,
+    /// that it passes when the search does not: it comes back to such a pose, and so passes the next one before it is there.
     fn missed<const D: usize>(
         &self,
         (problem, point): (&Problem<D>, &Point<D>),
         used: [bool; 2],
         backwards: bool,
     ) -> Vec<usize> {
-        let passes = self.passes((problem, point), used, backwards);
-        missed(&passes, point, problem.spacing(point.z))
+        let (passes, h) = (
+            self.passes((problem, point), used, backwards),
+            problem.spacing(point.z),
+        );
+        let mut found = missed(&passes, point, h);
+        if !Problem::<D>::TURNS {
+            let before = |i: &usize| {
+                if backwards {
+                    Some(i + 1)
+                } else {
+                    i.checked_sub(1)
+                }
+            };
+            let other = |i: &usize| {
+                passes
+                    .get(*i)
+                    .is_some_and(|pass| is_other(pass, point.crossings[*i], h))
+            };
+            let also: Vec<usize> = found.iter().filter_map(before).filter(other).collect();
+            found.extend(also);
+        }
+        found
     }
 
     /// How the motion of an iterate passes the poses.
@@ -156,9 +177,12 @@ impl Task<'_> {
 /// The inner poses that are not passed when an iterate with this knot spacing passes them, and not within their tolerances.
 fn missed<const D: usize>(passes: &[Crossing], point: &Point<D>, spacing: f64) -> Vec<usize> {
     let all = passes.iter().zip(&point.crossings).enumerate();
-    let missed = |(pass, time): (&Crossing, &f64)| {
-        !pass.holds() && (pass.time / spacing - time).abs() >= SAME
-    };
+    let missed = |(pass, time): (&Crossing, &f64)| !pass.holds() && is_other(pass, *time, spacing);
     let missed = all.filter(|(_, both)| missed(*both));
     missed.map(|(i, _)| i).collect()
+}
+
+/// Whether a pass is not the one at a time in knots.
+fn is_other(pass: &Crossing, time: f64, spacing: f64) -> bool {
+    (pass.time / spacing - time).abs() >= SAME
 }

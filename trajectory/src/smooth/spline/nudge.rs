@@ -49,12 +49,13 @@ fn way_inside<const D: usize>(
 ) -> Option<[f64; D]> {
     let (at, vertex) = (point.at(point.crossings[i])[0], &problem.inner()[i]);
     let mut way = [0.0; D];
-    for (g, group) in problem.groups.iter().enumerate().take(Problem::<D>::GROUPS) {
+    for g in 0..Problem::<D>::GROUPS {
+        let radius = problem.radius(g, i);
         let coordinates = 3 * g..3 * g + 3;
         let squares = coordinates.clone().map(|d| (at[d] - vertex[d]).powi(2));
         let far = squares.sum::<f64>().sqrt();
-        if far > OUTSIDE * group.radius {
-            let share = 1.0 - INSIDE * group.radius / far;
+        if far > OUTSIDE * radius {
+            let share = 1.0 - INSIDE * radius / far;
             coordinates.for_each(|d| way[d] = share * (vertex[d] - at[d]));
         }
     }

@@ -13,6 +13,7 @@ use super::basis::{self, START, weights};
 use super::forward::Forward;
 use super::frame::Frame;
 use super::joint::{BOUNDS, Joint};
+use crate::smooth::shares::Shares;
 
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
 /// slack that each step along a ball leaves it.
@@ -55,6 +56,8 @@ pub(crate) struct Problem<const D: usize> {
     pub(crate) frames: Vec<Frame>,
     /// Where the place goes forward only.
     pub(crate) forward: Vec<Forward>,
+    /// Shares of the balls that are used.
+    pub(crate) shares: Shares,
 }
 
 /// One iterate: control points, `z`, passing times in knots, and by how much
@@ -111,7 +114,13 @@ impl<const D: usize> Problem<D> {
             joints: Vec::new(),
             frames: Vec::new(),
             forward: Vec::new(),
+            shares: Shares::default(),
         }
+    }
+
+    /// Radius of the ball of an inner vertex in group `g`.
+    pub(super) fn radius(&self, g: usize, inner: usize) -> f64 {
+        self.shares.ball(inner, g) * self.groups[g].radius
     }
 
     /// Whether the start or the end is in motion.

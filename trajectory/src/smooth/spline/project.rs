@@ -291,8 +291,8 @@ impl Room {
             .take(Problem::<D>::GROUPS)
         {
             tight &= self.tighten_caps(ratios, g);
-            let radius = problem.groups[g].radius;
             for i in 0..point.crossings.len() {
+                let radius = problem.radius(g, i);
                 let far = miss(problem, point, i, g);
                 self.balls[g][i] = narrowed(
                     self.balls[g][i],

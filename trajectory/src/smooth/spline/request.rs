@@ -8,6 +8,7 @@ use crate::ToolPoint;
 use crate::line::body_turn;
 use crate::smooth::arm::ArmMotion;
 use crate::smooth::options::SmoothOptions;
+use crate::smooth::shares::Shares;
 use crate::smooth::span::Span;
 
 /// Times that the jump of an angular velocity within one knot may exceed the angular jerk where the
@@ -27,6 +28,8 @@ pub(crate) struct Request<'a> {
     /// The poses; with `moving` the first is the pose passed last.
     pub(crate) poses: &'a [Isometry3<f64>],
     pub(crate) options: &'a SmoothOptions,
+    /// Shares of the tolerances that are used.
+    pub(crate) shares: &'a Shares,
     /// State at the start; `None` at rest in the first pose.
     pub(crate) moving: Option<&'a Moving>,
     /// State at the end, between the last pose but one and the last; `None` at rest in the last pose. Only

@@ -229,7 +229,7 @@ fn junctions<const D: usize>(problem: &Problem<D>, legs: &[Leg<D>], h: f64) -> V
                 continue;
             }
             let [_, a, j] = problem.groups[g].caps;
-            let tol = problem.groups[g].radius;
+            let tol = problem.radius(g, i - 1);
             let corner = ((16.0 * tol * a).sqrt() / m)
                 .min(j * (96.0 * tol / j).powf(2.0 / 3.0) / (4.0 * m))
                 .min(2.3 * tol / (h * m));
