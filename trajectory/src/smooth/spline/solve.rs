@@ -43,8 +43,9 @@ const LOOSELY: f64 = 3000.0;
 const SHORT: f64 = 0.1;
 const STUCK: usize = 4;
 
-/// Rounds in which a trial looks for the passes.
-const ROUNDS: usize = 3;
+/// Rounds in which a trial looks for the passes, of a place alone and with orientations. There a pass that is not yet where it
+/// belongs may be inside of a ball which the pass itself is outside of: then no step leads on from the iterate.
+const ROUNDS: [usize; 2] = [3, 12];
 
 /// Square of the Newton decrement from which short steps are normal, because the weight has just
 /// been raised.
@@ -92,7 +93,7 @@ impl Pace {
                 last: if Problem::<D>::TURNS { ROUGHLY } else { CENTRE },
                 low: LOW,
                 keep: KEEP,
-                rounds: ROUNDS,
+                rounds: ROUNDS[usize::from(Problem::<D>::TURNS)],
                 near: if effort.gap >= ROUGH { 3.0 } else { 0.1 },
             };
         }
@@ -106,7 +107,7 @@ impl Pace {
             last: 1.0,
             low: 0.0,
             keep: 0.5,
-            rounds: 12,
+            rounds: ROUNDS[1],
             near: 0.1,
         }
     }
@@ -405,7 +406,7 @@ fn aim<const D: usize, const B: usize>(
         shifted(problem, &before, (&shifts, share));
         let mut trial = point.clone();
         go(problem, (point, &mut trial), (&step, share));
-        project(problem, &mut trial, Some(room), ROUNDS);
+        project(problem, &mut trial, Some(room), ROUNDS[1]);
         if let Some(seen) = left(problem, room, &trial, &seen.slacks) {
             known.keep(room, seen);
             *point = trial;
