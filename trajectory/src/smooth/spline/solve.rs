@@ -43,9 +43,13 @@ const LOOSELY: f64 = 3000.0;
 const SHORT: f64 = 0.1;
 const STUCK: usize = 4;
 
-/// Rounds in which a trial looks for the passes, of a place alone and with orientations. There a pass that is not yet where it
-/// belongs may be inside of a ball which the pass itself is outside of: then no step leads on from the iterate.
-const ROUNDS: [usize; 2] = [3, 12];
+/// Rounds in which a trial looks for the passes, and where the orientations of few poses are searched. There a pass that is not
+/// yet where it belongs may be inside of a ball which the pass itself is outside of: then no step leads on from the iterate.
+const ROUNDS: usize = 3;
+const MORE_ROUNDS: usize = 12;
+
+/// Most inner poses that are few: of a dense list the passes lead on from each other.
+const FEW: usize = 24;
 
 /// Square of the Newton decrement from which short steps are normal, because the weight has just
 /// been raised.
@@ -93,7 +97,7 @@ impl Pace {
                 last: if Problem::<D>::TURNS { ROUGHLY } else { CENTRE },
                 low: LOW,
                 keep: KEEP,
-                rounds: ROUNDS[usize::from(Problem::<D>::TURNS)],
+                rounds: rounds(problem),
                 near: if effort.gap >= ROUGH { 3.0 } else { 0.1 },
             };
         }
@@ -107,9 +111,18 @@ impl Pace {
             last: 1.0,
             low: 0.0,
             keep: 0.5,
-            rounds: ROUNDS[1],
+            rounds: MORE_ROUNDS,
             near: 0.1,
         }
+    }
+}
+
+/// Rounds in which a trial looks for the passes.
+fn rounds<const D: usize>(problem: &Problem<D>) -> usize {
+    if Problem::<D>::TURNS && problem.inner().len() <= FEW {
+        MORE_ROUNDS
+    } else {
+        ROUNDS
     }
 }
 
@@ -406,7 +419,7 @@ fn aim<const D: usize, const B: usize>(
         shifted(problem, &before, (&shifts, share));
         let mut trial = point.clone();
         go(problem, (point, &mut trial), (&step, share));
-        project(problem, &mut trial, Some(room), ROUNDS[1]);
+        project(problem, &mut trial, Some(room), rounds(problem));
         if let Some(seen) = left(problem, room, &trial, &seen.slacks) {
             known.keep(room, seen);
             *point = trial;
