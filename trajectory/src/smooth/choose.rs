@@ -48,7 +48,7 @@ pub(super) fn arm_effort(gap: f64, aimed: f64, onward: bool) -> Effort {
 /// is not followed by another.
 const HOPELESS: [f64; 2] = [10.0, 3.5];
 
-/// First attempts after which only the tolerances of poses that were missed are narrowed; later those of all.
+/// Attempts, the first ones, after which only the tolerances of poses that were missed are narrowed; after later ones those of all.
 const SINGLY: usize = 2;
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
@@ -285,7 +285,7 @@ impl Attempts<'_> {
                 known: self.known,
                 arm: None,
             };
-            let turns = request.moves()[1];
+            let [places, turns] = request.moves();
             request.coupled = self.couples(&request, turns)?;
             let Some(Found { mut spans, seed }) = spline::plan(&request) else {
                 self.otherwise(request.coupled || !turns)?;
@@ -327,7 +327,7 @@ impl Attempts<'_> {
                 continue;
             }
             retried |= broken(certificate, crossings) > FAR;
-            let coupled = request.coupled && request.moves()[0];
+            let coupled = request.coupled && places;
             self.narrow(attempt, &seen, coupled)?;
         }
         None

@@ -39,6 +39,14 @@ impl Crossing {
         self.deviation <= place && self.angle <= turn
     }
 
+    /// Deviation and angle in their tolerances.
+    pub(super) fn in_tolerances(&self) -> [f64; 2] {
+        [
+            self.deviation / self.tolerance,
+            self.angle / self.angular_tolerance.max(RESOLUTION),
+        ]
+    }
+
     /// Largest deviation (m) and angle (rad) with which a pose is passed within these tolerances.
     pub(super) fn accepted(tolerance: f64, angular_tolerance: f64) -> [f64; 2] {
         [tolerance + RESOLUTION, angular_tolerance + 1e3 * RESOLUTION]

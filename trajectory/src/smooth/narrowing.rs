@@ -1,7 +1,7 @@
 //! Bounds that are narrowed by what a motion exceeded.
 
 use super::certificate::{Certificate, Peak};
-use super::crossing::{Crossing, RESOLUTION};
+use super::crossing::Crossing;
 use super::options::SmoothOptions;
 use super::shares::Shares;
 use crate::{ToolLimits, ToolPoint};
@@ -11,14 +11,10 @@ const AT_END: f64 = 1.0 + 1e-3;
 
 /// The greatest ratio of a quantity to its bound.
 pub(super) fn broken(certificate: &Certificate, crossings: &[Crossing]) -> f64 {
-    let miss = |crossing: &Crossing| {
-        (crossing.deviation / crossing.tolerance)
-            .max(crossing.angle / crossing.angular_tolerance.max(RESOLUTION))
-    };
     let bounds = [certificate.corridor.ratio, certificate.worst_limit()];
     bounds
         .into_iter()
-        .chain(crossings.iter().map(miss))
+        .chain(crossings.iter().flat_map(Crossing::in_tolerances))
         .fold(0.0, f64::max)
 }
 
@@ -34,8 +30,8 @@ pub(super) fn narrow(
     }
     let (mut far, mut turned) = (1.0_f64, 1.0_f64);
     for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
-        far = far.max(crossing.deviation / crossing.tolerance);
-        turned = turned.max(crossing.angle / crossing.angular_tolerance);
+        let [place, turn] = crossing.in_tolerances();
+        (far, turned) = (far.max(place), turned.max(turn));
     }
     if turned > 1.0 && coupled {
         options.angular_tolerance = Some(options.angular_tolerance() * within(turned));
@@ -65,8 +61,7 @@ fn within(missed: f64) -> f64 {
 pub(super) fn narrow_missed(shares: &mut Shares, crossings: &[Crossing], coupled: bool) {
     let missed = crossings.iter().enumerate();
     for (i, crossing) in missed.filter(|(_, crossing)| !crossing.holds()) {
-        let far = crossing.deviation / crossing.tolerance;
-        let turned = crossing.angle / crossing.angular_tolerance;
+        let [far, turned] = crossing.in_tolerances();
         let over = if coupled {
             [far, turned]
         } else {

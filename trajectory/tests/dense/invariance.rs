@@ -463,7 +463,7 @@ fn slow_motions_are_known_and_searched_from_within_less() {
 }
 
 /// Within more tolerance a list took up to 6.3 % longer: where its orientation follows the place it missed six of 357 poses, and
-/// was planned again within a third of the tolerance of all.
+/// was planned again within a quarter to a sixth of the tolerance of all.
 #[test]
 fn few_missed_poses_do_not_narrow_all() {
     let list = random(616..617, 400.0).next().unwrap();

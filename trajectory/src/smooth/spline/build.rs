@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::basis;
 use super::ends::rolled;
 use super::known::Known;
-use super::problem::{Group, Point, Problem};
+use super::problem::{FEW, Group, Point, Problem};
 use super::request::{Moving, Request};
 use super::solve::{Aims, Effort, solve};
 use super::start::{self, KNOTS_PER_RAMP};
@@ -28,9 +28,6 @@ const ANGULAR: f64 = 0.985;
 /// Bound of an angular rate at an end in motion over its value there.
 const AT_END: f64 = 1.0 + 1e-5;
 
-/// Poses up to which position and orientation have bands of their own.
-const FEW: usize = 26;
-
 /// Most Newton steps of a search from rest to rest that starts from a motion, and those after which it is given up: where
 /// the tolerance shows many corners 90 end far from the optimum. With orientations a step takes ten times as long.
 const STEPS: usize = 300;
@@ -48,7 +45,7 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Found> {
         [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
         [false, true] => task.run::<3, 20>([false, true]),
         // The passing times beside the band cost the square of their number.
-        [true, true] if request.poses.len() <= FEW => task.run::<6, 20>([true, true]),
+        [true, true] if request.poses.len() <= FEW + 2 => task.run::<6, 20>([true, true]),
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
     }
@@ -66,7 +63,7 @@ pub(crate) fn forward(
     let (place, all, how) = ([true, false], [true; 2], [backwards, both]);
     match request.moves() {
         [true, turns] if !turns || !request.coupled => task.forward::<3, 20>(seed, place, how),
-        [true, true] if request.poses.len() <= FEW => task.forward::<6, 20>(seed, all, how),
+        [true, true] if request.poses.len() <= FEW + 2 => task.forward::<6, 20>(seed, all, how),
         [true, true] => task.forward::<6, 36>(seed, all, how),
         _ => None,
     }

@@ -27,14 +27,16 @@ impl Task<'_> {
         (effort, aims): (Effort, Option<Aims<'_, D>>),
         used: [bool; 2],
     ) {
-        if self.missed((problem, point), used, false).is_empty() {
+        let mut passes = self.passes((problem, point), used, false);
+        if passes.missed(point, false).is_empty() {
             return;
         }
         if Problem::<D>::TURNS {
             let ahead =
                 self.ahead::<D, B>((problem, point), (effort, aims), (used, [false, false]));
             let holds = |(other, first): &(Problem<D>, Point<D>)| {
-                self.missed((other, first), used, false).is_empty()
+                let passes = self.passes((other, first), used, false);
+                passes.missed(first, false).is_empty()
             };
             if let Some(ahead) = ahead.filter(holds) {
                 (*problem, *point) = ahead;
@@ -42,18 +44,17 @@ impl Task<'_> {
             }
         }
         for _ in 0..AGAIN {
-            let h = problem.spacing(point.z);
-            let passes = self.passes((problem, point), used, false);
-            if missed(&passes, point, h).is_empty() {
-                return;
-            }
             let (mut other, mut first) = (problem.clone(), point.clone());
-            first.crossings = passes.iter().map(|pass| pass.time / h).collect();
+            first.crossings = passes.times;
             self.see_aims(&mut other, &first);
             if solve::<D, B>(&mut other, &mut first, effort, aims).is_none() {
                 return;
             }
             (*problem, *point) = (other, first);
+            passes = self.passes((problem, point), used, false);
+            if passes.missed(point, false).is_empty() {
+                return;
+            }
         }
     }
 
@@ -89,7 +90,8 @@ impl Task<'_> {
         let mut ahead: Option<(Problem<D>, Point<D>)> = None;
         for _ in 0..FORWARD {
             let (before, from) = ahead.as_ref().map_or((problem, point), |(a, b)| (a, b));
-            let missed = self.missed((before, from), used, backwards);
+            let passes = self.passes((before, from), used, backwards);
+            let missed = passes.missed(from, backwards);
             if missed.is_empty() {
                 break;
             }
@@ -130,19 +132,42 @@ impl Task<'_> {
         (problem, point)
     }
 
-    /// The inner poses that the motion of an iterate misses; see [`missed`]. Where the place alone is searched, those before them, too,
-    /// that it passes when the search does not: it comes back to such a pose, and so passes the next one before it is there.
-    fn missed<const D: usize>(
+    /// How the motion of an iterate passes the poses.
+    fn passes<const D: usize>(
         &self,
         (problem, point): (&Problem<D>, &Point<D>),
         used: [bool; 2],
         backwards: bool,
-    ) -> Vec<usize> {
-        let (passes, h) = (
-            self.passes((problem, point), used, backwards),
-            problem.spacing(point.z),
-        );
-        let mut found = missed(&passes, point, h);
+    ) -> Passes {
+        let spans = self.spans(problem, point, used);
+        let made = crossings_made(&spans, (self.poses, backwards), self.options);
+        let spacing = problem.spacing(point.z);
+        Passes {
+            hold: made.iter().map(Crossing::holds).collect(),
+            times: made.iter().map(|pass| pass.time / spacing).collect(),
+        }
+    }
+}
+
+/// How a motion passes the inner poses.
+struct Passes {
+    /// Whether each is within its tolerances.
+    hold: Vec<bool>,
+    /// When, in knots.
+    times: Vec<f64>,
+}
+
+impl Passes {
+    /// The poses that are not passed when the search passes them, and not within their tolerances. Where the place alone is searched,
+    /// those before them, too, that are not passed when the search passes them: the place comes back to such a pose, and so passes
+    /// the next one before it is there.
+    fn missed<const D: usize>(&self, point: &Point<D>, backwards: bool) -> Vec<usize> {
+        let other = |i: &usize| {
+            let both = self.times.get(*i).zip(point.crossings.get(*i));
+            both.is_some_and(|(made, searched)| (made - searched).abs() >= SAME)
+        };
+        let all = 0..self.hold.len();
+        let mut missed: Vec<usize> = all.filter(|i| !self.hold[*i]).filter(other).collect();
         if !Problem::<D>::TURNS {
             let before = |i: &usize| {
                 if backwards {
@@ -151,38 +176,9 @@ impl Task<'_> {
                     i.checked_sub(1)
                 }
             };
-            let other = |i: &usize| {
-                passes
-                    .get(*i)
-                    .is_some_and(|pass| is_other(pass, point.crossings[*i], h))
-            };
-            let also: Vec<usize> = found.iter().filter_map(before).filter(other).collect();
-            found.extend(also);
+            let also: Vec<usize> = missed.iter().filter_map(before).filter(other).collect();
+            missed.extend(also);
         }
-        found
+        missed
     }
-
-    /// How the motion of an iterate passes the poses.
-    fn passes<const D: usize>(
-        &self,
-        (problem, point): (&Problem<D>, &Point<D>),
-        used: [bool; 2],
-        backwards: bool,
-    ) -> Vec<Crossing> {
-        let spans = self.spans(problem, point, used);
-        crossings_made(&spans, (self.poses, backwards), self.options)
-    }
-}
-
-/// The inner poses that are not passed when an iterate with this knot spacing passes them, and not within their tolerances.
-fn missed<const D: usize>(passes: &[Crossing], point: &Point<D>, spacing: f64) -> Vec<usize> {
-    let all = passes.iter().zip(&point.crossings).enumerate();
-    let missed = |(pass, time): (&Crossing, &f64)| !pass.holds() && is_other(pass, *time, spacing);
-    let missed = all.filter(|(_, both)| missed(*both));
-    missed.map(|(i, _)| i).collect()
-}
-
-/// Whether a pass is not the one at a time in knots.
-fn is_other(pass: &Crossing, time: f64, spacing: f64) -> bool {
-    (pass.time / spacing - time).abs() >= SAME
 }

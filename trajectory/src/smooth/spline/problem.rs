@@ -15,6 +15,9 @@ use super::frame::Frame;
 use super::joint::{BOUNDS, Joint};
 use crate::smooth::shares::Shares;
 
+/// Inner poses up to which place and orientation have bands of their own, and passes are looked for until they are found.
+pub(super) const FEW: usize = 24;
+
 /// Share of all constraints that the balls count for where they turn: few among thousands would be met at so small a
 /// slack that each step along a ball leaves it.
 const BALLS: f64 = 0.005;

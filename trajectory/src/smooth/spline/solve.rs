@@ -4,7 +4,7 @@
 use super::barrier::{Barrier, KEEP, Seen};
 use super::newton::{Step, System};
 use super::nudge::nudge;
-use super::problem::{Point, Problem, Room, spreading, ways};
+use super::problem::{FEW, Point, Problem, Room, spreading, ways};
 use super::project::project;
 
 /// How far and how long the iteration goes.
@@ -47,9 +47,6 @@ const STUCK: usize = 4;
 /// yet where it belongs may be inside of a ball which the pass itself is outside of: then no step leads on from the iterate.
 const ROUNDS: usize = 3;
 const MORE_ROUNDS: usize = 12;
-
-/// Most inner poses that are few: of a dense list the passes lead on from each other.
-const FEW: usize = 24;
 
 /// Square of the Newton decrement from which short steps are normal, because the weight has just
 /// been raised.
@@ -97,7 +94,7 @@ impl Pace {
                 last: if Problem::<D>::TURNS { ROUGHLY } else { CENTRE },
                 low: LOW,
                 keep: KEEP,
-                rounds: rounds(problem),
+                rounds: Self::rounds(problem),
                 near: if effort.gap >= ROUGH { 3.0 } else { 0.1 },
             };
         }
@@ -115,18 +112,16 @@ impl Pace {
             near: 0.1,
         }
     }
-}
 
-/// Rounds in which a trial looks for the passes.
-fn rounds<const D: usize>(problem: &Problem<D>) -> usize {
-    if Problem::<D>::TURNS && problem.inner().len() <= FEW {
-        MORE_ROUNDS
-    } else {
-        ROUNDS
+    /// Rounds in which a trial looks for the passes. Of a dense list they lead on from each other.
+    fn rounds<const D: usize>(problem: &Problem<D>) -> usize {
+        if Problem::<D>::TURNS && problem.inner().len() <= FEW {
+            MORE_ROUNDS
+        } else {
+            ROUNDS
+        }
     }
-}
 
-impl Pace {
     /// The barrier of a problem at this pace.
     fn barrier<'a, const D: usize>(
         &self,
@@ -419,7 +414,7 @@ fn aim<const D: usize, const B: usize>(
         shifted(problem, &before, (&shifts, share));
         let mut trial = point.clone();
         go(problem, (point, &mut trial), (&step, share));
-        project(problem, &mut trial, Some(room), rounds(problem));
+        project(problem, &mut trial, Some(room), Pace::rounds(problem));
         if let Some(seen) = left(problem, room, &trial, &seen.slacks) {
             known.keep(room, seen);
             *point = trial;
