@@ -263,14 +263,17 @@ impl<const N: usize> Solver<N> {
             if next.reached || score(&next) < score(&best) {
                 best = next;
             }
-            if index == PATIENCE && !best.reached && !self.place_reached(goal, &best.q) {
-                break;
+            if index == PATIENCE && !best.reached {
+                let place = self.best_place(goal.point(), &best.q);
+                if !place.reached {
+                    return Err(self.report(goal, &best, Some(place)));
+                }
             }
         }
         if best.reached {
             Ok(self.solution(&best, seed))
         } else {
-            Err(self.report(goal, &best))
+            Err(self.report(goal, &best, None))
         }
     }
 

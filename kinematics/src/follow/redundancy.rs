@@ -5,6 +5,7 @@ use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
+use crate::ik::IkFailure;
 use crate::measure::{self, NIMBLE, ROOM};
 use nalgebra::{SMatrix, SVector};
 
@@ -27,6 +28,11 @@ pub(super) fn resolve<const N: usize>(
     if ease >= 1.0 || is_beyond(&answer) {
         return answer;
     }
+    if answer.is_err()
+        && let Some(beyond) = beyond_end(task, start)
+    {
+        return beyond.map_or(answer, Err);
+    }
     for (found, moving) in judged(task, start, null_space_path::search(task, start, &still)) {
         if found <= ease {
             break;
@@ -42,6 +48,22 @@ pub(super) fn resolve<const N: usize>(
 fn is_beyond<P>(traced: &Result<P, FollowError>) -> bool {
     let cause = traced.as_ref().err().map(|error| error.cause);
     matches!(cause, Some(FollowCause::Unreachable(_)))
+}
+
+/// Whether the arm reaches the end of a path with no joint position, so that no null-space motion helps, and the reason, if it is
+/// another one than a limit: which limit is passed most on the path says more.
+#[cold]
+fn beyond_end<const N: usize>(
+    task: &Task<'_, N>,
+    start: &SVector<f64, N>,
+) -> Option<Option<FollowError>> {
+    let error = task.unreachable(*task.grid.last()?, start)?;
+    match error.cause {
+        FollowCause::Unreachable(IkFailure::AtLimit { .. }) => Some(None),
+        // The search may have ended too early.
+        FollowCause::Unreachable(IkFailure::Singular { .. }) => None,
+        _ => Some(Some(error)),
+    }
 }
 
 /// Null-space motions with the quality of their paths at a few places, the best first; those after a good one, and those

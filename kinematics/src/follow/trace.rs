@@ -302,23 +302,21 @@ impl<const N: usize> Task<'_, N> {
     /// Why no step from a point is possible, however short.
     #[cold]
     fn refusal(&self, last: &FollowPoint<N>, u: f64) -> FollowError {
-        let goal = (self.tool)(u).pose;
         let fastest = last.q[1].iamax();
-        if let Err(report) = self.solver.nearest(&goal, &last.q[0]) {
-            let amount = report.position_error.max(report.rotation_error);
-            return FollowError {
-                u,
-                joint: None,
-                cause: FollowCause::Unreachable(report.failure),
-                amount,
-            };
-        }
-        FollowError {
+        self.unreachable(u, &last.q[0]).unwrap_or(FollowError {
             u,
             joint: Some(fastest),
             cause: FollowCause::Singular,
             amount: measure::dexterity(self.solver.chain(), &last.q[0]).smallest,
-        }
+        })
+    }
+
+    /// Why the arm does not reach the pose at a parameter, wherever it comes from; `None` where it does.
+    #[cold]
+    pub(super) fn unreachable(&self, u: f64, seed: &SVector<f64, N>) -> Option<FollowError> {
+        let report = self.solver.nearest(&(self.tool)(u).pose, seed).err()?;
+        let amount = report.position_error.max(report.rotation_error);
+        Some(self.error(u, FollowCause::Unreachable(report.failure), amount))
     }
 }
 

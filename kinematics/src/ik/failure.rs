@@ -11,27 +11,23 @@ use crate::measure;
 const PLACES: u32 = 120;
 
 impl<const N: usize> Solver<N> {
-    /// Finds out why a goal was not reached.
+    /// Finds out why a goal was not reached. `place` is the nearest that the tool comes to its position, if that is known.
     #[cold]
-    pub(super) fn report(&self, goal: &Goal, best: &SolverResult<N>) -> IkReport<N> {
-        let (point, pose) = match goal {
-            Goal::Pose(pose) => (pose.translation.vector.into(), Some(pose)),
-            Goal::Position(point) | Goal::Axis(point, _) => (*point, None),
-        };
-        let finite = point.coords.iter().all(|x| x.is_finite())
-            && pose.is_none_or(|pose| pose.rotation.coords.iter().all(|x| x.is_finite()));
-        if !finite {
+    pub(super) fn report(
+        &self,
+        goal: &Goal,
+        best: &SolverResult<N>,
+        place: Option<SolverResult<N>>,
+    ) -> IkReport<N> {
+        let point = goal.point();
+        if !goal.is_finite() {
             return self.report_with(best, IkFailure::NotFinite);
         }
         // If the search for the position alone fails, the distance is the reason.
-        let place = self.best_place(point, &best.q);
+        let place = place.unwrap_or_else(|| self.best_place(point, &best.q));
         if !place.reached {
-            return self.report_with(
-                best,
-                IkFailure::OutOfReach {
-                    distance: place.position,
-                },
-            );
+            let distance = place.position;
+            return self.report_with(best, IkFailure::OutOfReach { distance });
         }
         let free = self.best_of(
             goal,
@@ -61,17 +57,8 @@ impl<const N: usize> Solver<N> {
         )
     }
 
-    /// Whether the position of a goal can be reached, with any orientation.
-    pub(super) fn place_reached(&self, goal: &Goal, seed: &SVector<f64, N>) -> bool {
-        let point = match goal {
-            Goal::Pose(pose) => pose.translation.vector.into(),
-            Goal::Position(point) | Goal::Axis(point, _) => *point,
-        };
-        self.best_place(point, seed).reached
-    }
-
     /// The nearest that the tool comes to a position, with any orientation.
-    fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
+    pub(super) fn best_place(&self, point: Point3<f64>, seed: &SVector<f64, N>) -> SolverResult<N> {
         let target = Goal::Position(point).target();
         let seeds = Restarts::new(&self.chain);
         let mut best = self.descend(&target, seed, self.stop);

@@ -40,6 +40,23 @@ pub(crate) struct PoseError {
 }
 
 impl Goal {
+    /// Where the tool is to be.
+    pub(super) fn point(&self) -> Point3<f64> {
+        match self {
+            Self::Pose(pose) => pose.translation.vector.into(),
+            Self::Position(point) | Self::Axis(point, _) => *point,
+        }
+    }
+
+    /// Whether every number of its position, and of a pose's orientation, is finite.
+    pub(super) fn is_finite(&self) -> bool {
+        let turned = match self {
+            Self::Pose(pose) => pose.rotation.coords.iter().all(|x| x.is_finite()),
+            Self::Position(_) | Self::Axis(..) => true,
+        };
+        turned && self.point().coords.iter().all(|x| x.is_finite())
+    }
+
     pub(crate) fn target(&self) -> Target {
         let (pose, kind) = match self {
             Self::Pose(pose) => (*pose, Kind::Pose),

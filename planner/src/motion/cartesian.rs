@@ -139,21 +139,34 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> MotionError {
-        let MotionError::Blocked { pose, .. } = &blocked else {
+        let MotionError::Blocked {
+            pose,
+            percent,
+            cause,
+        } = &blocked
+        else {
             return blocked;
         };
         let ahead = pose
             .checked_sub(1)
             .and_then(|index| motion.poses.get(index));
-        match ahead.map(|goal| self.solver.nearest(goal, start)) {
-            Some(Err(report)) => match report.failure {
-                IkFailure::OutOfReach { distance } if distance > motion.tolerance => {
-                    self.refusal(*pose, &report)
-                }
-                IkFailure::Orientation { .. } => self.refusal(*pose, &report),
-                _ => blocked,
-            },
-            _ => blocked,
+        let failure = match cause {
+            // At the end of the way that pose has been looked at.
+            BlockedCause::Unreachable(failure) if *percent >= 100.0 => Some(*failure),
+            _ => ahead
+                .and_then(|goal| self.solver.nearest(goal, start).err())
+                .map(|report| report.failure),
+        };
+        // The last pose is reached, the others are passed.
+        let slack = if *pose < motion.poses.len() {
+            motion.tolerance
+        } else {
+            0.0
+        };
+        match failure {
+            Some(IkFailure::OutOfReach { distance }) if distance <= slack => blocked,
+            Some(failure) => Self::out_of_reach(*pose, failure).unwrap_or(blocked),
+            None => blocked,
         }
     }
 

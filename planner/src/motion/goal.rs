@@ -157,25 +157,33 @@ impl<const N: usize> Planner<N> {
 
     /// The report of the solver as an error of the command.
     pub(super) fn refusal(&self, pose: usize, report: &IkReport<N>) -> MotionError {
+        let unsolved = MotionError::Unsolved {
+            pose,
+            millimetres: report.position_error * 1e3,
+            degrees: report.rotation_error.to_degrees(),
+        };
         match report.failure {
-            IkFailure::OutOfReach { distance } => MotionError::OutOfReach {
-                pose,
-                millimetres: distance * 1e3,
-            },
             IkFailure::AtLimit { joint, beyond } => MotionError::BeyondLimit {
                 pose,
                 joint: self.joint_name(joint),
                 beyond: self.amount(joint, beyond),
             },
-            IkFailure::Orientation { angle } => MotionError::Orientation {
+            failure => Self::out_of_reach(pose, failure).unwrap_or(unsolved),
+        }
+    }
+
+    /// The error of the command where a pose is out of reach, in place or orientation; `None` for other failures.
+    pub(super) fn out_of_reach(pose: usize, failure: IkFailure) -> Option<MotionError> {
+        match failure {
+            IkFailure::OutOfReach { distance } => Some(MotionError::OutOfReach {
+                pose,
+                millimetres: distance * 1e3,
+            }),
+            IkFailure::Orientation { angle } => Some(MotionError::Orientation {
                 pose,
                 degrees: angle.to_degrees(),
-            },
-            _ => MotionError::Unsolved {
-                pose,
-                millimetres: report.position_error * 1e3,
-                degrees: report.rotation_error.to_degrees(),
-            },
+            }),
+            _ => None,
         }
     }
 }
