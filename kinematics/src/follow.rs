@@ -10,6 +10,7 @@
 mod differential;
 mod error;
 mod linear;
+mod nearby;
 mod null_space;
 mod null_space_grid;
 mod null_space_path;
@@ -127,7 +128,7 @@ pub fn follow_choosing<const N: usize>(
     resolved.map(|(points, motion)| (points, NullMotion(motion)))
 }
 
-/// A null-space motion along a path of the tool that was found by [`follow_choosing`] or [`cheaper`], or is
+/// A null-space motion along a path of the tool that was found by [`follow_choosing`], [`cheaper`] or [`cheaper_near`], or is
 /// [given](NullMotion::given).
 #[derive(Clone)]
 pub struct NullMotion<const N: usize>(null_space::NullSpace<N>);
@@ -199,6 +200,88 @@ pub fn cheaper<const N: usize>(
         .and_then(|search| search(&task, start, cost))
         .map(NullMotion)
 }
+
+/// A search of a null-space motion near a known one, for [`cheaper_near`].
+pub struct SpareSearch<'a, const N: usize> {
+    /// The motion from which it begins, of the same path.
+    pub known: &'a NullMotion<N>,
+    /// What a joint path costs, known at a few places, in the unit of the caller.
+    pub cost: &'a dyn Fn(&[FollowPoint<N>]) -> f64,
+    /// Most motions that are tried.
+    pub trials: usize,
+}
+
+/// A null-space motion that costs less than a known one, and stays nearly as far inside the limits and away from singular poses: less
+/// work than [`cheaper`], as the function of the joints stays and only its values change. The other arguments are those of
+/// [`follow`]; `None` where nothing is found that saves one percent, for a motion that is [given](NullMotion::given), and
+/// always with six joints or fewer.
+///
+/// ```
+/// use kinematics::follow::{
+///     FollowOptions, FollowPoint, SpareSearch, TwistPoint, cheaper_near, follow_choosing, follow_with,
+/// };
+/// use kinematics::{Solver, urdf};
+/// use nalgebra::{SVector, Vector3};
+/// # let text = include_str!("../../robots/panda/robot.urdf");
+/// let solver = Solver::new(urdf::read(text, None)?.chain::<7>()?);
+/// let q = SVector::<f64, 7>::from([0.1, -0.8, 0.1, -2.3, 0.1, 1.6, 0.8]);
+/// let start = solver.chain().forward(&q);
+/// let tool = |u: f64| {
+///     let mut pose = start;
+///     pose.translation.vector.z += 0.1 * u;
+///     let linear = [Vector3::z() * 0.1, Vector3::zeros(), Vector3::zeros()];
+///     TwistPoint { pose, linear, angular: [Vector3::zeros(); 3] }
+/// };
+/// let (at, options) = ((&[0.0, 0.5, 1.0][..], &q), FollowOptions::default());
+/// let (points, known) = follow_choosing(&solver, &tool, at, &options)?;
+/// // The fastest joint should be slow.
+/// let cost = |points: &[FollowPoint<7>]| {
+///     points.iter().map(|point| point.q[1].amax()).fold(0.0, f64::max)
+/// };
+/// let search = SpareSearch { known: &known, cost: &cost, trials: 16 };
+/// let motion = cheaper_near(&solver, &tool, at, &options, &search).unwrap();
+/// let other = follow_with(&solver, &tool, at, &options, &motion)?;
+/// assert!(cost(&other) < cost(&points));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn cheaper_near<const N: usize>(
+    solver: &Solver<N>,
+    tool: &dyn Fn(f64) -> TwistPoint,
+    (grid, start): (&[f64], &SVector<f64, N>),
+    options: &FollowOptions,
+    search: &SpareSearch<'_, N>,
+) -> Option<NullMotion<N>> {
+    let SpareSearch {
+        known: NullMotion(known),
+        cost,
+        trials,
+    } = *search;
+    let task = trace::Task {
+        solver,
+        tool,
+        grid,
+        options,
+    };
+    check(&task, start).ok()?;
+    // A constant: only arms with a null space carry the code of the search in it.
+    let cheapest: Option<Nearby<N>> = const {
+        if N > 6 {
+            Some(nearby::cheapest::<N>)
+        } else {
+            None
+        }
+    };
+    let cheapest = cheapest.filter(|_| known.course.is_none())?;
+    cheapest(&task, (start, known), cost, trials).map(NullMotion)
+}
+
+/// Searches a null-space motion of less cost than a known one.
+type Nearby<const N: usize> = fn(
+    &trace::Task<'_, N>,
+    (&SVector<f64, N>, &null_space::NullSpace<N>),
+    &dyn Fn(&[FollowPoint<N>]) -> f64,
+    usize,
+) -> Option<null_space::NullSpace<N>>;
 
 /// Searches a null-space motion of least cost.
 type Search<const N: usize> = fn(

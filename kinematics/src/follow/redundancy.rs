@@ -73,7 +73,7 @@ fn judged<const N: usize>(
     start: &SVector<f64, N>,
     motions: Vec<NullSpace<N>>,
 ) -> Vec<(f64, NullSpace<N>)> {
-    let (grid, options) = coarse(task);
+    let (grid, options) = coarse(task, JUDGED);
     let coarse = Task {
         grid: &grid,
         options: &options,
@@ -94,10 +94,14 @@ fn judged<const N: usize>(
     found
 }
 
-/// A few places of a path, and how closely it is followed there to be judged.
-fn coarse<const N: usize>(task: &Task<'_, N>) -> (Vec<f64>, FollowOptions) {
+/// A few places of a path, one for so many points but no fewer than the second number, and how closely it is followed there to be
+/// judged.
+pub(super) fn coarse<const N: usize>(
+    task: &Task<'_, N>,
+    [every, fewest]: [usize; 2],
+) -> (Vec<f64>, FollowOptions) {
     let last = task.grid.len() - 1;
-    let steps = (last / EVERY).clamp(JUDGED[0], JUDGED[1]).min(last);
+    let steps = (last / every).clamp(fewest, MOST).min(last);
     let grid = (0..=steps).map(|k| task.grid[k * last / steps]).collect();
     let options = FollowOptions {
         accuracy: COARSE,
@@ -108,7 +112,7 @@ fn coarse<const N: usize>(task: &Task<'_, N>) -> (Vec<f64>, FollowOptions) {
 
 /// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
 /// to another place at the end, there and back, and so with one and two more turns.
-const SHAPES: [NullSpacePolynomial; 4] = [
+pub(super) const SHAPES: [NullSpacePolynomial; 4] = [
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
     [0.0, 4.0, -4.0, 0.0, 0.0, 0.0],
     [0.0, 10.4, -31.2, 20.8, 0.0, 0.0],
@@ -122,13 +126,13 @@ const TILTS: [f64; 2] = [0.5, 0.2];
 const GAIN: f64 = 1e-3;
 /// How often one step is taken in one direction.
 const REPEATS: usize = 3;
-/// Fewest and most steps along the path in which a motion is judged, points of the path for each, and how far
-/// from the path these may be between two of them, m.
-const JUDGED: [usize; 2] = [24, 64];
-const EVERY: usize = 4;
+/// Points of the path for each step along it in which a motion is judged, and fewest steps.
+const JUDGED: [usize; 2] = [4, 24];
+/// Most such steps, and how far from the path the joints may be between two of them, m.
+const MOST: usize = 64;
 const COARSE: f64 = 1e-3;
 /// Least share of the cost that another motion has to save.
-const WORTH: f64 = 0.01;
+pub(super) const WORTH: f64 = 0.01;
 
 /// The null-space motion that costs least, from `start`, among those that stay as far from limits and
 /// singular poses as the first without one, if it saves something. It is searched in two steps, along
@@ -139,7 +143,7 @@ pub(super) fn cheapest<const N: usize>(
     start: &SVector<f64, N>,
     cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
 ) -> Option<NullSpace<N>> {
-    let (grid, options) = coarse(task);
+    let (grid, options) = coarse(task, JUDGED);
     let coarse = Task {
         grid: &grid,
         options: &options,
@@ -260,7 +264,7 @@ fn resting<const N: usize>(
 
 /// How well a path stays inside limits and away from singular poses: 1 is good, or no worse than at
 /// its start.
-fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
+pub(super) fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
     let chain = task.solver.chain();
     // The smaller of the quality at a point and `least`, which is known.
     let one = |least: f64, point: &FollowPoint<N>| {

@@ -1,12 +1,12 @@
 //! MoveStraightTo and MoveSmoothlyTo: a curve of the tool, followed by the joints.
 
 use kinematics::follow::{
-    self, FollowCause, FollowError, FollowOptions, FollowPoint, NullMotion, TwistPoint,
+    self, FollowCause, FollowError, FollowOptions, FollowPoint, NullMotion, SpareSearch, TwistPoint,
 };
 use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
-use trajectory::timing::PathTiming;
+use trajectory::timing::{self, PathTiming};
 use trajectory::{HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory};
 
 use super::soonest::RESTING;
@@ -22,6 +22,8 @@ const FIT: f64 = 5e-7;
 /// Relative gap of the time law: so small that hardly any motion is slower than with a search that begins far
 /// from the limits and ends at the usual gap.
 const GAP: f64 = 5e-4;
+/// Null-space motions that are tried for a faster one.
+const TRIALS: usize = 16;
 /// How often the grid is refined before the path is given up.
 const REFINEMENTS: usize = 8;
 /// Most points of a path.
@@ -55,17 +57,27 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<Draft<N>, MotionError> {
-        let points = self
-            .followed(&Way::along(curve), start)
+        let way = Way::along(curve);
+        let (points, spare) = self
+            .follows(&way, start)
             .map_err(|blocked| self.blamed(blocked, motion, start))?;
+        let quicker = self.quicker(&way, (&points, &spare), motion, start);
         let options = TimingOptions {
             gap: GAP,
             ..RESTING
         };
         let path = joint_path(curve, &points)?;
-        let timing = PathTiming::new(&path, &self.limits, &motion.limits, &options)?;
+        let time = |path| PathTiming::new(path, &self.limits, &motion.limits, &options);
+        let (mut timing, mut points) = (time(&path)?, &points);
+        let other = quicker.and_then(|points| Some((joint_path(curve, &points).ok()?, points)));
+        if let Some((path, quicker)) = &other
+            && let Ok(other) = time(path)
+            && other.expected() < timing.expected()
+        {
+            (timing, points) = (other, quicker);
+        }
         let timed = timing.near().solve()?;
-        let trajectory = self.finite(timed.trajectory, &points, &|_| 1)?;
+        let trajectory = self.finite(timed.trajectory, points, &|_| 1)?;
         let draft = Draft {
             // The joints of a seven-joint arm may take another path along the same line.
             least: if N > 6 {
@@ -78,6 +90,38 @@ impl<const N: usize> Planner<N> {
         Ok(self.slowed(draft, motion))
     }
 
+    /// The joints along a curve with a null-space motion near a known one with which they need about less time, if one is found.
+    fn quicker(
+        &self,
+        way: &Way<'_, N>,
+        (points, spare): (&[FollowPoint<N>], &NullMotion<N>),
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Option<Vec<FollowPoint<N>>> {
+        if N <= 6 {
+            return None;
+        }
+        let cost = |points: &[FollowPoint<N>]| {
+            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
+            let path = joint_path(way.curve, points).ok();
+            path.and_then(about).unwrap_or(f64::INFINITY)
+        };
+        let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
+        let (tool, options) = (way.tool(), way.options());
+        let at = (&grid[..], start);
+        let search = SpareSearch {
+            known: spare,
+            cost: &cost,
+            trials: TRIALS,
+        };
+        let quicker = follow::cheaper_near(&self.solver, &tool, at, &options, &search)?;
+        let way = Way {
+            spare: Some(&quicker),
+            ..*way
+        };
+        self.followed(&way, start).ok()
+    }
+
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine
     /// enough that a quintic between its points stays on the curve.
     pub(super) fn followed(
@@ -85,6 +129,15 @@ impl<const N: usize> Planner<N> {
         way: &Way<'_, N>,
         start: &SVector<f64, N>,
     ) -> Result<Vec<FollowPoint<N>>, MotionError> {
+        self.follows(way, start).map(|(points, _)| points)
+    }
+
+    /// The same with the null-space motion.
+    fn follows(
+        &self,
+        way: &Way<'_, N>,
+        start: &SVector<f64, N>,
+    ) -> Result<(Vec<FollowPoint<N>>, NullMotion<N>), MotionError> {
         let (mut points, mut chosen) = self.solved(way, &first_grid(way.curve), start)?;
         for _ in 0..REFINEMENTS {
             let finer = refined(self.chain(), &points, way.curve);
@@ -99,7 +152,7 @@ impl<const N: usize> Planner<N> {
                 found => points = found?,
             }
         }
-        Ok(points)
+        Ok((points, chosen))
     }
 
     /// The joints at the points of a finer grid, with the null-space motion of those that are known.

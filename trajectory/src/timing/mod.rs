@@ -73,6 +73,21 @@ pub fn time_path<const N: usize>(
     PathTiming::new(path, joint, tool, options)?.solve()
 }
 
+/// About how long the fastest motion along a path takes from rest to rest (s): [`PathTiming::expected`] from a look at the knots
+/// alone, for a tenth of its work. To compare paths with many knots.
+///
+/// # Errors
+/// [`TimingError`] when a limit is not positive, or the path is not finite.
+pub fn about_time<const N: usize>(
+    path: &dyn Path<N>,
+    joint: &JointLimits<N>,
+    tool: &ToolLimits,
+) -> Result<f64, TimingError> {
+    check_joints(joint)?;
+    tool.check()?;
+    reachability::about(path, joint, tool)
+}
+
 /// A path whose fastest law without jerk limits is known: a tenth of the work of [`time_path`], and
 /// a bound that tells whether the rest is worth it.
 ///

@@ -11,6 +11,8 @@ use crate::{JointLimits, Path, PathPoint, TimingError, ToolLimits};
 
 /// Cells that the reachability pass distributes over the path, in addition to those at the knots.
 const CELLS: usize = 256;
+/// The same where a look at a few places is enough.
+const FEW_CELLS: usize = 24;
 /// A squared rate that nothing bounds.
 const FREE: f64 = 1e100;
 /// Least number of cells from one knot to the next.
@@ -120,6 +122,25 @@ impl ReachabilityPass {
     }
 }
 
+/// About how long the fastest motion from rest to rest takes (s), from a look at the knots of its path.
+pub(super) fn about<const N: usize>(
+    path: &dyn Path<N>,
+    joint: &JointLimits<N>,
+    tool: &ToolLimits,
+) -> Result<f64, TimingError> {
+    let at = even(path, FEW_CELLS, 1.0)?;
+    let bends = Bends::new(path, &at, tool)?;
+    let rows = Rows {
+        joint,
+        tool,
+        rate_cap: None,
+        leading: None,
+    };
+    let (caps, groups) = (rows.caps(&bends), rows.groups(&bends));
+    let a = rows.grid(&at, (&caps, &groups), 1).solve(0.0, 0.0);
+    Ok(reach::duration(&at, &a) + ramp(joint, tool, &at, &a, &bends))
+}
+
 /// The joint that comes nearest to its limit where the joints move by `step`.
 pub(super) fn leading<const N: usize>(step: &SVector<f64, N>, limit: &SVector<f64, N>) -> usize {
     step.component_div(limit).iamax()
@@ -155,6 +176,22 @@ fn clock(at: &[f64], a: &[f64]) -> Vec<f64> {
 
 /// Knots, places between them, and more of them near ends at rest.
 fn places<const N: usize>(path: &dyn Path<N>) -> Result<Vec<f64>, TimingError> {
+    let mut at = even(path, CELLS, PER_KNOT)?;
+    let end = path.end();
+    let graded = [0.002, 0.01, 0.03, 0.08, 0.2, 0.5];
+    let (first, last) = (at[1], end - at[at.len() - 2]);
+    at.extend(graded.iter().map(|x| x * first));
+    at.extend(graded.iter().map(|x| end - x * last));
+    at.sort_by(f64::total_cmp);
+    Ok(at)
+}
+
+/// Knots, and places between them: so many cells over the whole path, and at least so many from one knot to the next.
+fn even<const N: usize>(
+    path: &dyn Path<N>,
+    cells: usize,
+    per_knot: f64,
+) -> Result<Vec<f64>, TimingError> {
     let end = path.end();
     if !(end > 0.0 && end.is_finite()) {
         return Err(TimingError::EmptyPath { end });
@@ -168,20 +205,15 @@ fn places<const N: usize>(path: &dyn Path<N>) -> Result<Vec<f64>, TimingError> {
     if let Some(last) = knots.last_mut() {
         *last = end;
     }
-    let step = end / CELLS as f64;
+    let step = end / cells as f64;
     let mut at = Vec::new();
     for pair in knots.windows(2) {
-        let parts = ((pair[1] - pair[0]) / step).ceil().max(PER_KNOT);
+        let parts = ((pair[1] - pair[0]) / step).ceil().max(per_knot);
         for i in 0..parts as usize {
             at.push(pair[0] + (pair[1] - pair[0]) * (i as f64 / parts));
         }
     }
     at.push(end);
-    let graded = [0.002, 0.01, 0.03, 0.08, 0.2, 0.5];
-    let (first, last) = (at[1], end - at[at.len() - 2]);
-    at.extend(graded.iter().map(|x| x * first));
-    at.extend(graded.iter().map(|x| end - x * last));
-    at.sort_by(f64::total_cmp);
     Ok(at)
 }
 
