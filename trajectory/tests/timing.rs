@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use trajectory::timing::{Limit, PathTiming};
+use trajectory::timing::{Limit, PathTiming, about_time};
 use trajectory::{
     JointLimits, JointLine, JointPoint, SplinePath, Timed, TimingOptions, ToolLimits, ToolPoint,
     time_path,
@@ -51,6 +51,26 @@ prop_compose! {
     fn limits()(v in 0.2..4.0_f64, a in 0.5..30.0_f64, j in 5.0..1000.0_f64) -> JointLimits<3> {
         JointLimits::uniform(v, a, j)
     }
+}
+
+/// A look at a few places tells about how long a path takes: enough to compare paths.
+#[test]
+fn a_look_at_a_few_places_is_near() {
+    let limits = JointLimits::uniform(2.0, 10.0, 200.0);
+    let options = TimingOptions::default();
+    let mut worst = 0.0_f64;
+    for k in 0..40 {
+        let at = |i: i32, j: i32| f64::from(17 * k + 5 * i + 3 * j).sin();
+        let points: Vec<[f64; 3]> = (0..12).map(|i| [0, 1, 2].map(|j| at(i, j))).collect();
+        let path = spline(&points);
+        let about = about_time(&path, &limits, &ToolLimits::UNLIMITED).unwrap();
+        let timing = PathTiming::new(&path, &limits, &ToolLimits::UNLIMITED, &options).unwrap();
+        worst = worst.max((about / timing.expected() - 1.0).abs());
+    }
+    assert!(worst < 0.05, "{worst}");
+    let bad = JointLimits::uniform(0.0, 10.0, 200.0);
+    let path = spline(&[[0.0; 3], [1.0; 3]]);
+    assert!(about_time(&path, &bad, &ToolLimits::UNLIMITED).is_err());
 }
 
 fn waypoints() -> impl Strategy<Value = Vec<[f64; 3]>> {

@@ -2,8 +2,10 @@
 
 use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;
-use kinematics::follow::{cheaper, follow_choosing, follow_with, refine};
-use kinematics::{FollowCause, FollowOptions, FollowPoint, Solver, TwistPoint, follow};
+use kinematics::follow::{
+    NullMotion, SpareSearch, cheaper, cheaper_near, follow_choosing, follow_with, refine,
+};
+use kinematics::{FollowCause, FollowOptions, FollowPoint, IkFailure, Solver, TwistPoint, follow};
 use nalgebra::{Isometry3, SVector, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Positions in which the shipped arms stand well.
@@ -129,6 +131,89 @@ fn the_spare_joint_takes_what_costs_less() {
         }
     }
     assert!(found >= 3, "{found}");
+}
+
+/// Sum over a path of the speed of the fastest joint, to the path parameter (rad).
+fn swiftest<const N: usize>(points: &[FollowPoint<N>]) -> f64 {
+    let speed = |point: &FollowPoint<N>| point.q[1].amax();
+    let mean = |pair: &[FollowPoint<N>]| 0.5 * (speed(&pair[0]) + speed(&pair[1]));
+    points
+        .windows(2)
+        .map(|pair| mean(pair) * (pair[1].u - pair[0].u))
+        .sum()
+}
+
+/// Near a known null-space motion one is found that costs less, also on the fine grid; not beside one that is given, nor with six
+/// joints.
+#[test]
+fn a_motion_near_a_known_one_costs_less() {
+    let options = FollowOptions::default();
+    let grid: Vec<f64> = (0..=80).map(|i| f64::from(i) / 80.0).collect();
+    let mut found = 0;
+    for name in SEVEN {
+        let solver = Solver::new(arms::chain::<7>(name));
+        let start = ready::<7>(name);
+        let tool = curve(&solver.chain().forward(&start), 1.0);
+        let at = (&grid[..], &start);
+        let (points, known) = follow_choosing(&solver, &tool, at, &options).unwrap();
+        let search = |known: &NullMotion<7>, trials: usize| {
+            let search = SpareSearch {
+                known,
+                cost: &swiftest,
+                trials,
+            };
+            cheaper_near(&solver, &tool, at, &options, &search)
+        };
+        assert!(search(&known, 0).is_none(), "{name}");
+        let given = NullMotion::given(SVector::repeat(1.0), |_| [0.0; 4]);
+        assert!(search(&given, 30).is_none(), "{name}");
+        let Some(motion) = search(&known, 30) else {
+            continue;
+        };
+        found += 1;
+        let other = follow_with(&solver, &tool, at, &options, &motion).unwrap();
+        assert!(swiftest(&other) < 0.995 * swiftest(&points), "{name}");
+        let end = solver.chain().forward(&other.last().unwrap().q[0]);
+        let (position, rotation) = error(&end, &tool(1.0).pose);
+        assert!(position < 1e-10 && rotation < 1e-9, "{name}");
+    }
+    assert!(found >= 3, "{found}");
+    let solver = Solver::new(arms::chain::<6>("ur5e"));
+    let start = ready::<6>("ur5e");
+    let tool = curve(&solver.chain().forward(&start), 1.0);
+    let at = (&grid[..], &start);
+    let (_, known) = follow_choosing(&solver, &tool, at, &options).unwrap();
+    let search = SpareSearch {
+        known: &known,
+        cost: &swiftest,
+        trials: 30,
+    };
+    assert!(cheaper_near(&solver, &tool, at, &options, &search).is_none());
+}
+
+/// A line that ends out of reach says so, and not that the arm is singular where it can go no farther.
+#[test]
+fn an_end_out_of_reach_is_named() {
+    for name in SEVEN {
+        let solver = Solver::new(arms::chain::<7>(name));
+        let start = ready::<7>(name);
+        let pose = solver.chain().forward(&start);
+        let (middle, radius) = solver.chain().reach_ball();
+        let way = pose.translation.vector - middle.coords;
+        let far = way.normalize() * (radius + 0.005 - way.norm());
+        let line = |u: f64| TwistPoint {
+            pose: Isometry3::from_parts((pose.translation.vector + far * u).into(), pose.rotation),
+            linear: [far, Vector3::zeros(), Vector3::zeros()],
+            angular: [Vector3::zeros(); 3],
+        };
+        let grid: Vec<f64> = (0..=80).map(|i| f64::from(i) / 80.0).collect();
+        let refused = follow(&solver, &line, &grid, &start, &FollowOptions::default()).unwrap_err();
+        let out = matches!(
+            refused.cause,
+            FollowCause::Unreachable(IkFailure::OutOfReach { distance }) if distance > 0.004
+        );
+        assert!(out, "{name}: {refused}");
+    }
 }
 
 /// On a finer grid, the joints that are known stay as they are, and those between them are those that are found when all
