@@ -78,14 +78,14 @@ impl<const N: usize> Search<'_, N> {
     /// Adds a shape in one size, or takes it away; returns the factor on that size for the next step.
     fn step(&mut self, shape: usize, size: f64) -> f64 {
         for sign in [1.0, -1.0] {
-            let mut other = self.best.clone();
-            for (c, s) in other.polynomials[0].iter_mut().zip(SHAPES[shape]) {
-                *c += sign * size * s;
-            }
             if self.trials == 0 {
                 return 1.0;
             }
             self.trials -= 1;
+            let mut other = self.best.clone();
+            for (c, s) in other.polynomials[0].iter_mut().zip(SHAPES[shape]) {
+                *c += sign * size * s;
+            }
             if let Some(cost) = (self.judge)(&other).filter(|cost| *cost < self.least) {
                 (self.best, self.least) = (other, cost);
                 return sign * GROWS;

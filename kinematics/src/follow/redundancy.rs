@@ -28,10 +28,14 @@ pub(super) fn resolve<const N: usize>(
     if ease >= 1.0 || is_beyond(&answer) {
         return answer;
     }
-    if answer.is_err()
-        && let Some(beyond) = beyond_end(task, start)
-    {
-        return beyond.map_or(answer, Err);
+    // No null-space motion leads to an end that no joint position reaches.
+    let end = answer.as_ref().err().and(task.grid.last());
+    match end.and_then(|u| task.unreachable(*u, start)) {
+        // Which limit is passed most on the path says more.
+        Some(error) if is_limit(&error) => return answer,
+        // A search that ended at a singular pose may have ended too early.
+        Some(error) if !is_singular(&error) => return Err(error),
+        _ => {}
     }
     for (found, moving) in judged(task, start, null_space_path::search(task, start, &still)) {
         if found <= ease {
@@ -50,20 +54,20 @@ fn is_beyond<P>(traced: &Result<P, FollowError>) -> bool {
     matches!(cause, Some(FollowCause::Unreachable(_)))
 }
 
-/// Whether the arm reaches the end of a path with no joint position, so that no null-space motion helps, and the reason, if it is
-/// another one than a limit: which limit is passed most on the path says more.
-#[cold]
-fn beyond_end<const N: usize>(
-    task: &Task<'_, N>,
-    start: &SVector<f64, N>,
-) -> Option<Option<FollowError>> {
-    let error = task.unreachable(*task.grid.last()?, start)?;
-    match error.cause {
-        FollowCause::Unreachable(IkFailure::AtLimit { .. }) => Some(None),
-        // The search may have ended too early.
-        FollowCause::Unreachable(IkFailure::Singular { .. }) => None,
-        _ => Some(Some(error)),
-    }
+/// Whether a pose is not reached because a limit is in the way.
+fn is_limit(error: &FollowError) -> bool {
+    matches!(
+        error.cause,
+        FollowCause::Unreachable(IkFailure::AtLimit { .. })
+    )
+}
+
+/// Whether the search for a pose ended near it, at a singular pose.
+fn is_singular(error: &FollowError) -> bool {
+    matches!(
+        error.cause,
+        FollowCause::Unreachable(IkFailure::Singular { .. })
+    )
 }
 
 /// Null-space motions with the quality of their paths at a few places, the best first; those after a good one, and those
