@@ -234,10 +234,8 @@ pub struct SpareSearch<'a, const N: usize> {
 /// };
 /// let (at, options) = ((&[0.0, 0.5, 1.0][..], &q), FollowOptions::default());
 /// let (points, known) = follow_choosing(&solver, &tool, at, &options)?;
-/// // The fastest joint should be slow.
-/// let cost = |points: &[FollowPoint<7>]| {
-///     points.iter().map(|point| point.q[1].amax()).fold(0.0, f64::max)
-/// };
+/// // The first joint should end near the middle of its range.
+/// let cost = |points: &[FollowPoint<7>]| points[points.len() - 1].q[0][0].abs();
 /// let search = SpareSearch { known: &known, cost: &cost, trials: 16 };
 /// let motion = cheaper_near(&solver, &tool, at, &options, &search).unwrap();
 /// let other = follow_with(&solver, &tool, at, &options, &motion)?;
