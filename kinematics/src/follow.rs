@@ -103,13 +103,7 @@ pub fn follow_choosing<const N: usize>(
     (grid, start): (&[f64], &SVector<f64, N>),
     options: &FollowOptions,
 ) -> Result<(Vec<FollowPoint<N>>, NullMotion<N>), FollowError> {
-    let task = trace::Task {
-        solver,
-        tool,
-        grid,
-        options,
-    };
-    check(&task, start)?;
+    let task = task(solver, tool, (grid, start), options)?;
     // A constant: only arms with a null space carry the code of the search in it.
     let resolve: Option<Resolve<N>> = const {
         if N > 6 {
@@ -181,13 +175,7 @@ pub fn cheaper<const N: usize>(
     options: &FollowOptions,
     cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
 ) -> Option<NullMotion<N>> {
-    let task = trace::Task {
-        solver,
-        tool,
-        grid,
-        options,
-    };
-    check(&task, start).ok()?;
+    let task = task(solver, tool, (grid, start), options).ok()?;
     // A constant: only arms with a null space carry the code of the search in it.
     let search: Option<Search<N>> = const {
         if N > 6 {
@@ -254,13 +242,7 @@ pub fn cheaper_near<const N: usize>(
         cost,
         trials,
     } = *search;
-    let task = trace::Task {
-        solver,
-        tool,
-        grid,
-        options,
-    };
-    check(&task, start).ok()?;
+    let task = task(solver, tool, (grid, start), options).ok()?;
     // A constant: only arms with a null space carry the code of the search in it.
     let cheapest: Option<Nearby<N>> = const {
         if N > 6 {
@@ -300,13 +282,7 @@ pub fn follow_with<const N: usize>(
     options: &FollowOptions,
     motion: &NullMotion<N>,
 ) -> Result<Vec<FollowPoint<N>>, FollowError> {
-    let task = trace::Task {
-        solver,
-        tool,
-        grid,
-        options,
-    };
-    check(&task, start)?;
+    let task = task(solver, tool, (grid, start), options)?;
     task.trace(start, &motion.0)
 }
 
@@ -332,11 +308,20 @@ pub fn refine<const N: usize>(
     task.refine(points, &motion.0)
 }
 
-/// Checks the grid, and that the arm is at the start of the path.
-fn check<const N: usize>(
-    task: &trace::Task<'_, N>,
-    start: &SVector<f64, N>,
-) -> Result<(), FollowError> {
+/// A path to follow, whose grid rises, and at whose start the arm is.
+fn task<'a, const N: usize>(
+    solver: &'a Solver<N>,
+    tool: &'a dyn Fn(f64) -> TwistPoint,
+    (grid, start): (&'a [f64], &SVector<f64, N>),
+    options: &'a FollowOptions,
+) -> Result<trace::Task<'a, N>, FollowError> {
+    let task = trace::Task {
+        solver,
+        tool,
+        grid,
+        options,
+    };
     task.check_grid()?;
-    task.check_start(start)
+    task.check_start(start)?;
+    Ok(task)
 }

@@ -6,7 +6,7 @@
 
 use super::FollowPoint;
 use super::null_space::NullSpace;
-use super::redundancy::{SHAPES, WORTH, coarse, quality};
+use super::redundancy::{Coarse, SHAPES, WORTH, judge, quality};
 use super::trace::Task;
 use nalgebra::SVector;
 
@@ -29,18 +29,11 @@ pub(super) fn cheapest<const N: usize>(
     cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
     trials: usize,
 ) -> Option<NullSpace<N>> {
-    let (grid, options) = coarse(task, JUDGED);
-    let coarse = Task {
-        grid: &grid,
-        options: &options,
-        ..*task
-    };
+    let places = Coarse::new(task, JUDGED);
+    let coarse = places.of(task);
     let first = coarse.trace(start, known).ok()?;
     let ease = EASE * quality(&coarse, &first).min(1.0);
-    let judge = |moving: &NullSpace<N>| {
-        let points = coarse.trace(start, moving).ok()?;
-        (quality(&coarse, &points) >= ease).then(|| cost(&points))
-    };
+    let judge = judge(&coarse, start, ease, cost);
     let now = cost(&first);
     let mut search = Search {
         judge: &judge,

@@ -77,12 +77,8 @@ fn judged<const N: usize>(
     start: &SVector<f64, N>,
     motions: Vec<NullSpace<N>>,
 ) -> Vec<(f64, NullSpace<N>)> {
-    let (grid, options) = coarse(task, JUDGED);
-    let coarse = Task {
-        grid: &grid,
-        options: &options,
-        ..*task
-    };
+    let places = Coarse::new(task, JUDGED);
+    let coarse = places.of(task);
     let mut found: Vec<(f64, NullSpace<N>)> = Vec::new();
     for moving in motions {
         let Ok(points) = coarse.trace(start, &moving) else {
@@ -98,20 +94,47 @@ fn judged<const N: usize>(
     found
 }
 
-/// A few places of a path, one for so many points but no fewer than the second number, and how closely it is followed there to be
-/// judged.
-pub(super) fn coarse<const N: usize>(
-    task: &Task<'_, N>,
-    [every, fewest]: [usize; 2],
-) -> (Vec<f64>, FollowOptions) {
-    let last = task.grid.len() - 1;
-    let steps = (last / every).clamp(fewest, MOST).min(last);
-    let grid = (0..=steps).map(|k| task.grid[k * last / steps]).collect();
-    let options = FollowOptions {
-        accuracy: COARSE,
-        ..*task.options
-    };
-    (grid, options)
+/// A few places of a path, and how closely it is followed there to be judged.
+pub(super) struct Coarse {
+    grid: Vec<f64>,
+    options: FollowOptions,
+}
+
+impl Coarse {
+    /// One place for so many points, but no fewer than the second number.
+    pub(super) fn new<const N: usize>(task: &Task<'_, N>, [every, fewest]: [usize; 2]) -> Self {
+        let last = task.grid.len() - 1;
+        let steps = (last / every).clamp(fewest, MOST).min(last);
+        Self {
+            grid: (0..=steps).map(|k| task.grid[k * last / steps]).collect(),
+            options: FollowOptions {
+                accuracy: COARSE,
+                ..*task.options
+            },
+        }
+    }
+
+    /// The path at these places.
+    pub(super) fn of<'a, const N: usize>(&'a self, task: &Task<'a, N>) -> Task<'a, N> {
+        Task {
+            grid: &self.grid,
+            options: &self.options,
+            ..*task
+        }
+    }
+}
+
+/// The cost of a null-space motion along a path, if it has that ease.
+pub(super) fn judge<'a, const N: usize>(
+    coarse: &'a Task<'_, N>,
+    start: &'a SVector<f64, N>,
+    ease: f64,
+    cost: &'a dyn Fn(&[FollowPoint<N>]) -> f64,
+) -> impl Fn(&NullSpace<N>) -> Option<f64> + 'a {
+    move |moving| {
+        let points = coarse.trace(start, moving).ok()?;
+        (quality(coarse, &points) >= ease).then(|| cost(&points))
+    }
 }
 
 /// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
@@ -147,19 +170,12 @@ pub(super) fn cheapest<const N: usize>(
     start: &SVector<f64, N>,
     cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
 ) -> Option<NullSpace<N>> {
-    let (grid, options) = coarse(task, JUDGED);
-    let coarse = Task {
-        grid: &grid,
-        options: &options,
-        ..*task
-    };
+    let places = Coarse::new(task, JUDGED);
+    let coarse = places.of(task);
     let still = resting_from(task, start);
     let first = coarse.trace(start, &still).ok()?;
     let ease = quality(&coarse, &first).min(1.0);
-    let judge = |moving: &NullSpace<N>| {
-        let points = coarse.trace(start, moving).ok()?;
-        (quality(&coarse, &points) >= ease).then(|| cost(&points))
-    };
+    let judge = judge(&coarse, start, ease, cost);
     let none = cost(&first);
     let begin = Search {
         judge: &judge,

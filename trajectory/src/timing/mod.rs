@@ -74,7 +74,7 @@ pub fn time_path<const N: usize>(
 }
 
 /// About how long the fastest motion along a path takes from rest to rest (s): [`PathTiming::expected`] from a look at the knots
-/// alone, for a tenth of its work. To compare paths with many knots.
+/// and a few places between them, for about a tenth of its work. To compare paths.
 ///
 /// # Errors
 /// [`TimingError`] when a limit is not positive, or the path is not finite.

@@ -122,7 +122,8 @@ impl ReachabilityPass {
     }
 }
 
-/// About how long the fastest motion from rest to rest takes (s), from a look at the knots of its path.
+/// About how long the fastest motion from rest to rest takes (s), from a look at the knots of its path and a few places
+/// between them.
 pub(super) fn about<const N: usize>(
     path: &dyn Path<N>,
     joint: &JointLimits<N>,
