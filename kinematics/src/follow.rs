@@ -19,7 +19,7 @@ mod spare;
 mod trace;
 
 pub use error::{FollowCause, FollowError};
-pub use spare::{joint_changes, spare_direction};
+pub use spare::{joint_changes, spare_direction, spare_direction_along};
 
 use crate::ik::Solver;
 use nalgebra::{Isometry3, SVector, Vector3};

@@ -155,13 +155,18 @@ impl<const N: usize> Planner<N> {
     ) -> Option<PlannedMove<N>> {
         let [few, many] = PARTS;
         let found = self.in_parts_of(few, motion, start);
-        if is_whole(few, motion.poses.len()) {
+        if Self::is_one_part(motion) {
             return found;
         }
         match self.in_parts_of(many, motion, start) {
             Some(other) => Some(sooner(found, other)),
             None => found,
         }
+    }
+
+    /// Whether a list is no more than one part.
+    pub(super) fn is_one_part(motion: &Move) -> bool {
+        is_whole(PARTS[0], motion.poses.len())
     }
 
     /// The motion through a list whose parts of so many poses are searched for themselves; `None` where two of them do not meet, and

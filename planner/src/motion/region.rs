@@ -29,8 +29,10 @@ const WELL: f64 = 0.75;
 const EASED: f64 = 0.9;
 const FARTHER: f64 = 3.0;
 
-/// Places along a motion at which its ease is looked at.
+/// Places along a motion at which its ease is looked at, and by how much that may be below what was asked for in a motion along a
+/// curve whose joints had it: the motion is elsewhere at the same places.
 const LOOKS: u32 = 24;
+const ROUNDLY: f64 = 0.01;
 
 /// How far a search may go.
 #[derive(Clone)]
@@ -77,17 +79,20 @@ impl Region {
     }
 }
 
-/// Joint positions along a motion, its ends with them.
-fn places<const N: usize>(trajectory: &Trajectory<N>) -> impl Iterator<Item = SVector<f64, N>> {
-    let step = trajectory.duration() / f64::from(LOOKS);
-    (0..=LOOKS).map(move |k| trajectory.sample(step * f64::from(k)).position)
+/// Joint positions at the ends of so many parts of a motion that take the same time.
+pub(super) fn places<const N: usize>(
+    trajectory: &Trajectory<N>,
+    parts: u32,
+) -> impl Iterator<Item = SVector<f64, N>> {
+    let step = trajectory.duration() / f64::from(parts);
+    (0..=parts).map(move |k| trajectory.sample(step * f64::from(k)).position)
 }
 
 impl<const N: usize> Planner<N> {
     /// Where searches may go that begin at a known motion.
     pub(super) fn region(&self, known: &Trajectory<N>) -> Region {
         let chain = self.chain();
-        let places: Vec<_> = places(known).collect();
+        let places: Vec<_> = places(known, LOOKS).collect();
         let room = |j: usize| {
             let room = places.iter().map(|q| chain.room(j, q[j]));
             room.fold(ROOM, f64::min).max(0.0)
@@ -111,8 +116,13 @@ impl<const N: usize> Planner<N> {
         region.room.iter().enumerate().map(joint).collect()
     }
 
+    /// Whether a motion with which searches end has enough ease, or nearly so.
+    pub(super) fn is_eased(&self, trajectory: &Trajectory<N>, region: &Region) -> bool {
+        self.missing_ease(trajectory, region) <= ROUNDLY
+    }
+
     /// How much ease a motion lacks; not above 0 where it has enough.
-    pub(super) fn missing_ease(&self, trajectory: &Trajectory<N>, region: &Region) -> f64 {
+    fn missing_ease(&self, trajectory: &Trajectory<N>, region: &Region) -> f64 {
         let least = region.ease;
         least.map_or(0.0, |least| least - self.ease_along(trajectory))
     }
@@ -129,7 +139,7 @@ impl<const N: usize> Planner<N> {
 
     /// The least ease along a motion.
     fn ease_along(&self, trajectory: &Trajectory<N>) -> f64 {
-        let all = places(trajectory).map(|q| self.ease_within(&q, [ROOM, NIMBLE]));
+        let all = places(trajectory, LOOKS).map(|q| self.ease_within(&q, [ROOM, NIMBLE]));
         all.fold(f64::INFINITY, f64::min)
     }
 }

@@ -14,8 +14,16 @@ use crate::task::Move;
 /// about known: the law of time along it loses much more there.
 const RULED: f64 = 1.3;
 const RULED_LONG: f64 = 1.05;
-/// Gap to the optimum at which the search of the curve that is tried first ends.
-const FIRST_GAP: f64 = 0.05;
+/// Time of a motion of an arm with a spare joint through many poses, over that of the tool alone, up to which no other beginning is tried.
+const NEAR: f64 = 1.2;
+/// Curves from which searches with the joints begin, one after the other until one ends at a fast motion: the gap to the optimum at which the search of
+/// the curve ends, and shares of the linear and the angular limits for it. Through few poses only the first.
+const BEGINNINGS: [(f64, [f64; 2]); 4] = [
+    (0.05, [1.0, 1.0]),
+    (OTHER_GAP, [0.7, 1.0]),
+    (OTHER_GAP, [1.0, 0.6]),
+    (0.3, [1.0, 1.0]),
+];
 /// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
 const ENOUGH: f64 = 0.95;
 /// The same where the first curve is the fastest one for the tool: there more can be saved.
@@ -35,8 +43,8 @@ const FORETOLD: f64 = 1.1;
 /// Most spans of a curve, and most poses of a list, that is cheap enough for others.
 const CHEAP: usize = 400;
 const FEW: usize = 20;
-/// A list of more poses than so is dear to plan for the tool alone: if it turns a rounder curve is tried first, also with a spare joint, and
-/// one that is dense is not searched with the joints.
+/// A list of more poses than so is dear to plan for the tool alone: one that is dense is not searched with the joints, and one that
+/// does not turn is searched in parts.
 const MANY: usize = 60;
 /// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
 const DENSE: f64 = 4.0;
@@ -99,26 +107,38 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The faster motion of a search with the joints that begins at the one along a rounder curve through a list of many poses that
+    /// The fastest motion of searches with the joints that begin at those along rounder curves through a list of many poses that
     /// turns, and of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
-    /// list that does not turn is searched better from that curve, and one that is less long for an arm with a spare joint.
+    /// list that does not turn is searched better from that curve.
     fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        let most = if N > 6 { MANY } else { FEW };
-        let many = motion.poses.len() > most && Self::has_inverse();
+        let many = motion.poses.len() > FEW && Self::has_inverse();
         if !many || !self.turns(motion, start) {
             return None;
         }
-        let (curve, course) = self.ruled(motion, start, RULED_LONG)?;
-        if is_dense(&curve) {
-            return None;
+        let (mut found, mut tool, mut about) = (None, f64::INFINITY, f64::INFINITY);
+        for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
+            let Some((curve, course)) = self.rough(motion, start, beginning) else {
+                continue;
+            };
+            tool = tool.min(curve.path.plan.duration());
+            if is_dense(&curve) || k == 0 && course.time <= RULED_LONG * tool {
+                return None;
+            }
+            about = about.min(course.time);
+            found = or_sooner(found, self.with_joints(motion, start, course));
+            // A spare joint may be led elsewhere from another beginning.
+            let most = if N > 6 { NEAR * tool } else { ENOUGH * about };
+            if takes(&found, most) {
+                break;
+            }
         }
-        let about = course.time;
-        let useful = |found: &PlannedMove<N>| found.trajectory.duration() <= about;
-        let found = self.with_joints(motion, start, course).filter(useful);
-        match self.in_parts(motion, start).filter(useful) {
-            Some(in_parts) => Some(sooner(found, in_parts)),
-            None => found,
-        }
+        // The search of the one part of a list would be the same.
+        let found = if takes(&found, ENOUGH * about) && Self::is_one_part(motion) {
+            found
+        } else {
+            or_sooner(found, self.in_parts(motion, start))
+        };
+        found.filter(|found| found.trajectory.duration() <= about)
     }
 
     /// The joints along a curve that is found by a short search, if about their time over that of the tool is above `share`.
@@ -128,15 +148,30 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         share: f64,
     ) -> Option<(Followed<N>, Course<N>)> {
-        let search = Search {
-            gap: Some(FIRST_GAP),
-            most: f64::INFINITY,
-        };
-        let curve = self.curve(start, (motion, search), true).ok()?;
-        // The time of the joints need not be known exactly.
-        let course = self.course_along(&curve);
+        let (curve, course) = self.rough(motion, start, BEGINNINGS[0])?;
         let ruled = course.time > share * curve.path.plan.duration();
         ruled.then_some((curve, course))
+    }
+
+    /// The joints along a curve that is found by a search which ends at a gap to its optimum, under shares of the limits.
+    fn rough(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (gap, [along, about]): (f64, [f64; 2]),
+    ) -> Option<(Followed<N>, Course<N>)> {
+        let slower = Move {
+            limits: motion.limits.scaled(along, about),
+            ..motion.clone()
+        };
+        let search = Search {
+            gap: Some(gap),
+            most: f64::INFINITY,
+        };
+        let curve = self.curve(start, (&slower, search), true).ok()?;
+        // The time of the joints need not be known exactly.
+        let course = self.course_along(&curve);
+        Some((curve, course))
     }
 
     /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
@@ -337,6 +372,24 @@ impl<const N: usize> Planner<N> {
             }
         }
         best
+    }
+}
+
+/// Whether a motion is found that takes no longer than a time, s.
+fn takes<const N: usize>(found: &Option<PlannedMove<N>>, most: f64) -> bool {
+    found
+        .as_ref()
+        .is_some_and(|found| found.trajectory.duration() <= most)
+}
+
+/// The motion that ends first, if one is found.
+fn or_sooner<const N: usize>(
+    found: Option<PlannedMove<N>>,
+    other: Option<PlannedMove<N>>,
+) -> Option<PlannedMove<N>> {
+    match other {
+        Some(other) => Some(sooner(found, other)),
+        None => found,
     }
 }
 

@@ -13,7 +13,7 @@ use trajectory::smooth::{self, ArmMotion, ArmState, JointState};
 
 use super::cartesian::pieces;
 use super::course::Course;
-use super::region::Region;
+use super::region::{Region, places};
 use super::smooth_joints::{Followed, SmoothPath};
 use super::{PlannedMove, Planner};
 use crate::task::Move;
@@ -32,6 +32,9 @@ const TURN: f64 = 1e-12;
 /// Poses of a list that is searched as a whole; one pose is reached straight.
 const POSES: RangeInclusive<usize> = 2..=1000;
 
+/// Parts of the known motion at whose ends the spare joint is looked at.
+const LOOKS: u32 = 64;
+
 /// What a search has found.
 struct Found<const N: usize> {
     followed: Followed<N>,
@@ -43,8 +46,7 @@ struct Found<const N: usize> {
 struct Task<'a, const N: usize> {
     motion: &'a Move,
     start: &'a SVector<f64, N>,
-    /// The linear function of the joints that says where a spare joint is: the direction in which it is free in the middle of the
-    /// known motion.
+    /// The linear function of the joints that says where a spare joint is, all along the known motion.
     spare: Option<SVector<f64, N>>,
     /// Gap to its optimum at which the last search ends.
     gap: f64,
@@ -64,7 +66,7 @@ impl<const N: usize> Planner<N> {
         all.find_map(|followed| {
             let planned = self.on(&followed, motion, (start, most)).ok()?.planned;
             let trajectory = &planned.trajectory;
-            let eased = self.missing_ease(trajectory, &region) <= 0.0;
+            let eased = self.is_eased(trajectory, &region);
             let taken = trajectory.duration() < most && eased;
             taken.then_some(planned)
         })
@@ -81,7 +83,7 @@ impl<const N: usize> Planner<N> {
         let mut all = self.searches(motion, start, (known, &region));
         all.find(|followed| {
             let trajectory = Trajectory::new(pieces(&followed.points));
-            let eased = self.missing_ease(&trajectory, &region) <= 0.0;
+            let eased = self.is_eased(&trajectory, &region);
             self.about_time(&followed.points) < most && eased
         })
     }
@@ -107,12 +109,11 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (known, region): (Course<N>, &Region),
     ) -> [Option<Followed<N>>; 2] {
-        let middle = 0.5 * known.trajectory.duration();
-        let middle = known.trajectory.sample(middle).position;
+        let joints = places(&known.trajectory, LOOKS);
         let task = Task {
             motion,
             start,
-            spare: follow::spare_direction(self.chain(), &middle),
+            spare: follow::spare_direction_along(self.chain(), joints),
             gap: if self.turns(motion, start) {
                 TURNING
             } else {

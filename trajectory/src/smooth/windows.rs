@@ -27,6 +27,9 @@ const MOST_BRAKES: f64 = 16.0;
 const FIRST_BRAKES: f64 = 4.0;
 const LONG_BRAKES: f64 = 64.0;
 
+/// Most legs of a list that is one window where no more than a rough curve is wanted: that needs few knots, and no search begins in motion.
+const ROUGH_LEGS: usize = 64;
+
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
 
@@ -237,6 +240,10 @@ impl Windows {
 
     /// Last pose of a window that begins at pose `from`.
     fn window(&self, from: usize) -> usize {
+        let last = self.poses.len() - 1;
+        if from == 0 && self.options.is_rough() && last <= ROUGH_LEGS {
+            return last;
+        }
         let (mut end, mut time) = (from, 0.0);
         let most = MOST_BRAKES * self.brake();
         let legs = self.poses.windows(2);
@@ -261,8 +268,8 @@ impl Windows {
         let mut near = (end..self.poses.len()).take(self.options.window / 2);
         let end = near.find(|i| self.turns(*i)).unwrap_or(end);
         // A short rest of the list joins this window.
-        if self.poses.len() - 1 - end <= self.options.window / 4 {
-            self.poses.len() - 1
+        if last - end <= self.options.window / 4 {
+            last
         } else {
             end
         }
@@ -435,6 +442,33 @@ mod tests {
         }
         assert!(windows.finish().certificate().holds());
         tally
+    }
+
+    /// A rough curve through some dozens of poses is one window, a longer one is not.
+    #[test]
+    fn a_rough_curve_needs_one_window() {
+        let limits = ToolLimits {
+            speed: 0.5,
+            acceleration: 5.0,
+            jerk: 100.0,
+            ..ToolLimits::UNLIMITED
+        };
+        let poses: Vec<_> = (0..100)
+            .map(|i| Isometry3::translation(0.05 * f64::from(i), 0.02 * f64::from(i % 2), 0.0))
+            .collect();
+        let fine = SmoothOptions::new(1e-3, limits);
+        let rough = SmoothOptions {
+            gap: 0.05,
+            ..fine.clone()
+        };
+        let first = |count: usize, options: &SmoothOptions| {
+            let mut windows = Windows::new(&poses[..=count], options).unwrap();
+            assert!(windows.advance());
+            windows.end
+        };
+        assert_eq!(first(ROUGH_LEGS, &rough), ROUGH_LEGS);
+        assert!(first(ROUGH_LEGS + 1, &rough) < ROUGH_LEGS);
+        assert!(first(ROUGH_LEGS, &fine) < ROUGH_LEGS);
     }
 
     /// Four times the poses take four times the windows; no window is larger, and no more is
