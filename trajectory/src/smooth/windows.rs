@@ -28,7 +28,7 @@ const FIRST_BRAKES: f64 = 4.0;
 const LONG_BRAKES: f64 = 64.0;
 
 /// Most legs of a list that is one window where no more than a rough curve is wanted: that needs few knots, and no search begins in motion.
-const ROUGH_LEGS: usize = 64;
+const ROUGH_LEGS: usize = 36;
 
 /// Part of a window's end that is planned again, in braking times.
 const AGAIN_BRAKES: f64 = 2.0;
@@ -444,7 +444,7 @@ mod tests {
         tally
     }
 
-    /// A rough curve through some dozens of poses is one window, a longer one is not.
+    /// A rough curve through some dozens of poses is one window, one through more is not.
     #[test]
     fn a_rough_curve_needs_one_window() {
         let limits = ToolLimits {
