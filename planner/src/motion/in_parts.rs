@@ -16,7 +16,6 @@ use super::certificate::{Arm, corridor};
 use super::draft::Crossing;
 use super::rounder::sooner;
 use super::seam::{Part, Seam};
-use super::smooth::Search;
 use super::smooth_joints::{Followed, HELPED};
 use super::{Blend, PlannedMove, Planner};
 use crate::task::Move;
@@ -221,19 +220,10 @@ impl<const N: usize> Planner<N> {
         let firsts = gaps.map(|gap| (gap, [1.0, 1.0])).into_iter();
         let others = OTHERS.map(|shares| (Some(LAST_GAP), shares)).into_iter();
         let mut best: Option<(f64, Followed<N>)> = None;
-        for (gap, [along, about]) in firsts.chain(others) {
-            let slower = Move {
-                limits: part.limits.scaled(along, about),
-                ..part.clone()
-            };
-            let search = Search {
-                gap,
-                most: f64::INFINITY,
-            };
-            let Ok(curve) = self.curve(start, (&slower, search), true) else {
+        for beginning in firsts.chain(others) {
+            let Some((curve, course)) = self.rough(&part, start, beginning) else {
                 continue;
             };
-            let course = self.course_along(&curve);
             let ruled = course.time > HELPED * curve.path.plan.duration();
             let found = self.searched_along(&part, start, course);
             let ends = found.is_some() || !ruled;

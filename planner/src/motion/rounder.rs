@@ -18,11 +18,11 @@ const RULED_LONG: f64 = 1.05;
 const NEAR: f64 = 1.2;
 /// Curves from which searches with the joints begin, one after the other until one ends at a fast motion: the gap to the optimum at which the search of
 /// the curve ends, and shares of the linear and the angular limits for it. Through few poses only the first.
-const BEGINNINGS: [(f64, [f64; 2]); 4] = [
-    (0.05, [1.0, 1.0]),
-    (OTHER_GAP, [0.7, 1.0]),
-    (OTHER_GAP, [1.0, 0.6]),
-    (0.3, [1.0, 1.0]),
+const BEGINNINGS: [(Option<f64>, [f64; 2]); 4] = [
+    (Some(0.05), [1.0, 1.0]),
+    (Some(OTHER_GAP), [0.7, 1.0]),
+    (Some(OTHER_GAP), [1.0, 0.6]),
+    (Some(0.3), [1.0, 1.0]),
 ];
 /// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
 const ENOUGH: f64 = 0.95;
@@ -153,25 +153,33 @@ impl<const N: usize> Planner<N> {
         ruled.then_some((curve, course))
     }
 
-    /// The joints along a curve that is found by a search which ends at a gap to its optimum, under shares of the limits.
-    fn rough(
+    /// The joints along a curve that is found by a search which ends at a gap to its optimum, the usual one if none is given, under
+    /// shares of the limits.
+    pub(super) fn rough(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        (gap, [along, about]): (f64, [f64; 2]),
+        (gap, shares): (Option<f64>, [f64; 2]),
     ) -> Option<(Followed<N>, Course<N>)> {
+        let most = f64::INFINITY;
+        let curve = self.slower(motion, start, (Search { gap, most }, shares))?;
+        // The time of the joints need not be known exactly.
+        let course = self.course_along(&curve);
+        Some((curve, course))
+    }
+
+    /// The joints along the curve that is planned under shares of the linear and the angular limits.
+    fn slower(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (search, [along, about]): (Search, [f64; 2]),
+    ) -> Option<Followed<N>> {
         let slower = Move {
             limits: motion.limits.scaled(along, about),
             ..motion.clone()
         };
-        let search = Search {
-            gap: Some(gap),
-            most: f64::INFINITY,
-        };
-        let curve = self.curve(start, (&slower, search), true).ok()?;
-        // The time of the joints need not be known exactly.
-        let course = self.course_along(&curve);
-        Some((curve, course))
+        self.curve(start, (&slower, search), true).ok()
     }
 
     /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
@@ -329,13 +337,9 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        (search, [along, about]): (Search, [f64; 2]),
+        searched: (Search, [f64; 2]),
     ) -> Option<Other<N>> {
-        let slower = Move {
-            limits: motion.limits.scaled(along, about),
-            ..motion.clone()
-        };
-        let followed = self.curve(start, (&slower, search), true).ok()?;
+        let followed = self.slower(motion, start, searched)?;
         Some(Other {
             least: self.least_along(&followed, motion).ok()?,
             followed,
