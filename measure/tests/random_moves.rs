@@ -3,7 +3,7 @@
 
 use measure::{Random, RandomMoves};
 use nalgebra::{Isometry3, SVector};
-use planner::motion::Planner;
+use planner::motion::{MotionError, Planner};
 use planner::robot::{self, Robot, vector};
 use planner::task::{Move, Shape};
 
@@ -30,21 +30,30 @@ fn walk<const N: usize>(
     (0..count).map(|_| next()).collect()
 }
 
-/// How long the motion through a walk takes, s.
-fn through_walk<const N: usize>(robot: &Robot, size: (usize, u64)) -> Option<f64> {
-    let planner = Planner::new(
+/// Plans for a robot with its flange as the controlled point.
+fn planner<const N: usize>(robot: &Robot) -> Planner<N> {
+    Planner::new(
         &robot.chain::<N>().unwrap(),
         Isometry3::identity(),
         robot.joint_limits::<N>(),
         robot.joint_names(),
-    );
-    let home = vector::<N>(&robot.home);
-    let motion = Move {
+    )
+}
+
+/// A smooth move through poses.
+fn smooth(robot: &Robot, poses: Vec<Isometry3<f64>>) -> Move {
+    Move {
         shape: Shape::Smooth,
-        poses: walk(&planner, &home, size),
+        poses,
         tolerance: TOLERANCE,
         limits: robot.motion_limits(),
-    };
+    }
+}
+
+/// How long the motion through a walk takes, s.
+fn through_walk<const N: usize>(robot: &Robot, size: (usize, u64)) -> Option<f64> {
+    let (planner, home) = (planner(robot), vector::<N>(&robot.home));
+    let motion = smooth(robot, walk(&planner, &home, size));
     let planned = planner.plan(&motion, &home).ok()?;
     Some(planned.trajectory.duration())
 }
@@ -76,4 +85,56 @@ fn the_spare_joint_is_known_along_the_whole_motion() {
     let time = times[4].motion.unwrap();
     // Known in its middle only it takes 1.57 s.
     assert!(time <= 1.0, "{time} s");
+}
+
+/// A walk of 32 poses whose fast curves the joints of a Panda cannot follow, which was refused; and a random move of a UR5e that
+/// took 3.45 s from curves alone.
+#[test]
+fn a_search_begins_at_straight_moves_too() {
+    let time = through_walk::<7>(&robot::load("panda").unwrap(), (32, 5)).unwrap();
+    assert!(time <= 4.3, "{time} s");
+    let moves = RandomMoves {
+        shape: Shape::Smooth,
+        count: 9,
+        seed: 12,
+        clock: || 0.0,
+    };
+    let times = moves.measure(&robot::load("ur5e").unwrap()).unwrap();
+    let time = times[8].motion.unwrap();
+    assert!(time <= 2.8, "{time} s");
+}
+
+/// Walks of 12 poses from home: what is refused names the pose that cannot be reached, and what straight moves reach is not refused.
+#[test]
+fn many_poses_are_refused_for_their_reason() {
+    let robot = robot::load("ur5e").unwrap();
+    let (planner, home) = (planner::<6>(&robot), vector::<6>(&robot.home));
+    let is_straight = |motion: &Move| {
+        let mut joints = home;
+        motion.poses.iter().all(|pose| {
+            let leg = Move {
+                shape: Shape::Straight,
+                ..smooth(&robot, vec![*pose])
+            };
+            let planned = planner.plan(&leg, &joints);
+            planned.is_ok_and(|planned| {
+                joints = planned.end;
+                true
+            })
+        })
+    };
+    let mut straight = 0;
+    for seed in 0..12 {
+        let mut motion = smooth(&robot, walk(&planner, &home, (12, seed)));
+        let planned = planner.plan(&motion, &home);
+        if is_straight(&motion) {
+            straight += 1;
+            assert!(planned.is_ok(), "{seed}: {:?}", planned.err());
+        }
+        motion.poses[6].translation.vector.x += 3.0;
+        let error = planner.plan(&motion, &home).unwrap_err();
+        let named = matches!(error, MotionError::OutOfReach { pose: 7, .. });
+        assert!(named, "{seed}: {error}");
+    }
+    assert!(straight > 6, "{straight} of 12");
 }

@@ -13,7 +13,9 @@ use trajectory::smooth::{angular_tolerance, off_segment};
 use trajectory::{JointPoint, ToolCurve, ToolPoint};
 
 use super::certificate::{Arm, corridor};
+use super::course::Course;
 use super::draft::Crossing;
+use super::many::{BEGINNINGS, Beginning};
 use super::rounder::sooner;
 use super::seam::{Part, Seam};
 use super::smooth_joints::{Followed, HELPED};
@@ -30,13 +32,13 @@ const LOOKS: u32 = 32;
 /// Points nearer to each other than this are one, s.
 const NEAR: f64 = 1e-6;
 
-/// Gaps to its optimum at which the search of the curve ends from which a part is searched first, and of the one that is tried
-/// then; where the tool turns or does not.
-const TURNING: [Option<f64>; 2] = [Some(0.05), Some(0.3)];
-const STEADY: [Option<f64>; 2] = [None, Some(0.05)];
-/// Gap of curves that are tried at last, and shares of the linear and the angular limits for them.
-const LAST_GAP: f64 = 0.5;
-const OTHERS: [[f64; 2]; 2] = [[1.0, 0.6], [0.7, 1.0]];
+/// The rough curves from which searches of a part begin that does not turn.
+const STEADY: [Beginning; 4] = [
+    (None, [1.0, 1.0]),
+    (Some(0.05), [1.0, 1.0]),
+    (Some(0.5), [1.0, 0.6]),
+    (Some(0.5), [0.7, 1.0]),
+];
 
 /// The tool along parts and seams, by the time up to which it is on each.
 struct AlongParts<'a, const N: usize> {
@@ -212,16 +214,14 @@ impl<const N: usize> Planner<N> {
             poses: motion.poses[poses].to_vec(),
             ..motion.clone()
         };
-        let gaps = if self.turns(&part, start) {
-            TURNING
+        let beginnings: &[Beginning] = if self.turns(&part, start) {
+            &BEGINNINGS
         } else {
-            STEADY
+            &STEADY
         };
-        let firsts = gaps.map(|gap| (gap, [1.0, 1.0])).into_iter();
-        let others = OTHERS.map(|shares| (Some(LAST_GAP), shares)).into_iter();
         let mut best: Option<(f64, Followed<N>)> = None;
-        for beginning in firsts.chain(others) {
-            let Some((curve, course)) = self.rough(&part, start, beginning) else {
+        for beginning in beginnings {
+            let Ok((curve, course)) = self.rough(&part, start, *beginning) else {
                 continue;
             };
             let ruled = course.time > HELPED * curve.path.plan.duration();
@@ -236,7 +236,16 @@ impl<const N: usize> Planner<N> {
                 break;
             }
         }
-        best.map(|(_, followed)| followed)
+        match best {
+            Some((_, followed)) => Some(followed),
+            None => self.part_from_stops(&part, start),
+        }
+    }
+
+    /// The joints along the curve that a search of a part finds which begins at straight moves to each of its poses.
+    fn part_from_stops(&self, part: &Move, start: &SVector<f64, N>) -> Option<Followed<N>> {
+        let straights = self.straight_moves(part, (start, f64::INFINITY)).ok()?;
+        self.searched_along(part, start, Course::of(&straights))
     }
 
     /// The seam between two parts at which least time is lost.

@@ -21,6 +21,7 @@ mod kernel;
 mod least;
 mod least_turn;
 mod legs;
+mod many;
 mod motion_error;
 mod moving;
 mod reach;

@@ -5,28 +5,20 @@
 use nalgebra::{Isometry3, SVector};
 
 use super::course::Course;
+use super::many::BEGINNINGS;
 use super::smooth::{Along, Search};
 use super::smooth_joints::{Followed, HELPED};
-use super::{PlannedMove, Planner};
+use super::{MotionError, PlannedMove, Planner};
 use crate::task::Move;
 
-/// Time of the motion over that of the tool alone from which on the joints rule, and the same along a long list that turns, if only
-/// about known: the law of time along it loses much more there.
+/// Time of the motion over that of the tool alone from which on the joints rule.
 const RULED: f64 = 1.3;
-const RULED_LONG: f64 = 1.05;
-/// Time of a motion of an arm with a spare joint through many poses, over that of the tool alone, up to which no other beginning is tried.
-const NEAR: f64 = 1.2;
-/// Curves from which searches with the joints begin, one after the other until one ends at a fast motion: the gap to the optimum at which the search of
-/// the curve ends, and shares of the linear and the angular limits for it. Through few poses only the first.
-const BEGINNINGS: [(Option<f64>, [f64; 2]); 4] = [
-    (Some(0.05), [1.0, 1.0]),
-    (Some(OTHER_GAP), [0.7, 1.0]),
-    (Some(OTHER_GAP), [1.0, 0.6]),
-    (Some(0.3), [1.0, 1.0]),
-];
+/// Time of a motion through few poses, over that of the tool alone, from which on a search also begins at straight moves.
+const SLOW: f64 = 2.0;
 /// Share of its time that the motion along it may take after a search with the joints for no other curve to be tried.
 const ENOUGH: f64 = 0.95;
-/// The same where the first curve is the fastest one for the tool: there more can be saved.
+/// Share of its time that the motion along the fastest curve for the tool may take after a search with the joints for no other curve
+/// to be tried: there more can be saved.
 const MUCH: f64 = 0.8;
 /// Other curves tried then, each planned under a share of the linear and one of the angular limits; if the first of a pair
 /// is better than the other first one, the second is tried, too.
@@ -75,17 +67,28 @@ struct Other<const N: usize> {
 impl<const N: usize> Planner<N> {
     /// The fastest motion along curves that are rounder than the fastest one for the tool, where the joints rule; none that
     /// rests without need.
-    pub(super) fn rounder(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`] if the joints follow no curve through many poses.
+    pub(super) fn rounder(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Option<PlannedMove<N>>, MotionError> {
         if motion.tolerance <= 0.0 {
-            return None;
+            return Ok(None);
         }
-        let planned = if motion.poses.len() <= FEW {
+        let planned = if self.has_many_turns(motion, start) {
+            self.through_many(motion, start)?
+        } else if motion.poses.len() <= FEW {
             self.rounder_of_few(motion, start)
         } else {
-            self.rounder_of_many(motion, start)
-        }?;
-        let rests = planned.blend.is_some_and(|blend| blend.fallbacks > 0);
-        (!rests).then_some(planned)
+            None
+        };
+        let rests =
+            |planned: &PlannedMove<N>| planned.blend.is_some_and(|blend| blend.fallbacks > 0);
+        Ok(planned.filter(|planned| !rests(planned)))
     }
 
     /// The fastest motion of a search with the joints that begins at the one along a rounder curve and, where that saves
@@ -94,92 +97,31 @@ impl<const N: usize> Planner<N> {
         if !self.foretells_joints(motion, start) {
             return None;
         }
-        let (curve, course) = self.ruled(motion, start, RULED)?;
-        let about = course.time;
-        let found = self.with_joints(motion, start, course);
-        match found {
-            Some(found) if found.trajectory.duration() <= ENOUGH * about => Some(found),
+        let (curve, course) = self.ruled(motion, start)?;
+        let (about, tool) = (course.time, curve.path.plan.duration());
+        let found = match self.with_joints(motion, start, course) {
+            Some(found) if found.trajectory.duration() <= ENOUGH * about => found,
             found => {
                 let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
                 let other = self.on_others(motion, start, (first, &curve), false);
-                Some(sooner(found, other))
+                sooner(found, other)
             }
-        }
-    }
-
-    /// The fastest motion of searches with the joints that begin at those along rounder curves through a list of many poses that
-    /// turns, and of searches of its parts. There the fastest curve of the tool takes ten times the planning, and is of no use. A long
-    /// list that does not turn is searched better from that curve.
-    fn rounder_of_many(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
-        let many = motion.poses.len() > FEW && Self::has_inverse();
-        if !many || !self.turns(motion, start) {
-            return None;
-        }
-        let (mut found, mut tool, mut about) = (None, f64::INFINITY, f64::INFINITY);
-        for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
-            let Some((curve, course)) = self.rough(motion, start, beginning) else {
-                continue;
-            };
-            tool = tool.min(curve.path.plan.duration());
-            if is_dense(&curve) || k == 0 && course.time <= RULED_LONG * tool {
-                return None;
-            }
-            about = about.min(course.time);
-            found = or_sooner(found, self.with_joints(motion, start, course));
-            // A spare joint may be led elsewhere from another beginning.
-            let most = if N > 6 { NEAR * tool } else { ENOUGH * about };
-            if takes(&found, most) {
-                break;
-            }
-        }
-        // The search of the one part of a list would be the same.
-        let found = if takes(&found, ENOUGH * about) && Self::is_one_part(motion) {
-            found
-        } else {
-            or_sooner(found, self.in_parts(motion, start))
         };
-        found.filter(|found| found.trajectory.duration() <= about)
+        if found.trajectory.duration() <= SLOW * tool {
+            return Some(found);
+        }
+        let other = self.searched_from_stops(motion, start).ok().flatten();
+        Some(match other {
+            Some(other) => sooner(Some(found), other),
+            None => found,
+        })
     }
 
-    /// The joints along a curve that is found by a short search, if about their time over that of the tool is above `share`.
-    fn ruled(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        share: f64,
-    ) -> Option<(Followed<N>, Course<N>)> {
-        let (curve, course) = self.rough(motion, start, BEGINNINGS[0])?;
-        let ruled = course.time > share * curve.path.plan.duration();
+    /// The joints along a curve that is found by a short search, if they rule.
+    fn ruled(&self, motion: &Move, start: &SVector<f64, N>) -> Option<(Followed<N>, Course<N>)> {
+        let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
+        let ruled = course.time > RULED * curve.path.plan.duration();
         ruled.then_some((curve, course))
-    }
-
-    /// The joints along a curve that is found by a search which ends at a gap to its optimum, the usual one if none is given, under
-    /// shares of the limits.
-    pub(super) fn rough(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (gap, shares): (Option<f64>, [f64; 2]),
-    ) -> Option<(Followed<N>, Course<N>)> {
-        let most = f64::INFINITY;
-        let curve = self.slower(motion, start, (Search { gap, most }, shares))?;
-        // The time of the joints need not be known exactly.
-        let course = self.course_along(&curve);
-        Some((curve, course))
-    }
-
-    /// The joints along the curve that is planned under shares of the linear and the angular limits.
-    fn slower(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-        (search, [along, about]): (Search, [f64; 2]),
-    ) -> Option<Followed<N>> {
-        let slower = Move {
-            limits: motion.limits.scaled(along, about),
-            ..motion.clone()
-        };
-        self.curve(start, (&slower, search), true).ok()
     }
 
     /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
@@ -252,7 +194,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// Whether a list has many poses for a search with the joints.
-    fn has_many(motion: &Move) -> bool {
+    pub(super) fn has_many(motion: &Move) -> bool {
         motion.poses.len() > MANY && Self::has_inverse()
     }
 
@@ -339,7 +281,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         searched: (Search, [f64; 2]),
     ) -> Option<Other<N>> {
-        let followed = self.slower(motion, start, searched)?;
+        let followed = self.slower(motion, start, searched).ok()?;
         Some(Other {
             least: self.least_along(&followed, motion).ok()?,
             followed,
@@ -379,24 +321,6 @@ impl<const N: usize> Planner<N> {
     }
 }
 
-/// Whether a motion is found that takes no longer than a time, s.
-fn takes<const N: usize>(found: &Option<PlannedMove<N>>, most: f64) -> bool {
-    found
-        .as_ref()
-        .is_some_and(|found| found.trajectory.duration() <= most)
-}
-
-/// The motion that ends first, if one is found.
-fn or_sooner<const N: usize>(
-    found: Option<PlannedMove<N>>,
-    other: Option<PlannedMove<N>>,
-) -> Option<PlannedMove<N>> {
-    match other {
-        Some(other) => Some(sooner(found, other)),
-        None => found,
-    }
-}
-
 /// The motion that ends first.
 pub(super) fn sooner<const N: usize>(
     found: Option<PlannedMove<N>>,
@@ -408,7 +332,7 @@ pub(super) fn sooner<const N: usize>(
 }
 
 /// Whether the poses of a curve are so near to each other that a tool that stops at each of them takes much longer.
-fn is_dense<const N: usize>(curve: &Followed<N>) -> bool {
+pub(super) fn is_dense<const N: usize>(curve: &Followed<N>) -> bool {
     let plan = &curve.path.plan;
     curve.path.is_fitted() || plan.exact_stop() > DENSE * plan.duration()
 }

@@ -41,7 +41,7 @@ const FULL: Search = Search {
 
 /// Why there is no motion along a smooth curve of the tool.
 pub(super) struct Failure {
-    error: MotionError,
+    pub(super) error: MotionError,
     /// Spans of the curve; none if there is no curve.
     spans: usize,
 }
@@ -74,7 +74,7 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(Cow::Borrowed(motion), start) {
             return self.all_windows(windowed);
         }
-        if let Some(rounder) = self.rounder(motion, start) {
+        if let Some(rounder) = self.rounder(motion, start)? {
             return self.or_straight(motion, start, rounder);
         }
         let planned = match self.blended(motion, start, motion) {
@@ -84,15 +84,31 @@ impl<const N: usize> Planner<N> {
                 if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
                     return Err(error);
                 }
-                let other = match self.instead(motion, start, spans) {
-                    Some(other) => other,
-                    None => self.nearer(motion, start, error)?,
-                };
-                let found = self.with_joints(motion, start, Course::of(&other));
-                found.unwrap_or(other)
+                self.elsewhere(motion, start, (error, spans))?
             }
         };
         self.or_straight(motion, start, planned)
+    }
+
+    /// The motion of a search with the joints that begins at straight moves or at a motion along another curve than the first, which
+    /// failed with the joints and has so many spans; if there is none, that motion.
+    fn elsewhere(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (error, spans): (MotionError, usize),
+    ) -> Result<PlannedMove<N>, MotionError> {
+        if !Self::has_many(motion)
+            && let Ok(Some(found)) = self.searched_from_stops(motion, start)
+        {
+            return Ok(found);
+        }
+        let other = match self.instead(motion, start, spans) {
+            Some(other) => other,
+            None => self.nearer(motion, start, error)?,
+        };
+        let found = self.with_joints(motion, start, Course::of(&other));
+        Ok(found.unwrap_or(other))
     }
 
     /// A motion nearer to the legs than one that failed with the joints: within a quarter of the tolerance, or with stops.
@@ -253,7 +269,7 @@ impl<const N: usize> Planner<N> {
 
     /// A straight move to each pose in turn, with a stop at each; [`MotionError::NoWay`], as soon as that is known, where
     /// they take `most` (s) or longer.
-    fn straight_moves(
+    pub(super) fn straight_moves(
         &self,
         motion: &Move,
         (start, most): (&SVector<f64, N>, f64),
