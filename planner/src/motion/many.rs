@@ -7,7 +7,6 @@
 use nalgebra::SVector;
 
 use super::course::Course;
-use super::rounder::{is_dense, sooner};
 use super::smooth::{Failure, Search};
 use super::smooth_joints::Followed;
 use super::{MotionError, PlannedMove, Planner};
@@ -125,7 +124,7 @@ impl<const N: usize> Planner<N> {
                 }
             };
             let time = course.time;
-            if is_dense(&curve) || k == 0 && time <= RULED * curve.path.plan.duration() {
+            if curve.is_dense() || k == 0 && time <= RULED * curve.path.plan.duration() {
                 return None;
             }
             let found = self.with_joints(motion, start, course);
@@ -204,4 +203,14 @@ impl<const N: usize> Planner<N> {
         };
         self.curve(start, (&slower, search), true)
     }
+}
+
+/// The motion that ends first.
+pub(super) fn sooner<const N: usize>(
+    found: Option<PlannedMove<N>>,
+    other: PlannedMove<N>,
+) -> PlannedMove<N> {
+    let time = other.trajectory.duration();
+    let found = found.filter(|found| found.trajectory.duration() <= time);
+    found.unwrap_or(other)
 }

@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, SVector};
 
 use super::course::Course;
-use super::many::BEGINNINGS;
+use super::many::{BEGINNINGS, sooner};
 use super::smooth::{Along, Search};
 use super::smooth_joints::{Followed, HELPED};
 use super::{MotionError, PlannedMove, Planner};
@@ -38,9 +38,6 @@ const FEW: usize = 20;
 /// A list of more poses than so is dear to plan for the tool alone: one that is dense is not searched with the joints, and one that
 /// does not turn is searched in parts.
 const MANY: usize = 60;
-/// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
-const DENSE: f64 = 4.0;
-
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
 struct Known {
@@ -170,7 +167,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        if motion.poses.len() > MANY && is_dense(curve) {
+        if motion.poses.len() > MANY && curve.is_dense() {
             return None;
         }
         self.with_joints(motion, start, Course::of(planned))
@@ -184,7 +181,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        let is_open = motion.tolerance > 0.0 && !is_dense(curve);
+        let is_open = motion.tolerance > 0.0 && !curve.is_dense();
         if !Self::has_many(motion) || !is_open || self.turns(motion, start) {
             return None;
         }
@@ -319,20 +316,4 @@ impl<const N: usize> Planner<N> {
         }
         best
     }
-}
-
-/// The motion that ends first.
-pub(super) fn sooner<const N: usize>(
-    found: Option<PlannedMove<N>>,
-    other: PlannedMove<N>,
-) -> PlannedMove<N> {
-    let time = other.trajectory.duration();
-    let found = found.filter(|found| found.trajectory.duration() <= time);
-    found.unwrap_or(other)
-}
-
-/// Whether the poses of a curve are so near to each other that a tool that stops at each of them takes much longer.
-pub(super) fn is_dense<const N: usize>(curve: &Followed<N>) -> bool {
-    let plan = &curve.path.plan;
-    curve.path.is_fitted() || plan.exact_stop() > DENSE * plan.duration()
 }

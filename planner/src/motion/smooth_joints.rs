@@ -16,6 +16,8 @@ use crate::task::Move;
 const ENOUGH: f64 = 1e-3;
 /// Time of the joints over that of the tool from which on another way of the joints, or another curve, is worth a search.
 pub(super) const HELPED: f64 = 1.01;
+/// Time of the tool with a stop at each pose, over that without, from which on a list is dense.
+const DENSE: f64 = 4.0;
 /// A time law along a motion of the tool, whose ends rest; it is never faster.
 const ALONG: TimingOptions = TimingOptions {
     start: Boundary::Free,
@@ -233,6 +235,14 @@ pub(super) struct Followed<const N: usize> {
     pub(super) points: Vec<FollowPoint<N>>,
     /// Whether another null-space motion may be searched that helps the joints.
     may_be_helped: bool,
+}
+
+impl<const N: usize> Followed<N> {
+    /// Whether the poses of the curve are so near to each other that a tool that stops at each of them takes much longer.
+    pub(super) fn is_dense(&self) -> bool {
+        let plan = &self.path.plan;
+        self.path.is_fitted() || plan.exact_stop() > DENSE * plan.duration()
+    }
 }
 
 /// The smooth motion of the tool that the joints are to follow.
