@@ -38,6 +38,7 @@ const FEW: usize = 20;
 /// A list of more poses than so is dear to plan for the tool alone: one that is dense is not searched with the joints, and one that
 /// does not turn is searched in parts.
 const MANY: usize = 60;
+
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
 struct Known {
