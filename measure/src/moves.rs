@@ -64,12 +64,7 @@ impl RandomMoves {
     }
 
     fn measure_with<const N: usize>(&self, robot: &Robot) -> Result<Vec<PlanningTime>, RobotError> {
-        let planner = Planner::new(
-            &robot.chain::<N>()?,
-            Isometry3::identity(),
-            robot.joint_limits::<N>(),
-            robot.joint_names(),
-        );
+        let planner = robot.planner::<N>()?;
         let mut random = Random::scattered(self.seed);
         let mut times = Vec::with_capacity(self.count);
         for _ in 0..self.count {

@@ -76,7 +76,7 @@ impl Trial {
     }
 
     fn measure_with<const N: usize>(&self, robot: &Robot) -> Result<Measure, RobotError> {
-        let planner = planner_of::<N>(robot)?;
+        let planner = robot.planner::<N>()?;
         let home: SVector<f64, N> = vector(&robot.home);
         Ok(match self.find(&planner, &home) {
             Ok(found) => {
@@ -91,7 +91,7 @@ impl Trial {
         &self,
         robot: &Robot,
     ) -> Result<Result<Traced, String>, RobotError> {
-        let planner = planner_of::<N>(robot)?;
+        let planner = robot.planner::<N>()?;
         let home: SVector<f64, N> = vector(&robot.home);
         let found = self.find(&planner, &home).map_err(|(reason, _)| reason);
         Ok(found.map(|found| {
@@ -225,15 +225,6 @@ impl<const N: usize> Found<N> {
         };
         planner.plan(&stops, &self.start).ok()
     }
-}
-
-fn planner_of<const N: usize>(robot: &Robot) -> Result<Planner<N>, RobotError> {
-    Ok(Planner::new(
-        &robot.chain::<N>()?,
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    ))
 }
 
 #[cfg(test)]

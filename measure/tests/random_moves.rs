@@ -30,16 +30,6 @@ fn walk<const N: usize>(
     (0..count).map(|_| next()).collect()
 }
 
-/// Plans for a robot with its flange as the controlled point.
-fn planner<const N: usize>(robot: &Robot) -> Planner<N> {
-    Planner::new(
-        &robot.chain::<N>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    )
-}
-
 /// A smooth move through poses.
 fn smooth(robot: &Robot, poses: Vec<Isometry3<f64>>) -> Move {
     Move {
@@ -52,7 +42,7 @@ fn smooth(robot: &Robot, poses: Vec<Isometry3<f64>>) -> Move {
 
 /// How long the motion through a walk takes, s.
 fn through_walk<const N: usize>(robot: &Robot, size: (usize, u64)) -> Option<f64> {
-    let (planner, home) = (planner(robot), vector::<N>(&robot.home));
+    let (planner, home) = (robot.planner().unwrap(), vector::<N>(&robot.home));
     let motion = smooth(robot, walk(&planner, &home, size));
     let planned = planner.plan(&motion, &home).ok()?;
     Some(planned.trajectory.duration())
@@ -108,7 +98,7 @@ fn a_search_begins_at_straight_moves_too() {
 #[test]
 fn many_poses_are_refused_for_their_reason() {
     let robot = robot::load("ur5e").unwrap();
-    let (planner, home) = (planner::<6>(&robot), vector::<6>(&robot.home));
+    let (planner, home) = (robot.planner().unwrap(), vector::<6>(&robot.home));
     let is_straight = |motion: &Move| {
         let mut joints = home;
         motion.poses.iter().all(|pose| {

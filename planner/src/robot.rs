@@ -27,7 +27,7 @@ use nalgebra::{Isometry3, SVector};
 use std::path::{Path, PathBuf};
 
 use crate::end_effector::{EndEffector, Gripper, ToolChanger};
-use crate::motion::Efforts;
+use crate::motion::{Efforts, Planner};
 use crate::tooling::{Holder, Tooling};
 
 /// Shares of the maker's limits that are planned with, each above 0 and at most 1. An arm whose
@@ -317,6 +317,27 @@ impl Robot {
             jerk: vector(&joints.jerk),
             ends: joints.ends.as_ref().map(EndSpeeds::vectors),
         }
+    }
+
+    /// A planner of motions of the flange, in the frame of the workstation, without limits of efforts.
+    ///
+    /// # Errors
+    /// [`RobotError::Urdf`] when the robot does not have `N` joints.
+    ///
+    /// # Examples
+    /// ```
+    /// let panda = planner::robot::load("panda")?;
+    /// assert_eq!(panda.planner::<7>()?.chain().lower().len(), 7);
+    /// assert!(panda.planner::<6>().is_err());
+    /// # Ok::<(), planner::robot::RobotError>(())
+    /// ```
+    pub fn planner<const N: usize>(&self) -> Result<Planner<N>, RobotError> {
+        Ok(Planner::new(
+            &self.chain()?,
+            Isometry3::identity(),
+            self.joint_limits(),
+            self.joint_names(),
+        ))
     }
 
     /// The limits of efforts with the masses of the arm and of what it carries at the start; `None` if the

@@ -224,12 +224,7 @@ fn one_move<const N: usize>(
 }
 
 fn on_robot<const N: usize>(robot: &Robot, counts: Counts, seed: u64, seen: &mut [Seen; 3]) {
-    let planner = Planner::new(
-        &robot.chain::<N>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    );
+    let planner = robot.planner::<N>().unwrap();
     let mut random = Random(seed);
     for kind in 0..counts.moves {
         let seen = &mut seen[kind % 3];

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use kinematics::Inertia;
-use nalgebra::{Isometry3, SVector, vector};
+use nalgebra::{SVector, vector};
 use planner::controller::Controller;
 use planner::motion::{PlannedMove, Planner};
 use planner::robot::{self, Robot};
@@ -19,13 +19,7 @@ fn ur5e(effort: bool) -> Robot {
 }
 
 fn planner(robot: &Robot) -> Planner<6> {
-    Planner::new(
-        &robot.chain::<6>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<6>(),
-        robot.joint_names(),
-    )
-    .with_efforts(robot.efforts())
+    robot.planner::<6>().unwrap().with_efforts(robot.efforts())
 }
 
 /// The largest effort over its limit, at 2000 times.

@@ -10,15 +10,6 @@ use proptest::test_runner::RngSeed;
 
 type Joints = SVector<f64, 7>;
 
-fn planner(robot: &Robot) -> Planner<7> {
-    Planner::new(
-        &robot.chain::<7>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<7>(),
-        robot.joint_names(),
-    )
-}
-
 /// The maker's formula with the maker's numbers, written out once more: the largest speed upwards and
 /// downwards of each joint of the FR3.
 fn allowed(q: &Joints) -> [[f64; 2]; 7] {
@@ -95,7 +86,7 @@ proptest! {
     #[test]
     fn the_fr3_is_slower_near_the_ends(start in joints(), goal in joints()) {
         let robot = robot::load("fr3").unwrap();
-        let planner = planner(&robot);
+        let planner = robot.planner::<7>().unwrap();
         let planned = planner.plan(&joint_move(&planner, &goal), &start);
         let Ok(planned) = planned else {
             return Err(TestCaseError::fail(format!("{}", planned.unwrap_err())));
@@ -116,7 +107,7 @@ fn a_motion_to_an_end_is_slower_only_where_it_must() {
     let start = Joints::from_column_slice(&robot.home);
     let mut goal = start;
     (goal[0], goal[1]) = (2.72, 1.2);
-    let (with, free) = (planner(&robot), without(&robot));
+    let (with, free) = (robot.planner::<7>().unwrap(), without(&robot));
     let slow = with.actuate(&to(&goal), &start).unwrap();
     let fast = free.actuate(&to(&goal), &start).unwrap();
     let (before, after) = (worst(&fast), worst(&slow));
@@ -144,7 +135,10 @@ fn to(goal: &Joints) -> planner::task::JointMove {
 #[test]
 fn jogs_reach_the_ends() {
     let robot = robot::load("fr3").unwrap();
-    let (planner, start) = (planner(&robot), Joints::from_column_slice(&robot.home));
+    let (planner, start) = (
+        robot.planner::<7>().unwrap(),
+        Joints::from_column_slice(&robot.home),
+    );
     for joint in 0..7 {
         for sign in [-1.0, 1.0] {
             let mut shares = Joints::zeros();

@@ -28,12 +28,7 @@ fn near(pose: &Isometry3<f64>, far: f64, turned: f64, state: &mut u64) -> Isomet
 
 /// The planner of a robot, and its home.
 fn planner_at_home<const N: usize>(robot: &Robot) -> (Planner<N>, SVector<f64, N>) {
-    let planner = Planner::new(
-        &robot.chain::<N>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    );
+    let planner = robot.planner::<N>().unwrap();
     (planner, vector(&robot.home))
 }
 

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Quaternion, SVector, Translation3, UnitQuaternion, Vector3};
 use planner::motion::{MotionError, Planner};
-use planner::robot::{Robot, load};
+use planner::robot::load;
 use planner::task::{Move, Shape};
 
 /// Numbers from -1 to 1, the same each time.
@@ -17,22 +17,12 @@ fn random(state: &mut u64) -> f64 {
     2.0 * (*state >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
 }
 
-/// Plans for a robot with its flange as the controlled point.
-fn planner<const N: usize>(robot: &Robot) -> Planner<N> {
-    Planner::new(
-        &robot.chain::<N>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<N>(),
-        robot.joint_names(),
-    )
-}
-
 /// Where straight moves reach all poses in turn, a smooth move is never refused, and never slower: not
 /// even where the joints cannot follow the fastest curve of the tool.
 #[test]
 fn what_straight_moves_reach_is_never_refused() {
     let robot = load("ur5e").unwrap();
-    let planner = planner::<6>(&robot);
+    let planner = robot.planner::<6>().unwrap();
     let (mut state, mut both) = (3, 0);
     for round in 0..ROUNDS {
         let start = SVector::<f64, 6>::from_fn(|_, _| 3.0 * random(&mut state));
@@ -84,7 +74,7 @@ const ROUNDS: usize = 60;
 #[test]
 fn where_joints_rule_a_rounder_curve_does_not_rest() {
     let robot = load("panda").unwrap();
-    let planner = planner::<7>(&robot);
+    let planner = robot.planner::<7>().unwrap();
     let start = [
         -1.2957, -1.23366, -1.04046, -2.96238, -2.64457, 1.74466, 1.93886,
     ];
@@ -205,7 +195,7 @@ fn searches_near_a_singular_place_go_on() {
         tolerance: 0.01,
         limits: robot.motion_limits(),
     };
-    let planned = planner::<6>(&robot).plan(&smooth, &start).unwrap();
+    let planned = robot.planner::<6>().unwrap().plan(&smooth, &start).unwrap();
     let time = planned.trajectory.duration();
     assert!(time <= 3.0, "{time} s");
 }
@@ -213,7 +203,7 @@ fn searches_near_a_singular_place_go_on() {
 /// Time of the motion through a random walk of 64 poses, and of those through half of them each, with a stop between, s.
 fn whole_and_halves(seed: u64) -> [f64; 2] {
     let robot = load("ur5e").unwrap();
-    let planner = planner::<6>(&robot);
+    let planner = robot.planner::<6>().unwrap();
     let home = SVector::<f64, 6>::from_column_slice(&robot.home);
     let poses = walk(&planner.chain().forward(&home), seed);
     let through = |poses: &[Isometry3<f64>]| Move {

@@ -3,7 +3,7 @@
 
 use kinematics::follow::{FollowOptions, TwistPoint, follow_choosing};
 use kinematics::{Chain, Solver};
-use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
+use nalgebra::{SVector, UnitQuaternion, Vector3};
 use planner::motion::{BlockedCause, MotionError, Planner};
 use planner::robot::{Robot, load};
 use planner::task::{Move, Shape};
@@ -28,15 +28,6 @@ fn somewhere(chain: &Chain<7>, state: &mut u64) -> SVector<f64, 7> {
         let (low, high) = (chain.lower()[i], chain.upper()[i]);
         0.5 * (low + high) + 0.4 * (high - low) * random(state)
     })
-}
-
-fn planner(robot: &Robot) -> Planner<7> {
-    Planner::new(
-        &robot.chain::<7>().unwrap(),
-        Isometry3::identity(),
-        robot.joint_limits::<7>(),
-        robot.joint_names(),
-    )
 }
 
 /// A short straight move from somewhere.
@@ -92,7 +83,7 @@ fn with_ease(
 fn the_spare_joint_makes_straight_moves_fast() {
     for (name, expected) in [("panda", 0.97), ("iiwa7", 0.99)] {
         let robot = load(name).unwrap();
-        let (planner, limits) = (planner(&robot), robot.motion_limits());
+        let (planner, limits) = (robot.planner::<7>().unwrap(), robot.motion_limits());
         let solver = Solver::new(*planner.chain());
         let (mut state, mut logs) = (2026, Vec::new());
         while logs.len() < 40 {
@@ -117,7 +108,7 @@ fn the_spare_joint_makes_straight_moves_fast() {
 #[test]
 fn a_goal_out_of_reach_is_named() {
     let robot = load("panda").unwrap();
-    let planner = planner(&robot);
+    let planner = robot.planner::<7>().unwrap();
     let (mut state, mut named) = (2026, 0);
     for i in 0..400 {
         let (start, motion) = random_move(&robot, &planner, &mut state);
