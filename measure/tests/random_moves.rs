@@ -48,6 +48,18 @@ fn through_walk<const N: usize>(robot: &Robot, size: (usize, u64)) -> Option<f64
     Some(planned.trajectory.duration())
 }
 
+/// How long the last of so many random smooth moves takes, s.
+fn through_random(robot: &Robot, (count, seed): (usize, u64)) -> f64 {
+    let moves = RandomMoves {
+        shape: Shape::Smooth,
+        count,
+        seed,
+        clock: || 0.0,
+    };
+    let times = moves.measure(robot).unwrap();
+    times[count - 1].motion.unwrap()
+}
+
 /// Walks of 28 poses, from curves of the tool that are found by short searches. From the fastest curve of the tool the first took 4.219 s,
 /// and no motion was found through the second.
 #[test]
@@ -65,14 +77,7 @@ fn many_poses_are_searched_from_rough_curves() {
 /// Random moves of a Panda along which its spare joint turns far: one function of the joints tells where it is all along.
 #[test]
 fn the_spare_joint_is_known_along_the_whole_motion() {
-    let moves = RandomMoves {
-        shape: Shape::Smooth,
-        count: 5,
-        seed: 77,
-        clock: || 0.0,
-    };
-    let times = moves.measure(&robot::load("panda").unwrap()).unwrap();
-    let time = times[4].motion.unwrap();
+    let time = through_random(&robot::load("panda").unwrap(), (5, 77));
     // Known in its middle only it takes 1.57 s.
     assert!(time <= 1.0, "{time} s");
 }
@@ -83,14 +88,7 @@ fn the_spare_joint_is_known_along_the_whole_motion() {
 fn a_search_begins_at_straight_moves_too() {
     let time = through_walk::<7>(&robot::load("panda").unwrap(), (32, 5)).unwrap();
     assert!(time <= 4.5, "{time} s");
-    let moves = RandomMoves {
-        shape: Shape::Smooth,
-        count: 9,
-        seed: 12,
-        clock: || 0.0,
-    };
-    let times = moves.measure(&robot::load("ur5e").unwrap()).unwrap();
-    let time = times[8].motion.unwrap();
+    let time = through_random(&robot::load("ur5e").unwrap(), (9, 12));
     assert!(time <= 2.8, "{time} s");
 }
 

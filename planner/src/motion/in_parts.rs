@@ -13,9 +13,8 @@ use trajectory::smooth::{angular_tolerance, off_segment};
 use trajectory::{JointPoint, ToolCurve, ToolPoint};
 
 use super::certificate::{Arm, corridor};
-use super::course::Course;
 use super::draft::Crossing;
-use super::many::{BEGINNINGS, Beginning, sooner};
+use super::many::{BEGINNINGS, Beginning, or_sooner};
 use super::seam::{Part, Seam};
 use super::smooth_joints::{Followed, HELPED};
 use super::{Blend, PlannedMove, Planner};
@@ -147,21 +146,15 @@ fn is_whole(size: usize, poses: usize) -> bool {
 }
 
 impl<const N: usize> Planner<N> {
-    /// The motion through a list whose parts are searched for themselves: the faster one of those along two divisions of it.
+    /// The motion through a list of more than one part, each of which is searched for itself: the faster one of those along two
+    /// divisions of the list.
     pub(super) fn in_parts(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Option<PlannedMove<N>> {
-        let [few, many] = PARTS;
-        let found = self.in_parts_of(few, motion, start);
-        if Self::is_one_part(motion) {
-            return found;
-        }
-        match self.in_parts_of(many, motion, start) {
-            Some(other) => Some(sooner(found, other)),
-            None => found,
-        }
+        let [few, many] = PARTS.map(|size| self.in_parts_of(size, motion, start));
+        or_sooner(few, many)
     }
 
     /// Whether a list is no more than one part.
@@ -202,7 +195,7 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The joints along the fastest curve that is found through the poses of a part.
+    /// The joints along the fastest curve that is found through the poses of a part; from straight moves only where they follow no other.
     fn part(
         &self,
         motion: &Move,
@@ -235,16 +228,11 @@ impl<const N: usize> Planner<N> {
                 break;
             }
         }
-        match best {
-            Some((_, followed)) => Some(followed),
-            None => self.part_from_stops(&part, start),
-        }
-    }
-
-    /// The joints along the curve that a search of a part finds which begins at straight moves to each of its poses.
-    fn part_from_stops(&self, part: &Move, start: &SVector<f64, N>) -> Option<Followed<N>> {
-        let straights = self.straight_moves(part, (start, f64::INFINITY)).ok()?;
-        self.searched_along(part, start, Course::of(&straights))
+        let from_stops = || {
+            let stops = self.stops(&part, start).ok()?;
+            self.searched_along(&part, start, stops)
+        };
+        best.map(|(_, followed)| followed).or_else(from_stops)
     }
 
     /// The seam between two parts at which least time is lost.

@@ -1,8 +1,8 @@
 //! MoveSmoothlyTo through many poses that turn, where the joints rule: searches with the joints that begin at rough curves of the tool,
 //! which short searches find, and at straight moves to each pose in turn.
 //!
-//! The fastest curve of the tool takes ten times the planning there and is of no use. A move whose joints follow none of the rough curves
-//! and cannot make the straight moves either is refused.
+//! The fastest curve of the tool takes ten times the planning there and is of no use. A move is refused whose joints follow none of the
+//! rough curves and cannot make the straight moves, and for whose parts no motion is found either.
 
 use nalgebra::SVector;
 
@@ -66,9 +66,7 @@ impl<const N: usize> Tried<N> {
 
     /// With another motion.
     fn add(&mut self, found: Option<PlannedMove<N>>) {
-        if let Some(other) = found {
-            self.found = Some(sooner(self.found.take(), other));
-        }
+        self.found = or_sooner(self.found.take(), found);
     }
 
     /// Whether no other beginning is worth a search.
@@ -89,7 +87,7 @@ impl<const N: usize> Planner<N> {
     ///
     /// # Errors
     ///
-    /// [`MotionError`] if the joints follow no rough curve and cannot make the straight moves.
+    /// [`MotionError`] if the joints follow no rough curve and cannot make the straight moves, and no motion is found in parts.
     pub(super) fn through_many(
         &self,
         motion: &Move,
@@ -149,8 +147,21 @@ impl<const N: usize> Planner<N> {
         if !Self::has_inverse() {
             return Ok(None);
         }
+        Ok(self.with_joints(motion, start, self.stops(motion, start)?))
+    }
+
+    /// The course of straight moves to each pose in turn, with a stop at each.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`Planner::searched_from_stops`].
+    pub(super) fn stops(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Course<N>, MotionError> {
         let straights = self.straight_moves(motion, (start, f64::INFINITY))?;
-        Ok(self.with_joints(motion, start, Course::of(&straights)))
+        Ok(Course::of(&straights))
     }
 
     /// The fastest motion that was found, also of the parts of a list; if there is none, that along a rough curve.
@@ -202,6 +213,17 @@ impl<const N: usize> Planner<N> {
             ..motion.clone()
         };
         self.curve(start, (&slower, search), true)
+    }
+}
+
+/// The motion that ends first, if one is found.
+pub(super) fn or_sooner<const N: usize>(
+    found: Option<PlannedMove<N>>,
+    other: Option<PlannedMove<N>>,
+) -> Option<PlannedMove<N>> {
+    match other {
+        Some(other) => Some(sooner(found, other)),
+        None => found,
     }
 }
 

@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, SVector};
 
 use super::course::Course;
-use super::many::{BEGINNINGS, sooner};
+use super::many::{BEGINNINGS, or_sooner, sooner};
 use super::smooth::{Along, Search};
 use super::smooth_joints::{Followed, HELPED};
 use super::{MotionError, PlannedMove, Planner};
@@ -109,10 +109,7 @@ impl<const N: usize> Planner<N> {
             return Some(found);
         }
         let other = self.searched_from_stops(motion, start).ok().flatten();
-        Some(match other {
-            Some(other) => sooner(Some(found), other),
-            None => found,
-        })
+        or_sooner(Some(found), other)
     }
 
     /// The joints along a curve that is found by a short search, if they rule.
