@@ -299,10 +299,13 @@ impl<const N: usize> Runner<N> {
     pub fn tick(&mut self, came: bool, tick: Tick) -> &Setpoint {
         self.tick = tick.number;
         self.watch_stall(tick.skipped);
+        let was_ready = self.ready;
         self.take_state(came, tick);
         self.record();
         self.obey();
-        self.feed();
+        if was_ready || self.fault.is_some() {
+            self.feed();
+        }
         self.watch_guards();
         self.move_on();
         self.watch_arrival();
@@ -345,7 +348,9 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Takes planned work from the ring.
+    /// Takes planned work from the ring: from the period on after the one in which the driver became
+    /// active. In lock-step time may stand from there until work comes, so work that waits already must
+    /// not begin sooner than work that comes then.
     fn feed(&mut self) {
         for _ in 0..A_PERIOD {
             let Ok(item) = self.items.peek() else { return };

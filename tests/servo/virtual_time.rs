@@ -5,9 +5,14 @@ mod following;
 mod orders;
 mod payloads;
 
-use ipc::{Clock, DriverState, FaultCode, HelloAck, Setpoint, SetpointFlags, State, Verdict};
+use ipc::{
+    Clock, DriverState, FaultCode, GRIPPER, HelloAck, Setpoint, SetpointFlags, State, ToolAction,
+    Verdict,
+};
 use realtime::{Piece, Sample, Segment};
-use servo::{Control, Event, ExecutorConfig, Fault, Monitor, Remote, Runner, SegmentSender, Tick};
+use servo::{
+    Control, Event, ExecutorConfig, Fault, Monitor, Remote, Runner, SegmentSender, Tick, ToolOrder,
+};
 use system_tests::servo_arm::{JOINTS, executor_config, feed, home, limits, planned};
 
 /// A runner, its handles, and a driver that is always exactly at the last setpoint.
@@ -111,6 +116,34 @@ impl Bench {
                 assert!(second.abs() <= limits.acceleration[joint] * (1.0 + 1e-6) + 1e-8);
             }
         }
+    }
+}
+
+/// Work that waits when the driver becomes active begins in the same period as work that comes then: in
+/// lock-step, where time stands until it comes, how fast the planner is must not change a run.
+#[test]
+fn work_begins_in_the_same_period_whenever_it_came() {
+    let order = ToolOrder::new(1, GRIPPER, ToolAction::Close, 1.0);
+    let hand_over = |bench: &mut Bench, tool: bool| {
+        if tool {
+            bench.sender.tool(order).unwrap();
+        } else {
+            assert!(feed(&mut bench.sender, 0));
+        }
+    };
+    let begins = |tool: bool, before: u64| {
+        let mut bench = Bench::new();
+        bench.run(before);
+        hand_over(&mut bench, tool);
+        bench.run(4 - before);
+        let started = bench.events().into_iter().find_map(|event| match event {
+            Event::Started { tick, .. } => Some(tick),
+            _ => None,
+        });
+        started.unwrap()
+    };
+    for tool in [false, true] {
+        assert_eq!(begins(tool, 0), begins(tool, 1), "a tool order: {tool}");
     }
 }
 
