@@ -285,8 +285,37 @@ fn limits_of(span: &Span, options: &SmoothOptions, certificate: &mut Certificate
 /// Greatest distance from the leg being travelled over the half width.
 fn corridor(spans: &[Span], poses: &[Isometry3<f64>], crossings: &[Crossing], width: f64) -> Peak {
     let mut peak = Peak::default();
+    along_legs(spans, poses, crossings, width, |_, ratio, time| {
+        peak.raise(ratio, time);
+    });
+    peak
+}
+
+/// The same by leg, at the index of the pose at its end.
+pub(super) fn corridor_of_legs(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    crossings: &[Crossing],
+    width: f64,
+) -> Vec<f64> {
+    let mut most = vec![0.0_f64; poses.len()];
+    along_legs(spans, poses, crossings, width, |leg, ratio, _| {
+        most[leg] = most[leg].max(ratio);
+    });
+    most
+}
+
+/// Tells each part of a span that is travelled on one leg: the index of the pose at the end of the leg, the greatest distance
+/// from the leg over the half width, and the time in the middle of the part (s).
+fn along_legs(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    crossings: &[Crossing],
+    width: f64,
+    mut tell: impl FnMut(usize, f64, f64),
+) {
     if width.is_infinite() {
-        return peak;
+        return;
     }
     let room = width + RESOLUTION;
     let mut at = 0;
@@ -308,10 +337,8 @@ fn corridor(spans: &[Span], poses: &[Isometry3<f64>], crossings: &[Crossing], wi
             let to = (until - span.start).clamp(0.0, span.duration);
             if to > from {
                 let control = span.position_control(from, to);
-                peak.raise(
-                    away(&control, &ends, room, 5) / room,
-                    span.start + (from + to) / 2.0,
-                );
+                let ratio = away(&control, &ends, room, 5) / room;
+                tell(leg, ratio, span.start + (from + to) / 2.0);
             }
             if span.end() > until || at + 1 == spans.len() {
                 break;
@@ -319,7 +346,6 @@ fn corridor(spans: &[Span], poses: &[Isometry3<f64>], crossings: &[Crossing], wi
             at += 1;
         }
     }
-    peak
 }
 
 /// Upper bound of the distance of a Bernstein form from a segment: the

@@ -2,20 +2,21 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{Certificate, certify_made, certify_slowed};
+use super::certificate::{certify_made, certify_slowed};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
+use super::judged::Judged;
 use super::method::Method;
 use super::missed;
 use super::motion::Motion;
-use super::narrowing::{between, broken, narrow, narrow_missed};
+use super::narrowing::{between, broken, narrow, narrow_legs, narrow_missed};
 use super::options::SmoothOptions;
 use super::rest::RestCause;
 use super::seed::Seed;
 use super::shares::Shares;
 use super::span::Span;
 pub(crate) use super::span::stretch;
-use super::spline::{self, Effort, Found, Moving, Request};
+use super::spline::{self, Ahead, Effort, Found, Moving, Request};
 use crate::ToolPoint;
 
 /// Effort of one spline, but for the gap to its optimum.
@@ -48,8 +49,12 @@ pub(super) fn arm_effort(gap: f64, aimed: f64, onward: bool) -> Effort {
 /// is not followed by another.
 const HOPELESS: [f64; 2] = [10.0, 3.5];
 
-/// Attempts, the first ones, after which only the tolerances of poses that were missed are narrowed; after later ones those of all.
+/// Attempts, the first ones, after which only the tolerances of poses that were missed and the corridor along legs that were left are
+/// narrowed; after later ones those of all.
 const SINGLY: usize = 2;
+
+/// Most searches that go on from one another in a corridor that is narrower along the legs that were left.
+const INSIDE: usize = 4;
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
@@ -170,20 +175,6 @@ struct Attempts<'a> {
     turned: Option<(Vec<Span>, bool)>,
 }
 
-/// How a motion keeps what is asked of a window.
-struct Judged {
-    certificate: Certificate,
-    crossings: Vec<Crossing>,
-    /// Whether the passes do not change with what comes after it.
-    settled: bool,
-}
-
-impl Judged {
-    fn holds(&self) -> bool {
-        self.certificate.holds() && self.settled
-    }
-}
-
 impl<'a> Window<'a> {
     /// A window that starts at rest.
     pub(crate) fn from_rest(
@@ -296,10 +287,13 @@ impl Attempts<'_> {
             if seen.holds() {
                 return Some((spans, retried));
             }
-            if attempt == 0
-                && let Some(spans) = self.forward(&request, (&seed, &seen))
-            {
-                return Some((spans, true));
+            if attempt == 0 {
+                if let Some(spans) = self.forward(&request, (&seed, &seen)) {
+                    return Some((spans, true));
+                }
+                if let Some(spans) = self.inside(&request, (&spans, seed, &seen)) {
+                    return Some((spans, retried));
+                }
             }
             let Judged {
                 certificate,
@@ -319,7 +313,8 @@ impl Attempts<'_> {
                 return None;
             }
             let fast = certificate.worst_limit() > SLOWED;
-            let couple = ((attempt == 1 && self.dear) || fast) && turns;
+            let again = attempt == 1 && self.dear && !seen.only_leaves();
+            let couple = (again || fast) && turns;
             self.coupled = Some(request.coupled || couple);
             if couple && !request.coupled {
                 // What an orientation exceeds that follows the path says nothing about the optimum.
@@ -328,7 +323,7 @@ impl Attempts<'_> {
             }
             retried |= broken(certificate, crossings) > FAR;
             let coupled = request.coupled && places;
-            self.narrow(attempt, &seen, coupled)?;
+            self.narrow(attempt, (&spans, &seen), coupled)?;
         }
         None
     }
@@ -359,9 +354,40 @@ impl Attempts<'_> {
         }
         let backwards = self.window.backwards;
         [false, true].into_iter().find_map(|both| {
-            let mut spans = spline::forward(request, seed, [backwards, both])?.spans;
+            let ahead = Some(Ahead { backwards, both });
+            let mut spans = spline::further(request, seed, ahead)?.spans;
             self.judge(&mut spans).holds().then_some(spans)
         })
+    }
+
+    /// A motion that holds, from where searches ended that leave the corridor between its samples, and keep all else: the corridor is
+    /// narrowed along the legs where they do.
+    fn inside(
+        &self,
+        request: &Request<'_>,
+        (spans, mut seed, seen): (&[Span], Seed, &Judged),
+    ) -> Option<Vec<Span>> {
+        let Window { poses, options, .. } = self.window;
+        let outside = |spans: &[Span], seen: &Judged| {
+            let outside = || seen.outside(spans, poses, options.corridor());
+            seen.only_leaves().then(outside)
+        };
+        let mut left = outside(spans, seen);
+        let mut shares = request.shares.clone();
+        for _ in 0..INSIDE {
+            narrow_legs(&mut shares, &left?);
+            let narrower = Request {
+                shares: &shares,
+                ..*request
+            };
+            let mut found = spline::further(&narrower, &seed, None)?;
+            let seen = self.judge(&mut found.spans);
+            if seen.holds() {
+                return Some(found.spans);
+            }
+            (left, seed) = (outside(&found.spans, &seen), found.seed);
+        }
+        None
     }
 
     /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are
@@ -404,19 +430,27 @@ impl Attempts<'_> {
     fn narrow(
         &mut self,
         attempt: usize,
-        Judged {
+        (spans, seen): (&[Span], &Judged),
+        coupled: bool,
+    ) -> Option<()> {
+        let Judged {
             certificate,
             crossings,
             settled,
-        }: &Judged,
-        coupled: bool,
-    ) -> Option<()> {
-        let Window { moving, finish, .. } = self.window;
+        } = seen;
+        let Window {
+            poses,
+            options,
+            moving,
+            finish,
+            ..
+        } = self.window;
         let before = (self.inner.clone(), self.shares.clone());
         // With other bounds that are broken more poses are missed than those that show it.
-        let only = certificate.corridor.ratio <= 1.0 && certificate.worst_limit() <= 1.0;
-        if only && attempt < SINGLY {
+        if seen.only_leaves() || certificate.worst_limit() <= 1.0 && attempt < SINGLY {
             narrow_missed(&mut self.shares, crossings, coupled);
+            let outside = seen.outside(spans, poses, options.corridor());
+            narrow_legs(&mut self.shares, &outside);
         } else {
             narrow(&mut self.inner, certificate, crossings, coupled);
         }

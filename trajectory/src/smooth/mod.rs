@@ -23,6 +23,7 @@ mod exact_stop;
 mod fade;
 mod for_arm;
 mod found;
+mod judged;
 mod list;
 mod lower_bound;
 mod method;

@@ -26,7 +26,7 @@ pub(super) fn narrow(
     coupled: bool,
 ) {
     if certificate.corridor.ratio > 1.0 {
-        options.corridor = Some(options.corridor() * 0.98 / certificate.corridor.ratio.min(4.0));
+        options.corridor = Some(options.corridor() * beside(certificate.corridor.ratio));
     }
     let (mut far, mut turned) = (1.0_f64, 1.0_f64);
     for crossing in crossings.iter().filter(|crossing| !crossing.holds()) {
@@ -53,6 +53,25 @@ fn within(missed: f64) -> f64 {
         0.9 / missed.min(10.0)
     } else {
         1.0
+    }
+}
+
+/// The share of a corridor within which a motion is searched for that was outside of it by a factor.
+fn beside(outside: f64) -> f64 {
+    if outside > 1.0 {
+        0.98 / outside.min(4.0)
+    } else {
+        1.0
+    }
+}
+
+/// Narrows the corridor along the legs where a motion leaves it, and along no others; `outside` is its distance from each leg over
+/// the half width, by the pose at the end of the leg.
+pub(super) fn narrow_legs(shares: &mut Shares, outside: &[f64]) {
+    for (to, outside) in outside.iter().enumerate() {
+        if *outside > 1.0 {
+            shares.narrow_leg(to, beside(*outside));
+        }
     }
 }
 
@@ -120,6 +139,22 @@ mod tests {
             tolerance: 1e-3,
             angle: 1e-2 * turned,
             angular_tolerance: 1e-2,
+        }
+    }
+
+    /// Only the corridor along legs that are left is narrowed, twice if they are left twice.
+    #[test]
+    fn only_the_corridor_that_is_left_is_narrowed() {
+        let outside = [0.0, 0.99, 1.4, 1.0, 40.0];
+        for times in [1, 2] {
+            let mut shares = Shares::default();
+            for _ in 0..times {
+                narrow_legs(&mut shares, &outside);
+            }
+            for (to, expected) in [1.0_f64, 1.0, 0.7, 1.0, 0.245, 1.0].into_iter().enumerate() {
+                let got = shares.leg(to);
+                assert!((got - expected.powi(times)).abs() < 1e-12, "{to}: {got}");
+            }
         }
     }
 

@@ -51,24 +51,6 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Found> {
     }
 }
 
-/// The same from where a search ended whose motion approaches poses before it passes them: with a place that goes forward only on
-/// the legs before these poses, or on `both` beside them. `backwards` if the motion will be made from its end
-/// to its start. `None` where that is of no use.
-pub(crate) fn forward(
-    request: &Request<'_>,
-    seed: &Seed,
-    [backwards, both]: [bool; 2],
-) -> Option<Found> {
-    let task = Task::new(request);
-    let (place, all, how) = ([true, false], [true; 2], [backwards, both]);
-    match request.moves() {
-        [true, turns] if !turns || !request.coupled => task.forward::<3, 20>(seed, place, how),
-        [true, true] if request.poses.len() <= FEW + 2 => task.forward::<6, 20>(seed, all, how),
-        [true, true] => task.forward::<6, 36>(seed, all, how),
-        _ => None,
-    }
-}
-
 /// The same for an arm, between rests.
 pub(crate) fn plan_for_arm(request: &Request<'_>) -> Option<Found> {
     let task = Task::new(request);
@@ -110,7 +92,7 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    fn new(request: &'a Request<'a>) -> Self {
+    pub(super) fn new(request: &'a Request<'a>) -> Self {
         Self {
             request,
             poses: request.poses,

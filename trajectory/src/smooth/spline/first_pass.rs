@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use super::build::{Found, Task};
-use super::problem::{Point, Problem, ways};
+use super::build::Task;
+use super::further::Ahead;
+use super::problem::{Point, Problem};
 use super::solve::{Aims, Effort, solve};
 use super::stretch::Stretch;
 use crate::smooth::crossing::{Crossing, crossings_made};
-use crate::smooth::seed::Seed;
 
 /// Most further searches of an arm and of a tool, and times in knots that are the same.
 const AGAIN: usize = 2;
@@ -33,7 +33,7 @@ impl Task<'_> {
         }
         if Problem::<D>::TURNS {
             let ahead =
-                self.ahead::<D, B>((problem, point), (effort, aims), (used, [false, false]));
+                self.ahead::<D, B>((problem, point), (effort, aims), (used, Ahead::default()));
             let holds = |(other, first): &(Problem<D>, Point<D>)| {
                 let passes = self.passes((other, first), used, false);
                 passes.missed(first, false).is_empty()
@@ -58,32 +58,13 @@ impl Task<'_> {
         }
     }
 
-    /// Searches on from where a search of the tool alone ended, with a place that goes forward only on the leg before each pose that
-    /// it approaches where it is not turned yet, or on `both` legs beside it. `None` where there are none, or no such motion is found.
-    pub(super) fn forward<const D: usize, const B: usize>(
-        &self,
-        seed: &Seed,
-        used: [bool; 2],
-        [backwards, both]: [bool; 2],
-    ) -> Option<Found> {
-        let (problem, point) = self.ended(seed, used);
-        let aims = |problem: &Problem<D>, point: &Point<D>| self.aims(problem, point);
-        let aims: Aims<'_, D> = &aims;
-        let (problem, point) = self.ahead::<D, B>(
-            (&problem, &point),
-            (self.effort(), Some(aims)),
-            (used, [backwards, both]),
-        )?;
-        Some(self.found(&problem, &point, used))
-    }
-
     /// Where searches end that go on from an iterate with a place that goes forward only. `None` where it need not, or no such
     /// motion is found.
-    fn ahead<const D: usize, const B: usize>(
+    pub(super) fn ahead<const D: usize, const B: usize>(
         &self,
         (problem, point): (&Problem<D>, &Point<D>),
         (mut effort, aims): (Effort, Option<Aims<'_, D>>),
-        (used, [backwards, both]): ([bool; 2], [bool; 2]),
+        (used, Ahead { backwards, both }): ([bool; 2], Ahead),
     ) -> Option<(Problem<D>, Point<D>)> {
         (effort.search, effort.steps) = (BEGINS * effort.search, LONGER * effort.steps);
         let (mut vertices, mut nearer) = (BTreeSet::new(), BTreeSet::new());
@@ -113,23 +94,6 @@ impl Task<'_> {
             ahead = Some((other, first));
         }
         ahead
-    }
-
-    /// The problem of a search that has ended, and its last iterate.
-    fn ended<const D: usize>(&self, seed: &Seed, used: [bool; 2]) -> (Problem<D>, Point<D>) {
-        let vertices = Seed::used(&seed.vertices);
-        let problem = Problem {
-            scale: seed.spacing,
-            ways: ways(&vertices),
-            vertices,
-            ..self.problem(used)
-        };
-        let point = Point {
-            control: Seed::used(&seed.control),
-            z: 1.0,
-            crossings: seed.crossings.clone(),
-        };
-        (problem, point)
     }
 
     /// How the motion of an iterate passes the poses.

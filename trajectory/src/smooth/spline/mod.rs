@@ -22,6 +22,7 @@ mod ends;
 mod first_pass;
 mod forward;
 mod frame;
+mod further;
 mod iterate;
 mod joint;
 mod joints;
@@ -44,7 +45,8 @@ mod turns;
 
 pub(crate) use band::Band;
 pub(crate) use basis::{START, power};
-pub(crate) use build::{Found, forward, plan, plan_for_arm};
+pub(crate) use build::{Found, plan, plan_for_arm};
+pub(crate) use further::{Ahead, further};
 pub(crate) use meet::meet_spans;
 pub(crate) use request::{Moving, Request};
 pub(crate) use solve::Effort;

@@ -126,6 +126,11 @@ impl<const D: usize> Problem<D> {
         self.shares.ball(inner, g) * self.groups[g].radius
     }
 
+    /// Half width of the corridor of group `g` along the leg to a vertex.
+    pub(super) fn width(&self, g: usize, leg: usize) -> f64 {
+        self.shares.leg(leg) * self.groups[g].width
+    }
+
     /// Whether the start or the end is in motion.
     pub(crate) fn moving(&self) -> bool {
         let start = self.start[1..].iter().flatten();

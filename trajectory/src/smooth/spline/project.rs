@@ -339,7 +339,7 @@ impl Room {
             let wanted = next + 1;
             let fits = |leg: usize, factor: f64| {
                 (0..Problem::<D>::GROUPS)
-                    .all(|g| away(problem, point, k, g, leg) < factor * problem.groups[g].width)
+                    .all(|g| away(problem, point, k, g, leg) < factor * problem.width(g, leg))
             };
             // A sample that changes legs while its point is outside the new
             // one keeps the old leg until it fits.
@@ -359,7 +359,7 @@ impl Room {
                 } else {
                     1.0
                 };
-                let width = eased * problem.groups[g].width;
+                let width = eased * problem.width(g, self.legs[k]);
                 self.widths[g][k] = narrowed(
                     self.widths[g][k],
                     far,
