@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{certify_made, certify_slowed};
+use super::certificate::{certify_made, certify_slowed, corridor_of_legs};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::judged::Judged;
@@ -287,13 +287,10 @@ impl Attempts<'_> {
             if seen.holds() {
                 return Some((spans, retried));
             }
-            if attempt == 0 {
-                if let Some(spans) = self.forward(&request, (&seed, &seen)) {
-                    return Some((spans, true));
-                }
-                if let Some(spans) = self.inside(&request, (&spans, seed, &seen)) {
-                    return Some((spans, retried));
-                }
+            if attempt == 0
+                && let Some(found) = self.gone_on(&request, (&spans, seed, &seen))
+            {
+                return Some(found);
             }
             let Judged {
                 certificate,
@@ -312,9 +309,8 @@ impl Attempts<'_> {
             if last && (slow || broken(certificate, crossings) > HOPELESS[attempt.min(1)]) {
                 return None;
             }
-            let fast = certificate.worst_limit() > SLOWED;
             let again = attempt == 1 && self.dear && !seen.only_leaves();
-            let couple = (again || fast) && turns;
+            let couple = turns && (again || certificate.worst_limit() > SLOWED);
             self.coupled = Some(request.coupled || couple);
             if couple && !request.coupled {
                 // What an orientation exceeds that follows the path says nothing about the optimum.
@@ -347,6 +343,19 @@ impl Attempts<'_> {
         }
     }
 
+    /// A motion that holds, from where the first search ended, and whether that failed by far.
+    fn gone_on(
+        &self,
+        request: &Request<'_>,
+        (spans, seed, seen): (&[Span], Seed, &Judged),
+    ) -> Option<(Vec<Span>, bool)> {
+        let forward = self.forward(request, (&seed, seen));
+        let inside = || self.inside(request, (spans, seed, seen));
+        forward
+            .map(|spans| (spans, true))
+            .or_else(|| Some((inside()?, false)))
+    }
+
     /// A motion that holds, from where a search ended that approaches poses before the tool is turned: its place goes forward there.
     fn forward(&self, request: &Request<'_>, (seed, seen): (&Seed, &Judged)) -> Option<Vec<Span>> {
         if seen.crossings.iter().all(Crossing::holds) {
@@ -367,12 +376,7 @@ impl Attempts<'_> {
         request: &Request<'_>,
         (spans, mut seed, seen): (&[Span], Seed, &Judged),
     ) -> Option<Vec<Span>> {
-        let Window { poses, options, .. } = self.window;
-        let outside = |spans: &[Span], seen: &Judged| {
-            let outside = || seen.outside(spans, poses, options.corridor());
-            seen.only_leaves().then(outside)
-        };
-        let mut left = outside(spans, seen);
+        let mut left = seen.only_leaves().then(|| self.outside(spans, seen));
         let mut shares = request.shares.clone();
         for _ in 0..INSIDE {
             narrow_legs(&mut shares, &left?);
@@ -385,9 +389,16 @@ impl Attempts<'_> {
             if seen.holds() {
                 return Some(found.spans);
             }
-            (left, seed) = (outside(&found.spans, &seen), found.seed);
+            let outside = || self.outside(&found.spans, &seen);
+            (left, seed) = (seen.only_leaves().then(outside), found.seed);
         }
         None
+    }
+
+    /// The greatest distance of a motion from each leg over half the width of the corridor (m), by the pose at the end of the leg.
+    fn outside(&self, spans: &[Span], seen: &Judged) -> Vec<f64> {
+        let Window { poses, options, .. } = self.window;
+        corridor_of_legs(spans, poses, &seen.crossings, options.corridor())
     }
 
     /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are
@@ -433,23 +444,13 @@ impl Attempts<'_> {
         (spans, seen): (&[Span], &Judged),
         coupled: bool,
     ) -> Option<()> {
-        let Judged {
-            certificate,
-            crossings,
-            settled,
-        } = seen;
-        let Window {
-            poses,
-            options,
-            moving,
-            finish,
-            ..
-        } = self.window;
+        let (certificate, crossings) = (&seen.certificate, &seen.crossings);
+        let Window { moving, finish, .. } = self.window;
         let before = (self.inner.clone(), self.shares.clone());
         // With other bounds that are broken more poses are missed than those that show it.
         if seen.only_leaves() || certificate.worst_limit() <= 1.0 && attempt < SINGLY {
             narrow_missed(&mut self.shares, crossings, coupled);
-            let outside = seen.outside(spans, poses, options.corridor());
+            let outside = self.outside(spans, seen);
             narrow_legs(&mut self.shares, &outside);
         } else {
             narrow(&mut self.inner, certificate, crossings, coupled);
@@ -460,7 +461,7 @@ impl Attempts<'_> {
                 return None;
             }
         }
-        if certificate.in_order && !settled {
+        if certificate.in_order && !seen.settled {
             self.inner.tolerance *= 0.5;
         }
         Some(())

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use super::basis;
 use super::ends::rolled;
 use super::known::Known;
-use super::problem::{FEW, Group, Point, Problem};
+use super::problem::{Group, Point, Problem};
 use super::request::{Moving, Request};
 use super::solve::{Aims, Effort, solve};
 use super::start::{self, KNOTS_PER_RAMP};
@@ -44,8 +44,7 @@ pub(crate) fn plan(request: &Request<'_>) -> Option<Found> {
         [true, false] => task.run::<3, 20>([true, false]),
         [true, true] if !request.coupled => task.run::<3, 20>([true, false]),
         [false, true] => task.run::<3, 20>([false, true]),
-        // The passing times beside the band cost the square of their number.
-        [true, true] if request.poses.len() <= FEW + 2 => task.run::<6, 20>([true, true]),
+        [true, true] if request.has_few_poses() => task.run::<6, 20>([true, true]),
         [true, true] => task.run::<6, 36>([true, true]),
         [false, false] => None,
     }

@@ -1,7 +1,7 @@
 //! Searches of the tool alone that go on from where another one ended.
 
 use super::build::{Found, Task};
-use super::problem::{FEW, Point, Problem, ways};
+use super::problem::{Point, Problem, ways};
 use super::request::Request;
 use super::solve::{Aims, solve};
 use crate::smooth::seed::Seed;
@@ -16,7 +16,7 @@ pub(crate) fn further(request: &Request<'_>, seed: &Seed, ahead: Option<Ahead>) 
     match request.moves() {
         [true, turns] if !turns || !request.coupled => task.further::<3, 20>(seed, place, ahead),
         [false, true] if ahead.is_none() => task.further::<3, 20>(seed, turn, None),
-        [true, true] if request.poses.len() <= FEW + 2 => task.further::<6, 20>(seed, all, ahead),
+        [true, true] if request.has_few_poses() => task.further::<6, 20>(seed, all, ahead),
         [true, true] => task.further::<6, 36>(seed, all, ahead),
         _ => None,
     }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::problem::FEW;
 use super::solve::Effort;
 use super::start::KNOTS_PER_RAMP;
 use crate::ToolPoint;
@@ -59,6 +60,11 @@ impl Request<'_> {
             self.poses.iter().chain(finish).any(far) || fast(|s| s.linear[0].norm()),
             self.poses.iter().chain(finish).any(turned) || fast(|s| s.angular[0].norm()),
         ]
+    }
+
+    /// Whether the poses are so few that their passing times may stand beside the band: they cost the square of their number.
+    pub(super) fn has_few_poses(&self) -> bool {
+        self.poses.len() <= FEW + 2
     }
 
     /// True when each leg that turns takes about as long to move as to turn, so that the orientation
