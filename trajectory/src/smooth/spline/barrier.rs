@@ -41,6 +41,18 @@ impl<const D: usize> Barrier<'_, D> {
         self.look_in(Build::detect(), point, before)
     }
 
+    /// Whether an iterate, wherever it passes its poses, is within the limits of speed, acceleration and jerk, with enough left of the
+    /// slacks `before`: what [`Barrier::look`] asks for first, and only a small part of it.
+    pub(crate) fn is_limited(&self, point: &Point<D>, before: &[f64]) -> bool {
+        let barrier = self;
+        let look = Look {
+            barrier,
+            point,
+            before,
+        };
+        Build::detect().run(Limited(look))
+    }
+
     /// The same in one build.
     fn look_in(&self, build: Build, point: &Point<D>, before: &[f64]) -> Option<Seen> {
         build.run(Look {
@@ -182,7 +194,35 @@ impl<const D: usize> Op for Look<'_, D> {
     }
 }
 
+/// [`Barrier::is_limited`].
+struct Limited<'a, const D: usize>(Look<'a, D>);
+
+impl<const D: usize> Op for Limited<'_, D> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Four>(self, simd: S) -> bool {
+        let Self(look) = self;
+        let coordinates = Coordinates::of(&look.point.control);
+        (0..Problem::<D>::GROUPS).all(|g| {
+            let before = look.before.get(look.first_of(g)..).unwrap_or_default();
+            let mut slacks = Slacks::new(simd, look.barrier.keep, before, before.len());
+            look.limits(&mut slacks, &coordinates, g).is_some()
+        })
+    }
+}
+
 impl<const D: usize> Look<'_, D> {
+    /// The place of the first slack of a group among all.
+    fn first_of(&self, g: usize) -> usize {
+        let Self { barrier, point, .. } = *self;
+        let last = point.control.len() - 1;
+        let limits = (0..3).map(|k| last.saturating_sub(k)).sum::<usize>();
+        let before = barrier.problem.groups.iter().take(g);
+        let corridors = before.filter(|group| group.width.is_finite()).count();
+        g * (limits + point.crossings.len()) + corridors * point.samples()
+    }
+
     /// Adds the slacks of speed, acceleration and jerk; returns the sum of the logarithms of their
     /// bounds, which depend on `z`.
     #[inline(always)]

@@ -72,17 +72,20 @@ pub(crate) fn project<const D: usize>(
             led: problem.is_led(i),
         };
         let mut time = point.crossings[i].clamp(before, end.max(before));
-        let mut here = pass.strain(point, time);
+        // Where the orientation is searched, too, a step is taken only to where the strain is seen to be less.
+        let mut seen = Problem::<D>::TURNS.then(|| point.at(time));
+        let mut here = seen.map(|seen| pass.strain(&seen));
         for _ in 0..rounds {
-            let Some(step) = pass.step(point, time) else {
+            let Some(step) = pass.step(&seen.unwrap_or_else(|| point.at(time))) else {
                 break;
             };
             let (mut share, mut moved) = (1.0, false);
             for _ in 0..if Problem::<D>::TURNS { 4 } else { 1 } {
                 let to = (time - share * step).clamp(before, end.max(before));
-                let there = pass.strain(point, to);
-                if !Problem::<D>::TURNS || there <= here {
-                    (time, here, moved) = (to, there, true);
+                let there = Problem::<D>::TURNS.then(|| point.at(to));
+                let strain = there.map(|there| pass.strain(&there));
+                if strain <= here {
+                    (time, seen, here, moved) = (to, there, strain, true);
                     break;
                 }
                 share *= 0.4;
@@ -108,12 +111,9 @@ struct Pass<'a, const D: usize> {
 }
 
 impl<const D: usize> Pass<'_, D> {
-    /// Strain of a passing time: outside of a ball how far, and inside the barrier, which is less.
-    fn strain(&self, point: &Point<D>, time: f64) -> (f64, f64) {
-        if !Problem::<D>::TURNS {
-            return (0.0, 0.0);
-        }
-        let [p, ..] = point.at(time);
+    /// Strain of a passing time at which the path has such a position and derivatives: outside of a ball how far, and inside the
+    /// barrier, which is less.
+    fn strain(&self, [p, ..]: &[[f64; D]; 3]) -> (f64, f64) {
         if self.led {
             return (0.0, (0..3).map(|d| (p[d] - self.goal[d]).powi(2)).sum());
         }
@@ -139,9 +139,8 @@ impl<const D: usize> Pass<'_, D> {
         }
     }
 
-    /// The step of Newton's method towards the closest approach, in knots.
-    fn step(&self, point: &Point<D>, time: f64) -> Option<f64> {
-        let [p, v, a] = point.at(time);
+    /// The step of Newton's method towards the closest approach from where the path has such a position and derivatives, in knots.
+    fn step(&self, [p, v, a]: &[[f64; D]; 3]) -> Option<f64> {
         let (mut slope, mut bend, mut fall) = (0.0, 0.0, 0.0);
         for g in 0..if self.led { 1 } else { Problem::<D>::GROUPS } {
             let (mut away, mut along, mut bent, mut speed) = (0.0, 0.0, 0.0, 0.0);
