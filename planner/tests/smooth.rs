@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Quaternion, SVector, Translation3, UnitQuaternion, Vec
 use planner::motion::{MotionError, Planner};
 use planner::robot::load;
 use planner::task::{Move, Shape};
+use trajectory::smooth::angular_tolerance;
 
 /// Numbers from -1 to 1, the same each time.
 ///
@@ -257,3 +258,51 @@ fn walk(first: &Isometry3<f64>, seed: u64) -> Vec<Isometry3<f64>> {
     }
     poses
 }
+
+/// A dense list that leaves the reach and comes back is refused at the pose where it leaves it, whatever the tolerance: by the arm,
+/// which follows neither the fitted curve nor the legs.
+#[test]
+fn a_dense_list_beyond_the_reach_is_refused_where_it_leaves() {
+    let robot = load("ur5e").unwrap();
+    let planner = robot.planner::<6>().unwrap();
+    let start = SVector::<f64, 6>::from_column_slice(&robot.home);
+    let first = planner.chain().forward(&start);
+    // Out along an arc by 0.3 m, and back.
+    let pose = |k: usize| {
+        let angle = std::f64::consts::PI * k as f64 / ARC as f64;
+        let out = first.translation.vector.xy().normalize() * (0.3 * angle.sin());
+        let to = Translation3::new(out.x, out.y, 0.1 * (1.0 - angle.cos()));
+        to * first
+    };
+    let poses: Vec<_> = (1..=ARC).map(pose).collect();
+    let leaves = poses
+        .iter()
+        .position(|pose| planner.postures(pose, &start).is_empty());
+    let leaves = leaves.unwrap();
+    for tolerance in [1e-5, 1e-3] {
+        let motion = Move {
+            shape: Shape::Smooth,
+            poses: poses.clone(),
+            tolerance,
+            limits: robot.motion_limits(),
+        };
+        let pose = match planner.plan(&motion, &start).unwrap_err() {
+            MotionError::Blocked { pose, .. } => pose,
+            // Only where the tolerance does not allow for it.
+            MotionError::Orientation { pose, degrees }
+                if degrees.to_radians() > angular_tolerance(tolerance) =>
+            {
+                pose
+            }
+            other => panic!("{tolerance}: {other}"),
+        };
+        assert!(
+            pose.abs_diff(leaves + 1) <= 3,
+            "{tolerance}: pose {pose}, and the first out of reach is {}",
+            leaves + 1
+        );
+    }
+}
+
+/// Poses of the arc.
+const ARC: usize = 600;

@@ -6,6 +6,7 @@ use kinematics::follow::{
 use kinematics::{Chain, IkFailure};
 use nalgebra::{Isometry3, SVector};
 use realtime::{Piece, Sample};
+use trajectory::smooth::angular_tolerance;
 use trajectory::timing::{self, PathTiming};
 use trajectory::{HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory};
 
@@ -218,6 +219,7 @@ impl<const N: usize> Planner<N> {
         };
         match failure {
             Some(IkFailure::OutOfReach { distance }) if distance <= slack => blocked,
+            Some(IkFailure::Orientation { angle }) if angle <= angular_tolerance(slack) => blocked,
             Some(failure) => Self::out_of_reach(*pose, failure).unwrap_or(blocked),
             None => blocked,
         }

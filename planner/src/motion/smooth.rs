@@ -221,7 +221,8 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// The joints along that curve, if the tool alone takes less time than is useful on it.
+    /// The joints along that curve, if the tool alone takes less time than is useful on it. Where they can follow neither the
+    /// curve fitted through a dense list nor its straight legs, the spline is not searched: it goes between the two.
     pub(super) fn curve(
         &self,
         start: &SVector<f64, N>,
@@ -233,8 +234,11 @@ impl<const N: usize> Planner<N> {
             return Err(MotionError::NoWay.into());
         }
         let (spans, fitted) = (path.plan.spans(), path.is_fitted());
+        let hopeless = |error: &MotionError| {
+            matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(curve, start)
+        };
         match self.joints_on(path, start, None) {
-            Err(_) if fitted => self.curve(start, (curve, search), false),
+            Err(error) if fitted && !hopeless(&error) => self.curve(start, (curve, search), false),
             followed => followed.map_err(|error| Failure { error, spans }),
         }
     }
