@@ -456,14 +456,20 @@ mod tests {
         let plain = barrier.look_in(Build::Plain, &point, &[]).unwrap();
         assert_eq!((plain.rest, plain.slacks), (seen.rest, seen.slacks.clone()));
         // One slack after the other falls below a tenth of what it was.
+        let mut broken = 0;
         for i in 0..seen.slacks.len() {
             for (factor, held) in [(11.0, false), (9.0, true)] {
                 let mut before = seen.slacks.clone();
                 before[i] *= factor;
                 let there = barrier.look(&point, &before);
                 assert_eq!(there.is_some(), held, "slack {i} of {}", seen.slacks.len());
+                broken += usize::from(!barrier.is_limited(&point, &before));
+                assert!(!held || barrier.is_limited(&point, &before), "slack {i}");
             }
         }
+        // Those of the limits are seen without the passes.
+        let last = point.control.len() - 1;
+        assert_eq!(broken, D / 3 * (3 * last - 3));
         // Outside of the domain there is no value.
         point.z *= 1e-6;
         assert!(barrier.look(&point, &[]).is_none());
