@@ -243,8 +243,8 @@ impl<'a> List<'a> {
 
     /// The motion with which searches end that start from the one found and from each other, as far as they are faster.
     fn refined(&self, form: &NormalForm, mut found: Found) -> Found {
-        // A search with orientations is dear, and finds little that a good fit has not which is not far from the bound.
-        let good = found.plan.method() == Method::Fit && found.suffices() && !self.is_far(&found);
+        // A search with orientations is dear, and finds little that a good fit has not.
+        let good = found.plan.method() == Method::Fit && found.suffices();
         // A look for a faster law along the way of such a fit finds little, and no search starts from a long motion.
         if good && self.is_long() && !self.is_slow(&found) {
             return found;
