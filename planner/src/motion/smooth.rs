@@ -222,7 +222,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The joints along that curve, if the tool alone takes less time than is useful on it. Where they can follow neither the
-    /// curve fitted through a dense list nor its straight legs, the spline is not searched: it goes between the two.
+    /// curve fitted through a dense list nor its straight legs, the spline is not searched: it is as near to the legs.
     pub(super) fn curve(
         &self,
         start: &SVector<f64, N>,
