@@ -119,7 +119,7 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         error: MotionError,
     ) -> Result<PlannedMove<N>, MotionError> {
-        if matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(motion, start) {
+        if self.is_blocked_anyway(&error, motion, start) {
             return Err(error);
         }
         let within = |share: f64| Move {
@@ -130,6 +130,16 @@ impl<const N: usize> Planner<N> {
             .or_else(|_| self.blended(motion, start, &within(0.0)))
             .map(|(along, _)| along.planned)
             .map_err(|_| error)
+    }
+
+    /// Whether the joints can follow neither a curve, which failed so, nor the straight legs.
+    fn is_blocked_anyway(
+        &self,
+        error: &MotionError,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> bool {
+        matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(motion, start)
     }
 
     /// Whether the joints can follow straight legs to all poses; much cheaper than a curve.
@@ -234,11 +244,10 @@ impl<const N: usize> Planner<N> {
             return Err(MotionError::NoWay.into());
         }
         let (spans, fitted) = (path.plan.spans(), path.is_fitted());
-        let hopeless = |error: &MotionError| {
-            matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(curve, start)
-        };
         match self.joints_on(path, start, None) {
-            Err(error) if fitted && !hopeless(&error) => self.curve(start, (curve, search), false),
+            Err(error) if fitted && !self.is_blocked_anyway(&error, curve, start) => {
+                self.curve(start, (curve, search), false)
+            }
             followed => followed.map_err(|error| Failure { error, spans }),
         }
     }

@@ -38,28 +38,22 @@ impl<const D: usize> Barrier<'_, D> {
     /// The value without the weight's share, and the slacks; `None` outside of the domain, and if a slack
     /// is only a small fraction of its value `before`.
     pub(crate) fn look(&self, point: &Point<D>, before: &[f64]) -> Option<Seen> {
-        self.look_in(Build::detect(), point, before)
+        Build::detect().run(self.at(point, before))
     }
 
     /// Whether an iterate, wherever it passes its poses, is within the limits of speed, acceleration and jerk, with enough left of the
     /// slacks `before`: what [`Barrier::look`] asks for first, and only a small part of it.
     pub(crate) fn is_limited(&self, point: &Point<D>, before: &[f64]) -> bool {
-        let barrier = self;
-        let look = Look {
-            barrier,
-            point,
-            before,
-        };
-        Build::detect().run(Limited(look))
+        Build::detect().run(Limited(self.at(point, before)))
     }
 
-    /// The same in one build.
-    fn look_in(&self, build: Build, point: &Point<D>, before: &[f64]) -> Option<Seen> {
-        build.run(Look {
+    /// A look at an iterate.
+    fn at<'b>(&'b self, point: &'b Point<D>, before: &'b [f64]) -> Look<'b, D> {
+        Look {
             barrier: self,
             point,
             before,
-        })
+        }
     }
 }
 
@@ -213,11 +207,15 @@ impl<const D: usize> Op for Limited<'_, D> {
 }
 
 impl<const D: usize> Look<'_, D> {
+    /// How many differences of order 1 to 3 the control points have.
+    fn differences(&self) -> [usize; 3] {
+        [1, 2, 3].map(|order| self.point.control.len().saturating_sub(order))
+    }
+
     /// The place of the first slack of a group among all.
     fn first_of(&self, g: usize) -> usize {
         let Self { barrier, point, .. } = *self;
-        let last = point.control.len() - 1;
-        let limits = (0..3).map(|k| last.saturating_sub(k)).sum::<usize>();
+        let limits: usize = self.differences().iter().sum();
         let before = barrier.problem.groups.iter().take(g);
         let corridors = before.filter(|group| group.width.is_finite()).count();
         g * (limits + point.crossings.len()) + corridors * point.samples()
@@ -258,7 +256,7 @@ impl<const D: usize> Look<'_, D> {
                 return None;
             }
         }
-        let count = [last, last.saturating_sub(1), last.saturating_sub(2)];
+        let count = self.differences();
         let logarithm = |k: usize| count[k] as f64 * caps[k].ln();
         Some(logarithm(0) + logarithm(1) + logarithm(2))
     }
@@ -453,7 +451,7 @@ mod tests {
         let wanted = one_by_one(&barrier, &point);
         let got = barrier.value(&point, &seen) - 3.0 * point.z;
         assert!((got - wanted).abs() < 1e-9 * wanted.abs(), "{got} {wanted}");
-        let plain = barrier.look_in(Build::Plain, &point, &[]).unwrap();
+        let plain = Build::Plain.run(barrier.at(&point, &[])).unwrap();
         assert_eq!((plain.rest, plain.slacks), (seen.rest, seen.slacks.clone()));
         // One slack after the other falls below a tenth of what it was.
         let mut broken = 0;

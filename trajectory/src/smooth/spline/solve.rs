@@ -591,12 +591,13 @@ fn search<const D: usize>(
     for _ in 0..40 {
         go(problem, (point, &mut trial), (step, share));
         // Most trials that are too long break a limit, and to find their passes costs more than to see that.
-        if !barrier.is_limited(&trial, &seen.slacks) {
-            share *= BACK;
-            continue;
-        }
-        project(problem, &mut trial, Some(barrier.room), rounds);
-        if let Some(there) = barrier.look(&trial, &seen.slacks)
+        let there = if barrier.is_limited(&trial, &seen.slacks) {
+            project(problem, &mut trial, Some(barrier.room), rounds);
+            barrier.look(&trial, &seen.slacks)
+        } else {
+            None
+        };
+        if let Some(there) = there
             && barrier.value(&trial, &there) < here - 0.01 * share * step.decrement
         {
             *point = trial;
