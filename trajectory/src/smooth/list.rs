@@ -214,7 +214,8 @@ impl<'a> List<'a> {
         let fitted = best.plan.method() == Method::Fit;
         let cheap = best.motion.retried || !self.is_costly(&best.plan);
         let alone = self.is_fitted_alone(&best);
-        let spline = !alone && (best.is_divided() || (!fitted && cheap));
+        let slow = best.is_divided() || self.is_far(&best);
+        let spline = !alone && (slow || (!fitted && cheap));
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
         // Where an attempt failed, or the best motion is slow, the search from that motion may have failed, too.
         let refined = |found: Option<Found>, again: bool| match found {

@@ -9,8 +9,7 @@ use super::solve::{Aims, Effort, solve};
 use super::stretch::Stretch;
 use crate::smooth::crossing::{Crossing, crossings_made};
 
-/// Most further searches of an arm and of a tool, and times in knots that are the same.
-const AGAIN: usize = 2;
+/// Most searches one after another, and times in knots that are the same.
 const FORWARD: usize = 3;
 const SAME: f64 = 0.1;
 
@@ -19,43 +18,31 @@ const BEGINS: usize = 4;
 const LONGER: usize = 2;
 
 impl Task<'_> {
-    /// Searches on for an arm with a solution that has not turned as it has to be on the first approach to a pose: with a place that
-    /// goes forward only on the leg before it, or else so that it passes there. The solution stays where that does not help.
+    /// Searches on for an arm with a solution that turns and has not turned as it has to be on the first approach to a pose: with a
+    /// place that goes forward only on the leg before it. The solution stays where that does not help.
     pub(super) fn pass_first<const D: usize, const B: usize>(
         &self,
         (problem, point): (&mut Problem<D>, &mut Point<D>),
         (effort, aims): (Effort, Option<Aims<'_, D>>),
         used: [bool; 2],
     ) {
-        let mut passes = self.passes((problem, point), used, false);
-        if passes.missed(point, false).is_empty() {
+        if !Problem::<D>::TURNS || self.passes_all((problem, point), used) {
             return;
         }
-        if Problem::<D>::TURNS {
-            let ahead =
-                self.ahead::<D, B>((problem, point), (effort, aims), (used, Ahead::default()));
-            let holds = |(other, first): &(Problem<D>, Point<D>)| {
-                let passes = self.passes((other, first), used, false);
-                passes.missed(first, false).is_empty()
-            };
-            if let Some(ahead) = ahead.filter(holds) {
-                (*problem, *point) = ahead;
-                return;
-            }
+        let ahead = self.ahead::<D, B>((problem, point), (effort, aims), (used, Ahead::default()));
+        if let Some(ahead) = ahead.filter(|(other, first)| self.passes_all((other, first), used)) {
+            (*problem, *point) = ahead;
         }
-        for _ in 0..AGAIN {
-            let (mut other, mut first) = (problem.clone(), point.clone());
-            first.crossings = passes.times;
-            self.see_aims(&mut other, &first);
-            if solve::<D, B>(&mut other, &mut first, effort, aims).is_none() {
-                return;
-            }
-            (*problem, *point) = (other, first);
-            passes = self.passes((problem, point), used, false);
-            if passes.missed(point, false).is_empty() {
-                return;
-            }
-        }
+    }
+
+    /// Whether the motion of an iterate passes no pose elsewhere than its search does.
+    fn passes_all<const D: usize>(
+        &self,
+        (problem, point): (&Problem<D>, &Point<D>),
+        used: [bool; 2],
+    ) -> bool {
+        let passes = self.passes((problem, point), used, false);
+        passes.missed(point, false).is_empty()
     }
 
     /// Where searches end that go on from an iterate with a place that goes forward only. `None` where it need not, or no such
