@@ -214,8 +214,7 @@ impl<'a> List<'a> {
         let fitted = best.plan.method() == Method::Fit;
         let cheap = best.motion.retried || !self.is_costly(&best.plan);
         let alone = self.is_fitted_alone(&best);
-        let slow = self.is_slow(&best);
-        let spline = !alone && (slow || (!fitted && cheap));
+        let spline = !alone && (self.is_slow(&best) || (!fitted && cheap));
         let mut left = if best.is_hard() { PATIENCE } else { 1 };
         // Where an attempt failed, or the best motion is slow, the search from that motion may have failed, too.
         let refined = |found: Option<Found>, again: bool| match found {

@@ -26,23 +26,17 @@ impl Task<'_> {
         (effort, aims): (Effort, Option<Aims<'_, D>>),
         used: [bool; 2],
     ) {
-        if !Problem::<D>::TURNS || self.passes_all((problem, point), used) {
+        if !Problem::<D>::TURNS {
             return;
         }
         let ahead = self.ahead::<D, B>((problem, point), (effort, aims), (used, Ahead::default()));
-        if let Some(ahead) = ahead.filter(|(other, first)| self.passes_all((other, first), used)) {
+        let holds = |(other, first): &(Problem<D>, Point<D>)| {
+            let passes = self.passes((other, first), used, false);
+            passes.missed(first, false).is_empty()
+        };
+        if let Some(ahead) = ahead.filter(holds) {
             (*problem, *point) = ahead;
         }
-    }
-
-    /// Whether the motion of an iterate passes no pose elsewhere than its search does.
-    fn passes_all<const D: usize>(
-        &self,
-        (problem, point): (&Problem<D>, &Point<D>),
-        used: [bool; 2],
-    ) -> bool {
-        let passes = self.passes((problem, point), used, false);
-        passes.missed(point, false).is_empty()
     }
 
     /// Where searches end that go on from an iterate with a place that goes forward only. `None` where it need not, or no such
