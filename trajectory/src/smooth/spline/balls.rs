@@ -157,10 +157,10 @@ impl<const D: usize, const B: usize> System<D, B> {
 #[cfg(test)]
 mod tests {
     use crate::smooth::spline::corners::{along, corners};
+    use crate::smooth::spline::line_search::go;
     use crate::smooth::spline::newton::{Step, System};
     use crate::smooth::spline::problem::{Point, Problem, Room, ways};
     use crate::smooth::spline::project::project;
-    use crate::smooth::spline::solve::go;
     use crate::smooth::spline::start;
 
     /// Corners in position and orientation, with and without motion at the start.

@@ -2,12 +2,14 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::aimed::Aims;
 use super::basis;
+use super::effort::Effort;
 use super::ends::rolled;
 use super::known::Known;
 use super::problem::{Group, Point, Problem};
 use super::request::{Moving, Request};
-use super::solve::{Aims, Effort, solve};
+use super::solve::solve;
 use super::start::{self, KNOTS_PER_RAMP};
 use super::turns::turns;
 use crate::ToolPoint;

@@ -1,10 +1,10 @@
 //! What tests of the Newton system share: corners to be passed, and the barrier along a step.
 
 use super::barrier::Barrier;
+use super::line_search::go;
 use super::newton::Step;
 use super::problem::{Group, Point, Problem, Room};
 use super::project::project;
-use super::solve::go;
 
 /// Corners in position and orientation, from rest to rest.
 pub(super) fn corners() -> Problem<6> {

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use super::aimed::Aims;
 use super::build::Task;
+use super::effort::Effort;
 use super::further::Ahead;
 use super::problem::{Point, Problem};
-use super::solve::{Aims, Effort, solve};
+use super::solve::solve;
 use super::stretch::Stretch;
 use crate::smooth::crossing::{Crossing, crossings_made};
 

@@ -1,9 +1,10 @@
 //! Searches of the tool alone that go on from where another one ended.
 
+use super::aimed::Aims;
 use super::build::{Found, Task};
 use super::problem::{Point, Problem, ways};
 use super::request::Request;
-use super::solve::{Aims, solve};
+use super::solve::solve;
 use crate::smooth::seed::Seed;
 
 /// Time-optimal spline under the bounds of a request from where a search ended. Where the motion of that search approaches poses

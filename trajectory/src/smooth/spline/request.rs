@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::effort::Effort;
 use super::problem::FEW;
-use super::solve::Effort;
 use super::start::KNOTS_PER_RAMP;
 use crate::ToolPoint;
 use crate::line::body_turn;
