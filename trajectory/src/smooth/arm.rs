@@ -50,8 +50,8 @@ pub struct ArmMotion<'a> {
     pub far: f64,
     /// Whether the arm has a joint more than the tool needs, and the states a spare coordinate.
     pub has_spare: bool,
-    /// Whether the plan is no more than the known motion of a further search: it may exceed the tolerances and the corridor by a little, as
-    /// its certificate then says.
+    /// Whether the plan is no more than the known motion of a further search: it may exceed the tolerances by a little, and the
+    /// corridor by more, as its certificate then says.
     pub rough: bool,
     /// Where the search of the plan ended that this motion follows in the time of the tool, if it does: the next goes on from there, on
     /// knots at half the distance where the tool turns and the search is not rough. Of a plan for the same poses.

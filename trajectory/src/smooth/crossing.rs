@@ -8,6 +8,9 @@ use super::options::SmoothOptions;
 use super::span::{Span, reversed};
 use crate::line::body_turn;
 
+/// Times in knots that are nearer to each other than this are the same.
+const SAME: f64 = 0.1;
+
 /// How one intermediate pose is passed.
 ///
 /// The rule of the language: poses are passed in order, each on its first local closest approach
@@ -37,6 +40,12 @@ impl Crossing {
     pub fn holds(&self) -> bool {
         let [place, turn] = Self::accepted(self.tolerance, self.angular_tolerance);
         self.deviation <= place && self.angle <= turn
+    }
+
+    /// Whether it is at another time than that of a search, in knots of a spacing (s): the search then passes the pose on a
+    /// later approach than the first.
+    pub(super) fn is_apart(&self, searched: f64, spacing: f64) -> bool {
+        (self.time / spacing - searched).abs() >= SAME
     }
 
     /// Deviation and angle in their tolerances.

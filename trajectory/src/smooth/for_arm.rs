@@ -24,8 +24,9 @@ const ATTEMPTS: usize = 3;
 const TURNED: f64 = 0.98;
 const AIMED: f64 = 0.015;
 
-/// By how much a rough plan may exceed the corridor and the tolerances.
+/// By how much a rough plan may exceed the tolerances, and the corridor: between its few knots it leaves that by more.
 const ROUGHLY: f64 = 1.1;
+const OUTSIDE: f64 = 3.0;
 
 /// How the spare coordinate of an arm changes along a [`SmoothPlan`]: a uniform spline of degree four, from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,13 +161,16 @@ fn searched(
             mut seed,
         } = spline::plan_for_arm(&request)?;
         let whole = certify_slowed(&mut spans, (poses, false), options, SLOWED);
+        // It may have been slowed down.
+        seed.spacing = spans.last()?.end() / spans.len() as f64;
         let enough = whole.0.holds() || arm.rough && is_rough(&whole);
+        if !enough && passes_later(&whole.1, &seed) {
+            return None;
+        }
         if !enough {
             narrow(&mut inner, &whole.0, &whole.1, turns);
             continue;
         }
-        // It may have been slowed down.
-        seed.spacing = spans.last()?.end() / spans.len() as f64;
         let spare = arm.has_spare.then(|| SpareSpline {
             control: seed.last_coordinate(),
             spacing: seed.spacing,
@@ -186,11 +190,17 @@ fn effort(options: &SmoothOptions, arm: &ArmMotion<'_>) -> Effort {
     arm_effort(options.gap, aimed, arm.onward.is_some())
 }
 
-/// Whether a motion is nearly one that holds.
+/// Whether a search passes a pose on a later approach than the first, which misses it: within narrower bounds it does so, too.
+fn passes_later(crossings: &[Crossing], seed: &Seed) -> bool {
+    let mut all = crossings.iter().zip(&seed.crossings);
+    all.any(|(made, searched)| !made.holds() && made.is_apart(*searched, seed.spacing))
+}
+
+/// Whether a motion is so near to one that holds that a search may begin there.
 fn is_rough((certificate, crossings): &(Certificate, Vec<Crossing>)) -> bool {
     let near = |crossing: &Crossing| {
         crossing.deviation <= ROUGHLY * crossing.tolerance
             && crossing.angle <= ROUGHLY * crossing.angular_tolerance
     };
-    certificate.corridor.ratio <= ROUGHLY && crossings.iter().all(near)
+    certificate.corridor.ratio <= OUTSIDE && crossings.iter().all(near)
 }

@@ -11,9 +11,8 @@ use super::solve::solve;
 use super::stretch::Stretch;
 use crate::smooth::crossing::{Crossing, crossings_made};
 
-/// Most searches one after another, and times in knots that are the same.
+/// Most searches one after another.
 const FORWARD: usize = 3;
-const SAME: f64 = 0.1;
 
 /// Times the usual steps with which a search begins and those of all: its new bounds are widened at first, at many control points.
 const BEGINS: usize = 4;
@@ -87,21 +86,18 @@ impl Task<'_> {
         backwards: bool,
     ) -> Passes {
         let spans = self.spans(problem, point, used);
-        let made = crossings_made(&spans, (self.poses, backwards), self.options);
-        let spacing = problem.spacing(point.z);
         Passes {
-            hold: made.iter().map(Crossing::holds).collect(),
-            times: made.iter().map(|pass| pass.time / spacing).collect(),
+            made: crossings_made(&spans, (self.poses, backwards), self.options),
+            spacing: problem.spacing(point.z),
         }
     }
 }
 
 /// How a motion passes the inner poses.
 struct Passes {
-    /// Whether each is within its tolerances.
-    hold: Vec<bool>,
-    /// When, in knots.
-    times: Vec<f64>,
+    made: Vec<Crossing>,
+    /// Knot spacing, s.
+    spacing: f64,
 }
 
 impl Passes {
@@ -110,11 +106,12 @@ impl Passes {
     /// the next one before it is there.
     fn missed<const D: usize>(&self, point: &Point<D>, backwards: bool) -> Vec<usize> {
         let other = |i: &usize| {
-            let both = self.times.get(*i).zip(point.crossings.get(*i));
-            both.is_some_and(|(made, searched)| (made - searched).abs() >= SAME)
+            let both = self.made.get(*i).zip(point.crossings.get(*i));
+            both.is_some_and(|(made, searched)| made.is_apart(*searched, self.spacing))
         };
-        let all = 0..self.hold.len();
-        let mut missed: Vec<usize> = all.filter(|i| !self.hold[*i]).filter(other).collect();
+        let all = 0..self.made.len();
+        let lost = all.filter(|i| !self.made[*i].holds());
+        let mut missed: Vec<usize> = lost.filter(other).collect();
         if !Problem::<D>::TURNS {
             let before = |i: &usize| {
                 if backwards {
