@@ -4,7 +4,7 @@ use super::problem::{Point, Problem, Room};
 
 /// Steps between two narrowings of widened bounds: they move the iterate well inside, so that each
 /// narrowing is large.
-pub(super) const PATIENCE: usize = 4;
+const PATIENCE: usize = 4;
 
 /// The bounds of an iterate: widened to contain it, and narrowed as it moves inwards.
 pub(super) struct Bounds {
@@ -12,7 +12,7 @@ pub(super) struct Bounds {
     /// Whether they are the true bounds.
     pub(super) tight: bool,
     /// Steps since they were narrowed last.
-    pub(super) since: usize,
+    since: usize,
 }
 
 impl Bounds {
@@ -34,5 +34,15 @@ impl Bounds {
             self.tight = self.room.narrow(problem, point);
             self.since = 0;
         }
+    }
+
+    /// Whether they were narrowed before the last step.
+    pub(super) fn are_new(&self) -> bool {
+        self.since == 0
+    }
+
+    /// Has them narrowed before the next step.
+    pub(super) fn narrow_next(&mut self) {
+        self.since = PATIENCE;
     }
 }

@@ -11,13 +11,18 @@ const BACK: f64 = 0.6;
 /// What is known of the barrier at the iterate, under these bounds.
 pub(super) struct Known {
     room: Room,
-    pub(super) seen: Option<Seen>,
+    seen: Option<Seen>,
 }
 
 impl Known {
     pub(super) fn nothing(room: &Room) -> Self {
         let room = room.clone();
         Self { room, seen: None }
+    }
+
+    /// Forgets what was seen: the iterate is another.
+    pub(super) fn forget(&mut self) {
+        self.seen = None;
     }
 
     /// Keeps what is seen under these bounds.

@@ -4,7 +4,7 @@
 use super::aimed::{AIMING, Aims, aim};
 use super::anchor::{is_held_by_ends, is_let_go};
 use super::begin::begin;
-use super::bounds::{Bounds, PATIENCE};
+use super::bounds::Bounds;
 use super::effort::Effort;
 use super::line_search::Known;
 use super::newton::{Step, System};
@@ -120,7 +120,7 @@ impl<'a, const D: usize> Iteration<'a, D> {
     fn narrow(&mut self) {
         self.bounds.narrow(self.problem, self.point);
         if self.bounds.tight && is_let_go(self.problem, self.point) {
-            self.known.seen = None;
+            self.known.forget();
             if self.problem.finish.is_some() {
                 self.weight = self.first_weight();
             }
@@ -194,10 +194,10 @@ impl<'a, const D: usize> Iteration<'a, D> {
         if self.bounds.tight {
             let last = 1.01 * self.parameter / (self.effort.gap * self.point.z);
             self.weight = (self.weight * self.pace.growth).min(last);
-        } else if self.bounds.since == 0 && !moved {
+        } else if self.bounds.are_new() && !moved {
             return false;
         } else if decrement < self.pace.near || !moved {
-            self.bounds.since = PATIENCE;
+            self.bounds.narrow_next();
         }
         true
     }
