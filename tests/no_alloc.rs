@@ -13,7 +13,7 @@ use servo::{
     Control, Event, FeedForward, GuardKind, GuardOrder, GuardOutcome, GuardSource, MAX_GUARDS,
     Monitor, Runner, SegmentSender, SensorGuard, Tick, Work,
 };
-use system_tests::servo_arm::{JOINTS, executor_config, feed, home};
+use system_tests::servo_arm::{JOINTS, executor_config, feed_within, home};
 
 thread_local! {
     static HEAP_CALLS: Cell<u64> = const { Cell::new(0) };
@@ -131,7 +131,7 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
 
     let (mut next, mut finished, mut heap, mut waited, mut tripped) = (0, 0, 0, 0, 0);
     for block in 0..100 {
-        while sender.room() > 4000 && guard(&mut sender, next) && feed(&mut sender, next) {
+        while sender.room() > 4000 && guard(&mut sender, next) && feed_within(&mut sender, next, 1e-6) {
             next += 1;
         }
         // Towards the end a guard stops the command that moves, and none begins any more.

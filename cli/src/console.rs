@@ -112,7 +112,10 @@ impl Console {
                 "canter: error: line {line}: {name}: {}",
                 error.message
             )),
-            Note::NotArrived { .. } | Note::NotSettled { .. } | Note::SpeedAsked { .. } => {
+            Note::NotArrived { .. }
+            | Note::EndMissed { .. }
+            | Note::NotSettled { .. }
+            | Note::SpeedAsked { .. } => {
                 printer.note(&format!("canter: {note}"));
             }
             Note::Faulted { reason, .. } => printer.note(&format!("canter: error: {reason}")),

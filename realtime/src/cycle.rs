@@ -94,6 +94,7 @@ pub struct Cycle<const N: usize, const B: usize> {
     setpoint: Sample<N>,
     command: u32,
     path_time: f64,
+    may_start: bool,
 }
 
 impl<const N: usize, const B: usize> Cycle<N, B> {
@@ -112,6 +113,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
             setpoint: Sample::rest(position),
             command: 0,
             path_time: 0.0,
+            may_start: true,
         }
     }
 
@@ -132,6 +134,17 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
             Mode::Path => self.governor.factor == 0.0 && self.governor.rate == 0.0,
             Mode::Brake => at_rest(&self.setpoint),
         }
+    }
+
+    /// Whether the next command may start when the one that moves has ended; it may if nobody says
+    /// otherwise. A command that moves is not touched.
+    pub fn let_start(&mut self, may_start: bool) {
+        self.may_start = may_start;
+    }
+
+    /// The command whose path is followed, also while the arm is stopped on it.
+    pub fn follows(&self) -> Option<u32> {
+        (self.mode == Mode::Path).then_some(self.command)
     }
 
     /// The last setpoint.
@@ -255,7 +268,7 @@ impl<const N: usize, const B: usize> Cycle<N, B> {
         let enough = self.buffer.has_end()
             || self.buffer.is_full()
             || self.buffer.horizon() >= START_HORIZON;
-        if share.is_nan() || share <= 0.0 || !enough {
+        if share.is_nan() || share <= 0.0 || !enough || !self.may_start {
             return None;
         }
         self.command = first.command;

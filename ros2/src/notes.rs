@@ -47,6 +47,14 @@ pub(crate) fn words(note: &Value) -> (LogLevel, String) {
                 format!("joint {joint} is {error:.4} from its end and does not arrive"),
             )
         }
+        "end-missed" => {
+            let off = |key: &str| note[key].as_f64().unwrap_or(f64::NAN);
+            let (point, angle) = (off("off_m") * 1e3, off("off_rad").to_degrees());
+            let said = format!(
+                "the measured tool came no nearer to its end than {point:.3} mm and {angle:.3} degrees"
+            );
+            (LogLevel::Warn, said)
+        }
         "not-settled" => {
             let (error, joint) = (note["error"].as_f64().unwrap_or(f64::NAN), number("joint"));
             let said = format!(

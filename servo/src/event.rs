@@ -173,6 +173,18 @@ pub enum Event {
         /// The period.
         tick: u64,
     },
+    /// The measured tool has not come within the tolerance of a command's end within the patience; the
+    /// command counts as finished.
+    EndMissed {
+        /// Index of the command.
+        command: u32,
+        /// How near it came: distance of the controlled point (m).
+        point: f64,
+        /// The angle to its orientation then (rad).
+        angle: f64,
+        /// The period.
+        tick: u64,
+    },
     /// The arm asks for less speed, or no longer does.
     SpeedAsked {
         /// Share of the planned speed, 0..=1.

@@ -20,6 +20,7 @@
 
 mod config;
 mod control;
+mod end_tolerance;
 mod event;
 mod feed_forward;
 mod guard;
@@ -34,6 +35,7 @@ mod thread;
 
 pub use config::{Arrival, ExecutorConfig, ExecutorError};
 pub use control::Control;
+pub use end_tolerance::{EndTolerance, OffEnd};
 pub use event::{Event, Fault, Recorded, ShortText};
 pub use feed_forward::FeedForward;
 pub use guard::{

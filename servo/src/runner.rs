@@ -1,6 +1,7 @@
 //! One period of the real-time thread, without a clock and without a channel.
 
 mod arrival;
+mod feed;
 mod guards;
 mod leaving;
 mod message;
@@ -14,18 +15,19 @@ use std::sync::Arc;
 
 use ipc::{HelloAck, Payload, Setpoint, State};
 use nalgebra::SVector;
-use realtime::{Cycle, Demand, Pushed, Sample, Step, StopCategory};
+use realtime::{Cycle, Demand, Sample, Step, StopCategory};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::config::ExecutorConfig;
+use super::end_tolerance::EndTolerance;
 use super::event::{Event, Fault, Recorded};
 use super::guard::{Guarded, Watch};
 use super::monitor::Monitor;
 use super::orders::Asked;
 use super::remote::{Remote, Shared};
-use super::segment_sender::{Item, SegmentSender, ToolOrder, Work};
+use super::segment_sender::{Item, SegmentSender, ToolOrder};
 
-use arrival::{Awaited, WAITING};
+use arrival::{Awaited, ENDS, WAITING};
 use leaving::Leaving;
 use message::first;
 
@@ -40,9 +42,6 @@ const REPORTS: usize = 1 << 14;
 
 /// Guarded commands that wait for their reader.
 const GUARDED: usize = 64;
-
-/// Largest number of items taken from the ring per period.
-const A_PERIOD: usize = 64;
 
 /// How long the speed of a joint counts in its following error (s): an arm that follows late may be far
 /// from a plan that rests already.
@@ -98,6 +97,8 @@ pub struct Runner<const N: usize> {
     ready: bool,
     /// What is reported when the measured arm has arrived, in order.
     awaited: VecDeque<Awaited<N>>,
+    /// How near the arm must come to the ends of commands that are planned, in order.
+    ends: VecDeque<EndTolerance<N>>,
     /// How late the arm is by the driver's own delay (s).
     delay: f64,
     /// Whether the arm asks for less speed.
@@ -150,6 +151,7 @@ impl<const N: usize> Runner<N> {
             blind: 0,
             ready: false,
             awaited: VecDeque::with_capacity(WAITING),
+            ends: VecDeque::with_capacity(ENDS),
             delay: 0.0,
             slowed: false,
             asked: shared.orders.asked(),
@@ -198,7 +200,7 @@ impl<const N: usize> Runner<N> {
         self.ready = false;
         self.delay = (ack.delay_ns as f64 * 1e-9).min(LARGEST_DELAY);
         self.slowed = false;
-        self.awaited.clear();
+        self.forget_ends();
         self.fault = None;
         self.shared.orders.clear();
         self.tool = None;
@@ -283,7 +285,7 @@ impl<const N: usize> Runner<N> {
         if self.fault.is_none() {
             self.fault = Some(fault);
             // The arm will not arrive.
-            self.awaited.clear();
+            self.forget_ends();
             self.forget_guards();
             self.shared.orders.latch();
             self.epoch = self.shared.new_epoch();
@@ -348,49 +350,6 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Takes planned work from the ring: from the period on after the one in which the driver became
-    /// active. In lock-step time may stand from there until work comes, so work that waits already must
-    /// not begin sooner than work that comes then.
-    fn feed(&mut self) {
-        for _ in 0..A_PERIOD {
-            let Ok(item) = self.items.peek() else { return };
-            let item = *item;
-            let done = if item.epoch != self.epoch || self.fault.is_some() {
-                true
-            } else {
-                match item.work {
-                    Work::Motion(segment) if self.drops(&segment) => true,
-                    Work::Motion(segment) if self.tool.is_none() => {
-                        match self.cycle.push(&segment) {
-                            Pushed::Taken => {
-                                self.note_pushed(&segment);
-                                true
-                            }
-                            Pushed::Full => false,
-                            Pushed::Broken => {
-                                self.latch(Fault::BrokenSegment);
-                                true
-                            }
-                        }
-                    }
-                    Work::Tool(order)
-                        if self.tool.is_none()
-                            && self.cycle.is_idle()
-                            && self.awaited.is_empty() =>
-                    {
-                        self.start_tool(order)
-                    }
-                    Work::Guards(order) => self.start_guards(&order),
-                    Work::Splice(splice) => self.splice(&splice),
-                    _ => false,
-                }
-            };
-            if !done || self.items.pop().is_err() {
-                return;
-            }
-        }
-    }
-
     /// What the cycle shall do now.
     fn demand(&self) -> Demand {
         if self.fault.is_some() {
@@ -424,6 +383,8 @@ impl<const N: usize> Runner<N> {
     /// Moves along the path by one step. Periods that were left out delay the plan, so a setpoint
     /// is never further from the one before than the joints can move in a period.
     fn move_on(&mut self) {
+        let may_start = self.may_start();
+        self.cycle.let_start(may_start);
         let made = self.cycle.step(self.demand());
         self.tell(&made, self.tick);
         self.published = made.setpoint;
@@ -446,7 +407,8 @@ impl<const N: usize> Runner<N> {
     fn tell(&mut self, made: &Step<N>, tick: u64) {
         if let Some(command) = made.finished {
             self.note_finished(command);
-            self.await_arrival(command);
+            let wanted = self.take_end(command);
+            self.await_arrival(command, wanted);
         }
         if let Some(command) = made.started {
             self.report_in_order(Event::Started { command, tick });

@@ -7,6 +7,7 @@ use realtime::Segment;
 use rtrb::Producer;
 use thiserror::Error;
 
+use super::end_tolerance::EndTolerance;
 use super::guard::GuardOrder;
 use super::remote::Shared;
 
@@ -73,6 +74,8 @@ pub enum Work<const N: usize> {
     Tool(ToolOrder),
     /// Guards of the command whose pieces follow.
     Guards(GuardOrder),
+    /// How near the arm must come to the end of the command whose pieces go through the ring.
+    End(EndTolerance<N>),
     /// The command whose pieces follow takes the place of the one that moves.
     Splice(Splice),
 }

@@ -1,8 +1,8 @@
 //! Planned motions of a six-joint arm for the tests of the servo loop.
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use realtime::{JointLimits, Piece, Sample, Segment};
-use servo::{ExecutorConfig, SegmentSender};
+use servo::{EndTolerance, ExecutorConfig, SegmentSender, Work};
 
 /// Joints of the test arm.
 pub const JOINTS: usize = 6;
@@ -95,4 +95,25 @@ pub fn feed(sender: &mut SegmentSender<JOINTS>, index: u32) -> bool {
         && command(index)
             .into_iter()
             .all(|segment| sender.push(segment).is_ok())
+}
+
+/// How near the tool of the test arm must come to the end of [`command`] `index` (m): its first three
+/// joints move the tool, each by a metre for a radian, along axes at right angles to each other.
+pub fn end_tolerance(index: u32, point: f64) -> EndTolerance<JOINTS> {
+    EndTolerance {
+        command: index,
+        joints: planned(index, f64::INFINITY),
+        jacobian: SMatrix::identity(),
+        point,
+        angle: f64::INFINITY,
+    }
+}
+
+/// Sends a whole command whose end has a tolerance (m); `false` if there was no room for it.
+pub fn feed_within(sender: &mut SegmentSender<JOINTS>, index: u32, point: f64) -> bool {
+    sender.room() >= 3
+        && sender
+            .hand_over(Work::End(end_tolerance(index, point)))
+            .is_ok()
+        && feed(sender, index)
 }

@@ -113,6 +113,7 @@ export function words(note) {
     case 'faulted': return [`fault: ${note.reason}`, 'bad'];
     case 'recovered': return ['recovered', ''];
     case 'not-arrived': return [`joint ${note.joint} has not arrived: ${digits(note.error * 1000, 1)} mrad or mm are left`, 'warn'];
+    case 'end-missed': return [`the measured tool came no nearer to its end than ${digits(note.off_m * 1000, 3)} mm and ${digits(note.off_rad * 180 / Math.PI, 3)} degrees`, 'warn'];
     case 'not-settled': return [`the driver does not come to rest: joint ${note.joint} is ${digits(note.error * 1000, 3)} mrad or mm from the last setpoint`, 'warn'];
     case 'speed-asked': return [`the arm asks for ${digits(note.share * 100, 0)} % of the speed`, 'warn'];
     case 'closed': return ['the engine has ended', 'warn'];

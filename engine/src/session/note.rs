@@ -123,6 +123,16 @@ pub enum Note {
         /// How far it is (rad, m).
         error: f64,
     },
+    /// The measured tool did not come within the tolerance of a command's end in time; the command counts
+    /// as done.
+    EndMissed {
+        /// Number of the command in this session, from 1.
+        id: u32,
+        /// How near the controlled point came to its place (m).
+        off_m: f64,
+        /// How far it was turned from its orientation then (rad).
+        off_rad: f64,
+    },
     /// The session ends although what the driver commands does not come to rest at the last setpoint.
     NotSettled {
         /// The joint that is furthest away, from 1.
@@ -174,6 +184,13 @@ impl fmt::Display for Note {
             Self::NotArrived { id, joint, error } => write!(
                 f,
                 "warning: command {id}: joint {joint} is {error:.4} from its end and does not arrive"
+            ),
+            Self::EndMissed { id, off_m, off_rad } => write!(
+                f,
+                "warning: command {id}: the measured tool came no nearer to its end than {:.3} mm and {:.3} degrees; \
+                 look at the arm, or set larger tolerances with SetEndPointTolerance and SetEndAngleTolerance",
+                off_m * 1e3,
+                off_rad.to_degrees()
             ),
             Self::NotSettled { joint, error } => write!(
                 f,

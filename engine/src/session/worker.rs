@@ -3,6 +3,7 @@
 mod guarding;
 mod in_flight;
 mod jogging;
+mod motion;
 mod replacing;
 mod reports;
 mod sampling;
@@ -21,6 +22,7 @@ use trajectory::ToolLimits;
 
 use in_flight::InFlight;
 use jogging::Jogging;
+use motion::{end_tolerance, motion};
 use sampling::Sampling;
 use streaming::Streaming;
 use tools::{payload, tool_order};
@@ -271,7 +273,7 @@ impl<const N: usize> Worker<'_, N> {
         match self.step(given) {
             Ok(step) => {
                 flight.planned_s = step.ticks as f64 / self.config.rate_hz;
-                self.enlist(&mut flight, step);
+                self.enlist(&mut flight, step, language);
             }
             Err(error) => {
                 self.refuse(&mut flight, error, language);
@@ -339,10 +341,12 @@ impl<const N: usize> Worker<'_, N> {
         }
     }
 
-    /// The work of one step; a command without work is finished at once.
-    fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>) {
+    /// The work of one step; a command without work is finished at once. The tolerances of the end are
+    /// for commands of the `language` that move to a pose.
+    fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>, language: bool) {
         let command = flight.id;
         self.enlist_guards(flight, &step);
+        let posed = matches!(step.task, Task::Move(_) | Task::Screw(_) | Task::Legs(_));
         match step.task {
             Task::Message { text } => flight.says = Some(Note::Message { text }),
             Task::End { reason } => flight.says = Some(Note::Ended { reason }),
@@ -367,14 +371,9 @@ impl<const N: usize> Worker<'_, N> {
             .planned
             .as_ref()
             .map_or(&[][..], |planned| planned.trajectory.pieces());
-        for (index, piece) in pieces.iter().enumerate() {
-            let last = index + 1 == pieces.len();
-            self.work.push_back(Work::Motion(Segment {
-                piece: *piece,
-                command,
-                last,
-            }));
-        }
+        let settings = Some(self.controller.modal().settings()).filter(|_| posed && language);
+        let within = settings.and_then(|it| end_tolerance(command, pieces, &flight.chain, it));
+        self.work.extend(motion(command, pieces, true, within));
         if !pieces.is_empty() {
             flight.motion = step.planned.map(|planned| planned.trajectory);
             return;

@@ -44,9 +44,14 @@ impl<const N: usize> Runner<N> {
         let dropped = self.dropping == Some(segment.command);
         if dropped && segment.last {
             self.dropping = None;
-            self.await_arrival(segment.command);
+            self.await_arrival(segment.command, None);
         }
         dropped
+    }
+
+    /// Whether what belongs to the command is dropped.
+    pub(super) fn is_dropped(&self, command: u32) -> bool {
+        self.refused == Some(command) || self.dropping == Some(command)
     }
 
     /// A segment was pushed into the cycle.
@@ -78,8 +83,10 @@ impl<const N: usize> Runner<N> {
             self.cycle.flush();
             self.published = *self.cycle.setpoint();
             let command = watch.report.command;
+            // The arm rests elsewhere.
+            self.take_end(command);
             if watch.is_whole {
-                self.await_arrival(command);
+                self.await_arrival(command, None);
             } else {
                 self.dropping = Some(command);
             }

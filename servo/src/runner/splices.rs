@@ -10,7 +10,9 @@ impl<const N: usize> Runner<N> {
     pub(super) fn splice(&mut self, splice: &Splice) -> bool {
         let runs = self.watch.is_none() && self.fault.is_none() && self.aborting.is_none();
         let accepted = runs && self.cycle.cut(splice.command, splice.path_time);
-        if !accepted {
+        if accepted {
+            self.take_end(splice.command);
+        } else {
             self.refused = Some(splice.by);
         }
         self.report(Event::Spliced {

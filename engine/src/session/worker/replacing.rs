@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 use crcl::Located;
 use planner::controller::{Controller, Step};
 use planner::task::Task;
-use realtime::Segment;
 use servo::Splice;
+use trajectory::Trajectory;
 
 use super::super::ReplaceError;
 use super::super::note::Note;
+use super::motion::{end_tolerance, motion};
 use super::{Work, Worker};
 
 /// How long before the new motion begins it is planned (s of the old one).
@@ -116,14 +117,12 @@ impl<const N: usize> Worker<'_, N> {
             match step.planned {
                 Some(planned) => {
                     by = *id;
-                    self.send_motion(
-                        Splice {
-                            command: old,
-                            path_time,
-                            by,
-                        },
-                        &planned.trajectory,
-                    );
+                    let splice = Splice {
+                        command: old,
+                        path_time,
+                        by,
+                    };
+                    self.send_motion(splice, &planned.trajectory, &new.controller);
                     flight.motion = Some(planned.trajectory);
                 }
                 None => flight.finished = Some(0),
@@ -144,16 +143,12 @@ impl<const N: usize> Worker<'_, N> {
         Ok(ids)
     }
 
-    fn send_motion(&mut self, splice: Splice, motion: &trajectory::Trajectory<N>) {
+    fn send_motion(&mut self, splice: Splice, way: &Trajectory<N>, controller: &Controller<N>) {
         self.work.push_back(Work::Splice(splice));
-        let pieces = motion.pieces();
-        for (index, piece) in pieces.iter().enumerate() {
-            self.work.push_back(Work::Motion(Segment {
-                piece: *piece,
-                command: splice.by,
-                last: index + 1 == pieces.len(),
-            }));
-        }
+        let (chain, settings) = (controller.chain(), controller.modal().settings());
+        let within = end_tolerance(splice.by, way.pieces(), chain, settings);
+        self.work
+            .extend(motion(splice.by, way.pieces(), true, within));
         self.spliced = None;
         self.feed();
     }

@@ -56,6 +56,16 @@ impl<const N: usize> Worker<'_, N> {
                 joint: joint + 1,
                 error,
             }),
+            Event::EndMissed {
+                command,
+                point,
+                angle,
+                ..
+            } => self.say(Note::EndMissed {
+                id: command,
+                off_m: point,
+                off_rad: angle,
+            }),
             Event::NotSettled { joint, error, .. } => self.say(Note::NotSettled {
                 joint: joint + 1,
                 error,

@@ -4,6 +4,7 @@ use planner::command_error::CommandError;
 use planner::motion::WindowedMove;
 use realtime::{Piece, Segment};
 
+use super::motion::{end_tolerance, motion};
 use super::{InFlight, Work, Worker};
 use crate::queue::Given;
 
@@ -53,14 +54,10 @@ impl<const N: usize> Worker<'_, N> {
             Ok(window) => window,
             Err(error) => return self.end_on_the_way(&streaming, error),
         };
-        let count = window.pieces.len();
-        for (index, piece) in window.pieces.into_iter().enumerate() {
-            self.work.push_back(Work::Motion(Segment {
-                piece,
-                command,
-                last: window.last && index + 1 == count,
-            }));
-        }
+        let (pieces, whole) = (&window.pieces, window.last);
+        let (chain, settings) = (self.controller.chain(), self.controller.modal().settings());
+        let within = end_tolerance(command, pieces, chain, settings).filter(|_| whole);
+        self.work.extend(motion(command, pieces, whole, within));
         if let Some(flight) = self.flight.iter_mut().find(|flight| flight.id == command) {
             flight.planned_s = streaming.windowed.duration();
         }
