@@ -131,7 +131,10 @@ fn a_hundred_thousand_periods_without_heap_or_wait() {
 
     let (mut next, mut finished, mut heap, mut waited, mut tripped) = (0, 0, 0, 0, 0);
     for block in 0..100 {
-        while sender.room() > 4000 && guard(&mut sender, next) && feed_within(&mut sender, next, 1e-6) {
+        while sender.room() > 4000
+            && guard(&mut sender, next)
+            && feed_within(&mut sender, next, 1e-6)
+        {
             next += 1;
         }
         // Towards the end a guard stops the command that moves, and none begins any more.
