@@ -78,6 +78,8 @@ struct List<'a> {
     least: f64,
     /// Time of the fastest motion that is certified so far, s.
     best: Cell<f64>,
+    /// Whether a certified motion rests nowhere.
+    unrested: Cell<bool>,
 }
 
 impl<'a> List<'a> {
@@ -94,6 +96,7 @@ impl<'a> List<'a> {
             exact_stop: exact_stop::duration(given, &options.limits),
             least: lower_bound(poses, options),
             best: Cell::new(f64::INFINITY),
+            unrested: Cell::new(false),
         }
     }
 
@@ -115,7 +118,13 @@ impl<'a> List<'a> {
     /// The motion of the way of planning that suits the list; or the faster one of two, and the other one.
     fn at_first(&self, form: &NormalForm) -> Option<(Found, Option<Found>)> {
         let dense = self.options.fit && dense::is_dense(&form.poses, &form.options);
-        let fitted = if dense { self.fitted(form) } else { None };
+        // A list whose corners show is divided as often as needed only where a spline rests, or no search starts from it.
+        let corners = dense && dense::shows_corners(&form.poses, &form.options);
+        let fitted = if dense {
+            self.fitted(form, !corners)
+        } else {
+            None
+        };
         let enough = fitted.as_ref().is_some_and(Found::suffices);
         let alone = fitted
             .as_ref()
@@ -125,11 +134,19 @@ impl<'a> List<'a> {
         }
         let spline = self.by_spline(form);
         let spline = spline.or_else(|| self.by_spline(&form.turned(self.poses, self.options)));
+        let rests = |spline: &Found| !spline.plan.rests().is_empty();
+        let divided =
+            corners && fitted.is_none() && (self.is_long() || spline.as_ref().is_none_or(rests));
+        let fitted = if divided {
+            self.fitted(form, true)
+        } else {
+            fitted
+        };
         let (best, other) = Found::ordered(fitted, spline)?;
         if self.options.is_rough() || dense || !self.is_slow(&best) || !self.may_be_fitted(form) {
             return Some((best, other));
         }
-        Found::ordered(Some(best), self.fitted(form))
+        Found::ordered(Some(best), self.fitted(form, true))
     }
 
     /// Whether a curve may be fitted through the list.
@@ -320,22 +337,24 @@ impl<'a> List<'a> {
     }
 
     /// The motion along a fitted curve: the faster one from both ends if that from the first is
-    /// slower than it might be.
-    fn fitted(&self, form: &NormalForm) -> Option<Found> {
-        let first = self.fit(form, &form.options);
-        if first
-            .as_ref()
-            .is_some_and(|first| first.suffices() || self.is_fitted_alone(first))
-        {
+    /// slower than it might be; where a fit fails the list is divided as often as needed if it may be `divided`.
+    fn fitted(&self, form: &NormalForm, divided: bool) -> Option<Found> {
+        let fit = |form: &NormalForm| {
+            self.certified(form, dense::plan(&form.poses, &form.options, divided)?)
+        };
+        let first = fit(form);
+        let good = |first: &Found| first.suffices() || self.is_fitted_alone(first);
+        if first.as_ref().map_or(!divided, good) {
             return first;
         }
-        let turned = form.turned(self.poses, self.options);
-        Found::faster(first, self.fit(&turned, &turned.options))
+        Found::faster(first, fit(&form.turned(self.poses, self.options)))
     }
 
-    /// The same from one end, under options of the form.
+    /// The same from one end, under options of the form; divided a few times only if a motion is known that rests nowhere, and
+    /// searches start from it.
     fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Found> {
-        self.certified(form, dense::plan(&form.poses, options)?)
+        let divided = self.is_long() || !self.unrested.get();
+        self.certified(form, dense::plan(&form.poses, options, divided)?)
     }
 
     /// The motion by time-optimal splines, and where that is cheap the faster one of it and that within half of the
@@ -400,6 +419,8 @@ impl<'a> List<'a> {
             .or_else(|| placed(motion.clone()))
             .or_else(|| self.repaired(form, motion))?;
         self.best.set(self.best.get().min(plan.duration()));
+        let unrested = plan.rests().is_empty();
+        self.unrested.set(self.unrested.get() || unrested);
         Some(Found {
             plan,
             motion,

@@ -66,8 +66,13 @@ const CORNER: f64 = 0.85;
 const BOTH: usize = 64;
 
 /// A motion from rest in the first pose to rest in the last along fitted curves; `None` where a limit
-/// is missing or a list cannot be fitted. The options are finite.
-pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
+/// is missing or a list cannot be fitted. Where a fit fails the list is divided: as often as needed if it may be
+/// `divided`, else a few times. The options are finite.
+pub(super) fn plan(
+    given: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    divided: bool,
+) -> Option<Motion> {
     if !is_limited(options) {
         return None;
     }
@@ -76,9 +81,9 @@ pub(super) fn plan(given: &[Isometry3<f64>], options: &SmoothOptions) -> Option<
         return None;
     }
     if !poses.windows(2).any(TURNING) {
-        sections::<3>(&poses, options)
+        sections::<3>(&poses, options, divided)
     } else if options.angular_tolerance() > 1e3 * RESOLUTION {
-        sections::<7>(&poses, options)
+        sections::<7>(&poses, options, divided)
     } else {
         None
     }
@@ -100,6 +105,13 @@ pub(super) fn is_dense(given: &[Isometry3<f64>], options: &SmoothOptions) -> boo
     let poses = moved(given);
     let short = |pair: &&[Isometry3<f64>]| leg(pair, options) <= LEG;
     poses.len() >= FEWEST && 2 * poses.windows(2).filter(short).count() > poses.len()
+}
+
+/// Whether the tolerance shows the corner at each pose of a list that does not turn: its curve is not nearly known.
+pub(super) fn shows_corners(given: &[Isometry3<f64>], options: &SmoothOptions) -> bool {
+    let poses = moved(given);
+    let points = Units::new(options).points::<3>(&poses);
+    !poses.windows(2).any(TURNING) && Chords::new(&points).shows_corners(&points)
 }
 
 /// Whether a list needs no other way of planning: it is long, and dense all along. Straight legs with few
@@ -194,7 +206,11 @@ fn parts(turn: &Vector3<f64>) -> usize {
 }
 
 /// The motion through all sections between places where the way turns back, and between seams.
-fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Option<Motion> {
+fn sections<const D: usize>(
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    divided: bool,
+) -> Option<Motion> {
     let units = Units::new(options);
     let points = units.points::<D>(poses);
     let turning = Chords::new(&points).turning_points(&points);
@@ -211,7 +227,7 @@ fn sections<const D: usize>(poses: &[Isometry3<f64>], options: &SmoothOptions) -
         } else {
             RestCause::TurnsBack
         };
-        let section = Section::<D>::new(&poses[from..=to], options, units);
+        let section = Section::<D>::new(&poses[from..=to], options, (units, divided));
         motion.append(section.motion()?, cause);
         from = to;
     }

@@ -30,8 +30,9 @@ const ATTEMPTS: usize = 8;
 pub(super) const FIT_KNOTS: f64 = 6.0;
 /// Sections of so few poses that cannot be fitted are left to the time-optimal spline.
 const FEW: usize = 12;
-/// Times that a section is divided.
-const DEPTH: usize = 10;
+/// Times that a section is divided, and times where a motion is known that rests nowhere.
+const DIVISIONS: usize = 10;
+const FEW_DIVISIONS: usize = 3;
 /// Poses around one that was missed whose balls become smaller.
 const NEAR: usize = 3;
 /// A ratio to a limit up to this is met by stretching time; for more a law is computed again with
@@ -50,7 +51,9 @@ pub(super) struct Section<'a, const D: usize> {
     poses: &'a [Isometry3<f64>],
     options: &'a SmoothOptions,
     units: Units,
-    depth: usize,
+    /// How often it may be divided where a fit fails, and whether it stops at each pose then: else there is no motion.
+    divisions: usize,
+    stops: bool,
 }
 
 /// Why no curve was found.
@@ -70,17 +73,18 @@ struct TimedCurve<const D: usize> {
 }
 
 impl<'a, const D: usize> Section<'a, D> {
-    /// The section through `poses`.
+    /// The section through `poses`, which may be `divided` as often as needed where a fit fails.
     pub(super) fn new(
         poses: &'a [Isometry3<f64>],
         options: &'a SmoothOptions,
-        units: Units,
+        (units, divided): (Units, bool),
     ) -> Self {
         Self {
             poses,
             options,
             units,
-            depth: DEPTH,
+            divisions: if divided { DIVISIONS } else { FEW_DIVISIONS },
+            stops: divided,
         }
     }
 
@@ -94,17 +98,18 @@ impl<'a, const D: usize> Section<'a, D> {
         match self.fitted() {
             Ok(motion) => Some(motion),
             Err(Failure::TooFast) => None,
+            Err(_) if self.divisions == 0 && !self.stops => None,
             Err(_) if last < FEW => Some(from_rest(&Window::from_rest(
                 self.poses,
                 self.options,
                 Then::More,
             ))),
-            Err(_) if self.depth == 0 => Some(corners(self.poses, self.options)),
+            Err(_) if self.divisions == 0 => Some(corners(self.poses, self.options)),
             Err(Failure::Missed(worst)) => {
                 let at = worst.clamp(1, last - 1);
                 let part = |poses| Section {
                     poses,
-                    depth: self.depth - 1,
+                    divisions: self.divisions - 1,
                     ..self
                 };
                 let mut motion = part(&self.poses[..=at]).motion()?;
