@@ -196,23 +196,27 @@ impl<'a> List<'a> {
     }
 
     /// The fastest of a doubtful motion and others: of splines from the other end where it rests without need; of searches
-    /// that start from the motion and, if that is far above the bound then, from the one of another way of planning; and of
+    /// that start from the motion and, if that is far above the bound then, from those of other ways of planning; and of
     /// those within less of the tolerance, where an attempt failed, the list is too long for searches, or the motion is
     /// still far above the bound.
     fn compared(&self, form: &NormalForm, first: Found, other: Option<Found>) -> Option<Found> {
         let (hard, mut best) = (first.is_hard(), first);
+        let mut others = [other, None];
         if best.is_divided() && !self.is_fitted_alone(&best) {
             let turned = form.turned(self.poses, self.options);
-            best = Found::faster(Some(best), self.by_windows(&turned, &turned.options))?;
+            let turned = self.by_windows(&turned, &turned.options);
+            (best, others[1]) = Found::ordered(Some(best), turned)?;
         }
         best = self.refined(form, best);
         // A long list that was divided at seams only is as fast within less.
         if best.is_divided() && self.is_fitted_alone(&best) {
             return Some(best);
         }
-        // A search may end elsewhere from the slower one of two motions.
-        if let Some(other) = other.filter(|_| self.is_far(&best)) {
-            best = Found::faster(Some(best), Some(self.refined(form, other)))?;
+        // A search may end elsewhere from a slower motion.
+        for other in others.into_iter().flatten() {
+            if self.is_far(&best) {
+                best = Found::faster(Some(best), Some(self.refined(form, other)))?;
+            }
         }
         if hard || self.is_far(&best) || best.is_hard() || self.is_long() {
             let before = best.plan.duration();

@@ -191,9 +191,14 @@ impl<'a, const D: usize> Section<'a, D> {
         let mut best = self.timed(parameters, balls, &limits)?;
         for _ in 0..REFITS {
             let before = best.timed.certificate.duration;
-            let next = self.timed(&self.time_parameters(&best, density), balls, &limits);
-            let Some(next) = next
-                .ok()
+            // A tight bend takes little time, so it may need more knots over time than over its chords.
+            let refitted = |more: f64| {
+                let parameters = self.time_parameters(&best, density * more);
+                self.timed(&parameters, balls, &limits).ok()
+            };
+            let Some(next) = DENSITIES
+                .into_iter()
+                .find_map(refitted)
                 .filter(|next| next.timed.certificate.duration < before)
             else {
                 break;
