@@ -39,33 +39,31 @@ pub(crate) fn words(note: &Value) -> (LogLevel, String) {
                 format!("aborted, {dropped} commands dropped"),
             )
         }
-        "not-arrived" => {
-            let error = note["error"].as_f64().unwrap_or(f64::NAN);
-            let joint = number("joint");
-            (
-                LogLevel::Warn,
-                format!("joint {joint} is {error:.4} from its end and does not arrive"),
-            )
-        }
-        "end-missed" => {
-            let off = |key: &str| note[key].as_f64().unwrap_or(f64::NAN);
-            let (point, angle) = (off("off_m") * 1e3, off("off_rad").to_degrees());
-            let said = format!(
-                "the measured tool came no nearer to its end than {point:.3} mm and {angle:.3} degrees"
-            );
-            (LogLevel::Warn, said)
-        }
-        "not-settled" => {
-            let (error, joint) = (note["error"].as_f64().unwrap_or(f64::NAN), number("joint"));
-            let said = format!(
-                "joint {joint} is {error:.6} from the last setpoint, and the driver does not come to rest"
-            );
-            (LogLevel::Warn, said)
-        }
+        "not-arrived" | "end-missed" | "not-settled" => (LogLevel::Warn, missed(note)),
         "faulted" => (LogLevel::Error, format!("fault: {}", text("reason"))),
         "recovered" => (LogLevel::Info, "the fault is cleared".to_owned()),
         "closed" => (LogLevel::Error, "the engine has ended".to_owned()),
         _ => (LogLevel::Info, note.to_string()),
+    }
+}
+
+/// Where the arm is not, although the plan is, in words.
+fn missed(note: &Value) -> String {
+    let number = |key: &str| note[key].as_f64().unwrap_or(f64::NAN);
+    let (joint, error) = (number("joint"), number("error"));
+    match note["event"].as_str() {
+        Some("not-arrived") => {
+            format!("joint {joint} is {error:.4} from its end and does not arrive")
+        }
+        Some("end-missed") => {
+            let (point, angle) = (number("off_m") * 1e3, number("off_rad").to_degrees());
+            format!(
+                "the measured tool came no nearer to its end than {point:.3} mm and {angle:.3} degrees"
+            )
+        }
+        _ => format!(
+            "joint {joint} is {error:.6} from the last setpoint, and the driver does not come to rest"
+        ),
     }
 }
 

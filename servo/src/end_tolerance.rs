@@ -65,8 +65,9 @@ impl<const N: usize> EndTolerance<N> {
     /// How far the tool is from the end when the joints are at `measured` (rad, m).
     pub fn off(&self, measured: &SVector<f64, N>) -> OffEnd {
         let twist = self.jacobian * (measured - self.joints);
-        let part = |first: usize| Vector3::new(twist[first], twist[first + 1], twist[first + 2]);
-        let (point, angle) = (part(0).norm(), part(3).norm());
+        let [vx, vy, vz, wx, wy, wz] = twist.data.0[0];
+        let point = Vector3::new(vx, vy, vz).norm();
+        let angle = Vector3::new(wx, wy, wz).norm();
         OffEnd {
             point,
             angle,

@@ -46,30 +46,9 @@ impl<const N: usize> Worker<'_, N> {
                 }
                 self.report_done();
             }
-            Event::NotArrived {
-                command,
-                joint,
-                error,
-                ..
-            } => self.say(Note::NotArrived {
-                id: command,
-                joint: joint + 1,
-                error,
-            }),
-            Event::EndMissed {
-                command,
-                point,
-                angle,
-                ..
-            } => self.say(Note::EndMissed {
-                id: command,
-                off_m: point,
-                off_rad: angle,
-            }),
-            Event::NotSettled { joint, error, .. } => self.say(Note::NotSettled {
-                joint: joint + 1,
-                error,
-            }),
+            Event::NotArrived { .. } | Event::EndMissed { .. } | Event::NotSettled { .. } => {
+                self.say_missed(event);
+            }
             Event::Spliced { by, accepted, .. } => self.spliced = Some((by, accepted)),
             Event::SpeedAsked { share, .. } => self.say(Note::SpeedAsked { share }),
             Event::Stopped { .. } => self.say(Note::Stopped),
@@ -90,6 +69,37 @@ impl<const N: usize> Worker<'_, N> {
             }
             Event::Ended { .. } => self.closing = true,
         }
+    }
+
+    /// Says where the arm is not, although the plan is.
+    fn say_missed(&mut self, event: Event) {
+        self.say(match event {
+            Event::NotArrived {
+                command,
+                joint,
+                error,
+                ..
+            } => Note::NotArrived {
+                id: command,
+                joint: joint + 1,
+                error,
+            },
+            Event::EndMissed {
+                command,
+                point,
+                angle,
+                ..
+            } => Note::EndMissed {
+                id: command,
+                off_m: point,
+                off_rad: angle,
+            },
+            Event::NotSettled { joint, error, .. } => Note::NotSettled {
+                joint: joint + 1,
+                error,
+            },
+            _ => return,
+        });
     }
 
     /// Drops everything, and keeps the fault until an operator recovers from it.

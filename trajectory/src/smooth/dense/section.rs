@@ -196,8 +196,11 @@ impl<'a, const D: usize> Section<'a, D> {
                 let parameters = self.time_parameters(&best, density * more);
                 self.timed(&parameters, balls, &limits).ok()
             };
+            // Orientations may turn between poses then, which poses on the legs do not allow.
+            let tries = if D == 3 { DENSITIES.len() } else { 1 };
             let Some(next) = DENSITIES
                 .into_iter()
+                .take(tries)
                 .find_map(refitted)
                 .filter(|next| next.timed.certificate.duration < before)
             else {
