@@ -342,11 +342,10 @@ impl<const N: usize> Worker<'_, N> {
     }
 
     /// The work of one step; a command without work is finished at once. The tolerances of the end are
-    /// for commands of the `language` that move to a pose.
+    /// for commands of the `language`.
     fn enlist(&mut self, flight: &mut InFlight<N>, step: Step<N>, language: bool) {
         let command = flight.id;
         self.enlist_guards(flight, &step);
-        let posed = matches!(step.task, Task::Move(_) | Task::Screw(_) | Task::Legs(_));
         match step.task {
             Task::Message { text } => flight.says = Some(Note::Message { text }),
             Task::End { reason } => flight.says = Some(Note::Ended { reason }),
@@ -371,9 +370,8 @@ impl<const N: usize> Worker<'_, N> {
             .planned
             .as_ref()
             .map_or(&[][..], |planned| planned.trajectory.pieces());
-        let settings = Some(self.controller.modal().settings()).filter(|_| posed && language);
-        let within = settings.and_then(|it| end_tolerance(command, pieces, &flight.chain, it));
-        self.work.extend(motion(command, pieces, true, within));
+        let end = end_tolerance(command, pieces, &self.controller).filter(|_| language);
+        self.work.extend(motion(command, pieces, true, end));
         if !pieces.is_empty() {
             flight.motion = step.planned.map(|planned| planned.trajectory);
             return;

@@ -151,9 +151,7 @@ impl<const N: usize> Runner<N> {
             awaited.look(&measured);
         }
         while let Some(first) = self.awaited.front().copied() {
-            if let Awaited::End { .. } = first
-                && !self.ends_with(&first)
-            {
+            if !self.ends_with(&first) {
                 return;
             }
             self.awaited.pop_front();
@@ -161,7 +159,8 @@ impl<const N: usize> Runner<N> {
         }
     }
 
-    /// Whether the arm has arrived, or is not waited for any longer; then what it misses is reported.
+    /// Whether the arm has arrived, or is not waited for any longer; then what it misses is reported. An event
+    /// waits for nothing else.
     fn ends_with(&mut self, first: &Awaited<N>) -> bool {
         let Awaited::End {
             command,

@@ -1,7 +1,6 @@
 //! A planned motion as work of the real-time thread, and how near the measured tool must come to its end.
 
-use kinematics::Chain;
-use planner::modal::Settings;
+use planner::controller::Controller;
 use realtime::{Piece, Segment};
 use servo::{EndTolerance, Work};
 
@@ -33,8 +32,7 @@ pub(super) fn motion<const N: usize>(
 pub(super) fn end_tolerance<const N: usize>(
     command: u32,
     pieces: &[Piece<N>],
-    chain: &Chain<N>,
-    settings: &Settings,
+    controller: &Controller<N>,
 ) -> Option<EndTolerance<N>> {
     let given = |tolerance: f64| {
         if tolerance > 0.0 {
@@ -43,6 +41,7 @@ pub(super) fn end_tolerance<const N: usize>(
             f64::INFINITY
         }
     };
+    let settings = controller.modal().settings();
     let [point, angle] = [settings.end_point, settings.end_angle].map(given);
     let last = pieces
         .last()
@@ -51,8 +50,43 @@ pub(super) fn end_tolerance<const N: usize>(
     Some(EndTolerance {
         command,
         joints,
-        jacobian: chain.jacobian(&joints).1,
+        jacobian: controller.chain().jacobian(&joints).1,
         point,
         angle,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The tolerance that the last command of a program gets on a UR5e.
+    fn of_last(program: &str) -> Option<EndTolerance<6>> {
+        let robot = planner::robot::load("ur5e").unwrap();
+        let mut controller = Controller::<6>::new(&robot, 1000.0, crcl::LengthUnit::Meter).unwrap();
+        let reading = crcl::text::read(program, &crcl::ReadOptions::default());
+        let mut found = None;
+        for command in reading.program.iter() {
+            let step = controller.step(command).unwrap();
+            let planned = step.planned.as_ref();
+            let pieces = planned.map_or(&[][..], |it| it.trajectory.pieces());
+            found = end_tolerance(1, pieces, &controller);
+        }
+        found
+    }
+
+    #[test]
+    fn moves_have_the_end_tolerance_that_is_set() {
+        let units = "InitCanon()\nSetLengthUnits(\"mm\")\n";
+        let set = format!("{units}SetEndPointTolerance(0.5)\n");
+        let pose = "{{400, 100, 300}, {0, 0, -1}, {1, 0, 0}}";
+        let to_pose = format!("MoveTo({pose})\n");
+        let of_joint = "ActuateJoints({{1, 10}})\n";
+        for moves in [&to_pose, of_joint] {
+            let end = of_last(&format!("{set}{moves}")).unwrap();
+            assert_eq!((end.point, end.angle), (5e-4, f64::INFINITY));
+            assert_eq!(of_last(&format!("{units}{moves}")), None);
+        }
+        assert_eq!(of_last(&format!("{set}Dwell(0.1)\n")), None);
+    }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crcl::Located;
 use planner::controller::{Controller, Step};
 use planner::task::Task;
-use servo::Splice;
+use servo::{EndTolerance, Splice};
 use trajectory::Trajectory;
 
 use super::super::ReplaceError;
@@ -122,7 +122,9 @@ impl<const N: usize> Worker<'_, N> {
                         path_time,
                         by,
                     };
-                    self.send_motion(splice, &planned.trajectory, &new.controller);
+                    let pieces = planned.trajectory.pieces();
+                    let end = end_tolerance(by, pieces, &new.controller);
+                    self.send_motion(splice, &planned.trajectory, end);
                     flight.motion = Some(planned.trajectory);
                 }
                 None => flight.finished = Some(0),
@@ -143,12 +145,9 @@ impl<const N: usize> Worker<'_, N> {
         Ok(ids)
     }
 
-    fn send_motion(&mut self, splice: Splice, way: &Trajectory<N>, controller: &Controller<N>) {
+    fn send_motion(&mut self, splice: Splice, way: &Trajectory<N>, end: Option<EndTolerance<N>>) {
         self.work.push_back(Work::Splice(splice));
-        let (chain, settings) = (controller.chain(), controller.modal().settings());
-        let within = end_tolerance(splice.by, way.pieces(), chain, settings);
-        self.work
-            .extend(motion(splice.by, way.pieces(), true, within));
+        self.work.extend(motion(splice.by, way.pieces(), true, end));
         self.spliced = None;
         self.feed();
     }

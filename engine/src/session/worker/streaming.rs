@@ -55,9 +55,12 @@ impl<const N: usize> Worker<'_, N> {
             Err(error) => return self.end_on_the_way(&streaming, error),
         };
         let (pieces, whole) = (&window.pieces, window.last);
-        let (chain, settings) = (self.controller.chain(), self.controller.modal().settings());
-        let within = end_tolerance(command, pieces, chain, settings).filter(|_| whole);
-        self.work.extend(motion(command, pieces, whole, within));
+        let end = if whole {
+            end_tolerance(command, pieces, &self.controller)
+        } else {
+            None
+        };
+        self.work.extend(motion(command, pieces, whole, end));
         if let Some(flight) = self.flight.iter_mut().find(|flight| flight.id == command) {
             flight.planned_s = streaming.windowed.duration();
         }
