@@ -146,7 +146,7 @@ fn in_parts(window: &Window<'_>) -> Motion {
 /// the tolerance requires a stop at every pose.
 pub(crate) fn corners(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Motion {
     let spans = if options.tolerance > RESOLUTION {
-        exact_stop::plan(&exact_stop::corners(poses), &options.limits)
+        exact_stop::plan(&exact_stop::at_corners(poses), &options.limits)
     } else {
         exact_stop::plan(poses, &options.limits)
     };

@@ -123,16 +123,27 @@ pub(crate) fn duration(poses: &[Isometry3<f64>], limits: &ToolLimits) -> f64 {
         .sum()
 }
 
-/// The poses without those that the straight leg between their neighbours passes anyway, in
+/// Which poses of a list are its ends and corners: the straight legs between them pass the other poses anyway, in
 /// position and in orientation.
-pub(crate) fn corners(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
-    let mut kept: Vec<_> = poses.first().copied().into_iter().collect();
-    let (last, mut from) = (poses.len().saturating_sub(1), 0);
-    while from < last {
-        from = farthest(poses, from);
-        kept.push(poses[from]);
-    }
-    kept
+///
+/// ```
+/// use nalgebra::Isometry3;
+/// use trajectory::smooth::corners;
+/// let at = |x: f64, y: f64| Isometry3::translation(x, y, 0.0);
+/// let poses = [at(0.0, 0.0), at(0.1, 0.0), at(0.2, 0.0), at(0.2, 0.1)];
+/// assert!(corners(&poses).eq([0, 2, 3]));
+/// ```
+pub fn corners(poses: &[Isometry3<f64>]) -> impl Iterator<Item = usize> {
+    let last = poses.len().saturating_sub(1);
+    let first = (!poses.is_empty()).then_some(0);
+    std::iter::successors(first, move |from| {
+        (*from < last).then(|| farthest(poses, *from))
+    })
+}
+
+/// The poses at the ends and corners of a list.
+pub(crate) fn at_corners(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
+    corners(poses).map(|at| poses[at]).collect()
 }
 
 /// The farthest pose that is found to which a leg from pose `from` passes those between: doubling finds one too
@@ -191,7 +202,7 @@ mod tests {
             .map(|i| at(1e-3 * f64::from(i), 0.0))
             .collect();
         way.extend((1..700_i32).map(|i| at(0.999, 1e-3 * f64::from(i))));
-        assert_eq!(corners(&way), [way[0], way[999], way[1698]]);
+        assert_eq!(at_corners(&way), [way[0], way[999], way[1698]]);
         let back = [
             at(0.0, 0.0),
             at(0.2, 0.0),
@@ -199,8 +210,8 @@ mod tests {
             at(0.1, 0.0),
             at(0.0, 0.0),
         ];
-        assert_eq!(corners(&back[..3]), back[..3]);
-        assert_eq!(corners(&back).len(), 5);
+        assert_eq!(at_corners(&back[..3]), back[..3]);
+        assert_eq!(corners(&back).count(), 5);
         let turned = |x: f64, angle: f64| {
             Isometry3::from_parts(
                 at(x, 0.0).translation,
@@ -208,9 +219,9 @@ mod tests {
             )
         };
         let even = [turned(0.0, 0.0), turned(0.1, 0.2), turned(0.2, 0.4)];
-        assert_eq!(corners(&even), [even[0], even[2]]);
+        assert_eq!(at_corners(&even), [even[0], even[2]]);
         let uneven = [turned(0.0, 0.0), turned(0.1, 0.3), turned(0.2, 0.4)];
-        assert_eq!(corners(&uneven), uneven);
-        assert_eq!(corners(&[]), []);
+        assert_eq!(at_corners(&uneven), uneven);
+        assert_eq!(at_corners(&[]), []);
     }
 }

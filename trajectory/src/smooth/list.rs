@@ -63,7 +63,7 @@ fn legs(poses: &[Isometry3<f64>], options: &SmoothOptions) -> Vec<Isometry3<f64>
     if options.tolerance <= RESOLUTION || options.corridor() > options.tolerance {
         poses.to_vec()
     } else {
-        exact_stop::corners(poses)
+        exact_stop::at_corners(poses)
     }
 }
 
@@ -247,7 +247,9 @@ impl<'a> List<'a> {
             let before = best.plan.duration();
             if fit {
                 let again = best.is_hard() || self.is_far(&best);
-                let fit = refined(self.fit(form, &options), again);
+                // Divided a few times only if a motion is known that rests nowhere, and searches start from it.
+                let divided = self.is_long() || !self.unrested.get();
+                let fit = refined(self.fit(form, &options, divided), again);
                 best = Found::faster(Some(best), fit)?;
             }
             if spline {
@@ -343,21 +345,17 @@ impl<'a> List<'a> {
     /// The motion along a fitted curve: the faster one from both ends if that from the first is
     /// slower than it might be; where a fit fails the list is divided as often as needed if it may be `divided`.
     fn fitted(&self, form: &NormalForm, divided: bool) -> Option<Found> {
-        let fit = |form: &NormalForm| {
-            self.certified(form, dense::plan(&form.poses, &form.options, divided)?)
-        };
-        let first = fit(form);
+        let first = self.fit(form, &form.options, divided);
         let good = |first: &Found| first.suffices() || self.is_fitted_alone(first);
         if first.as_ref().map_or(!divided, good) {
             return first;
         }
-        Found::faster(first, fit(&form.turned(self.poses, self.options)))
+        let turned = form.turned(self.poses, self.options);
+        Found::faster(first, self.fit(&turned, &turned.options, divided))
     }
 
-    /// The same from one end, under options of the form; divided a few times only if a motion is known that rests nowhere, and
-    /// searches start from it.
-    fn fit(&self, form: &NormalForm, options: &SmoothOptions) -> Option<Found> {
-        let divided = self.is_long() || !self.unrested.get();
+    /// The motion along a curve fitted from one end, under options of the form.
+    fn fit(&self, form: &NormalForm, options: &SmoothOptions, divided: bool) -> Option<Found> {
         self.certified(form, dense::plan(&form.poses, options, divided)?)
     }
 

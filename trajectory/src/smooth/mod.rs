@@ -51,6 +51,7 @@ pub use arm::{ArmMotion, ArmState, JointBounds, JointState};
 pub use certificate::{Certificate, Peak, off_segment};
 pub use crossing::{Crossing, RESOLUTION};
 pub use dense::{FittedCurve, FittedPart};
+pub use exact_stop::corners;
 pub use for_arm::{ArmPlan, SpareSpline, plan_for_arm};
 pub use list::plan;
 pub use lower_bound::{least_time, least_turning_time};

@@ -278,7 +278,7 @@ impl Windows {
     /// Whether the straight path has a corner at a pose.
     fn turns(&self, pose: usize) -> bool {
         let around = pose.saturating_sub(1)..(pose + 2).min(self.poses.len());
-        exact_stop::corners(&self.poses[around.clone()]).len() == around.len()
+        exact_stop::corners(&self.poses[around.clone()]).count() == around.len()
     }
 
     /// Motion from the end of `done` to rest in pose `end`.

@@ -25,6 +25,9 @@ use crate::smooth::options::SmoothOptions;
 const OFF: f64 = 1e-9;
 const OFF_SHARE: f64 = 0.01;
 
+/// Most knots of a curve over time, in those of the first fit: there is no other to compare it with.
+const MOST_KNOTS: f64 = 2.0;
+
 /// A smooth curve from the first pose of a long dense list to the last, without times: it passes all
 /// poses between them in order within 0.98 of the tolerances, and stays within 0.98 of the corridor.
 ///
@@ -240,7 +243,8 @@ impl<'a> Trials<'a> {
         let profile = Profile::new(&curve, limits);
         let timed = (|time| profile.parameter(time), profile.duration());
         let ramp = limits.acceleration / limits.jerk;
-        TimeParameter::new(&curve, timed, ramp, density * FIT_KNOTS).change(&mut parameters);
+        let knots = [density * FIT_KNOTS, MOST_KNOTS];
+        TimeParameter::new(&curve, timed, ramp, knots).change(&mut parameters);
         parameters
     }
 }

@@ -28,6 +28,8 @@ const GAIN: f64 = 1e-3;
 const ATTEMPTS: usize = 8;
 /// Knots of a fit in a ramp of the acceleration.
 pub(super) const FIT_KNOTS: f64 = 6.0;
+/// Most knots of a refit over time, in those of the curve before: with more, where a ramp is very short, a curve waves.
+const MOST_KNOTS: f64 = 4.0;
 /// Sections of so few poses that cannot be fitted are left to the time-optimal spline.
 const FEW: usize = 12;
 /// Times that a section is divided, and times where a motion is known that rests nowhere.
@@ -193,7 +195,7 @@ impl<'a, const D: usize> Section<'a, D> {
             let before = best.timed.certificate.duration;
             // A tight bend takes little time, so it may need more knots over time than over its chords.
             let refitted = |more: f64| {
-                let parameters = self.time_parameters(&best, density * more);
+                let parameters = self.time_parameters(&best, [density, more]);
                 self.timed(&parameters, balls, &limits).ok()
             };
             // Orientations may turn between poses then, which poses on the legs do not allow.
@@ -260,12 +262,12 @@ impl<'a, const D: usize> Section<'a, D> {
     }
 
     /// Parameters for the poses that run like the time of a law.
-    fn time_parameters(&self, best: &TimedCurve<D>, density: f64) -> Vec<f64> {
+    fn time_parameters(&self, best: &TimedCurve<D>, [density, more]: [f64; 2]) -> Vec<f64> {
         let ramp = self.options.limits.acceleration / self.options.limits.jerk;
         let law = &best.timed.law;
         let timed = (|time| law.sample(time).position[0], law.duration());
-        TimeParameter::new(&best.curve, timed, ramp, density * FIT_KNOTS)
-            .map(&best.curve.fit.parameters)
+        let knots = [density * more * FIT_KNOTS, more * MOST_KNOTS];
+        TimeParameter::new(&best.curve, timed, ramp, knots).map(&best.curve.fit.parameters)
     }
 
     /// Spans of the motion along a curve.

@@ -4,6 +4,7 @@
 //! fast.
 
 use super::curve::Curve;
+use crate::ToolCurve;
 
 /// Samples of a law in one ramp of the acceleration.
 const SAMPLES: usize = 8;
@@ -21,13 +22,13 @@ pub(super) struct TimeParameter {
 
 impl TimeParameter {
     /// From a curve and its law, which takes `total` (s) and gives the parameter at a time, averaged over a ramp of the acceleration, `ramp` (s), with so many
-    /// knots in one. From either end, where the law rests, to the first place where it is fastest, the
+    /// knots in one, but no more than so many times those of the curve. From either end, where the law rests, to the first place where it is fastest, the
     /// speed of that place counts: a curve whose parameter rests would have no direction.
     pub(super) fn new<const D: usize>(
         curve: &Curve<D>,
         (law, total): (impl Fn(f64) -> f64, f64),
         ramp: f64,
-        knots: f64,
+        [knots, most]: [f64; 2],
     ) -> Self {
         let half = SAMPLES / 2;
         let steps = (SAMPLES as f64 * total / ramp)
@@ -56,7 +57,8 @@ impl TimeParameter {
             let slow = 0.5 * (1.0 / speed[k] + 1.0 / speed[k + 1]);
             to.push(to[k] + (way[k + 1] - way[k]) * slow);
         }
-        let whole = (knots * to[steps] / ramp).round().max(FEWEST);
+        let whole = (knots * to[steps] / ramp).min(most * curve.end());
+        let whole = whole.round().max(FEWEST);
         let scale = whole / to[steps];
         to.iter_mut().for_each(|x| *x *= scale);
         to[steps] = whole;
