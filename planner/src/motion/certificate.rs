@@ -331,7 +331,7 @@ const EXACT_ANGLE: f64 = 1e-6;
 const NEAR: f64 = 2e-3;
 
 /// Minimum of a unimodal function between two times, by golden section.
-fn closest(within: Range<f64>, distance: impl Fn(f64) -> f64) -> (f64, f64) {
+pub(super) fn closest(within: Range<f64>, distance: impl Fn(f64) -> f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut low, mut high) = (within.start, within.end);
     let mut left = high - GOLDEN * (high - low);

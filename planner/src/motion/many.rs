@@ -93,7 +93,7 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<Option<PlannedMove<N>>, MotionError> {
-        let Some(mut tried) = self.tried_from_rough(motion, start) else {
+        let Some(mut tried) = self.tried_from_rough(motion, start)? else {
             return Ok(None);
         };
         let stops = if tried.is_fast() {
@@ -111,19 +111,30 @@ impl<const N: usize> Planner<N> {
     }
 
     /// What searches have found that begin at rough curves; `None` if the list is dense or the tool rules.
-    fn tried_from_rough(&self, motion: &Move, start: &SVector<f64, N>) -> Option<Tried<N>> {
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`] if no other curve need be tried where the joints do not follow the first.
+    fn tried_from_rough(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<Option<Tried<N>>, MotionError> {
         let mut tried = Tried::nothing();
         for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
             let (curve, course) = match self.rough(motion, start, beginning) {
                 Ok(rough) => rough,
-                Err(Failure { error, .. }) => {
-                    tried.failed.get_or_insert(error);
+                Err(failure) => {
+                    if k == 0 && self.is_refused(&failure, motion, start) {
+                        return Err(self.blamed(failure.error, motion, start));
+                    }
+                    tried.failed.get_or_insert(failure.error);
                     continue;
                 }
             };
             let time = course.time;
             if curve.is_dense() || k == 0 && time <= RULED * curve.path.plan.duration() {
-                return None;
+                return Ok(None);
             }
             let found = self.with_joints(motion, start, course);
             tried.add_curve(time, curve, found);
@@ -131,7 +142,7 @@ impl<const N: usize> Planner<N> {
                 break;
             }
         }
-        Some(tried)
+        Ok(Some(tried))
     }
 
     /// The motion of a search with the joints that begins at straight moves to each pose in turn, with a stop at each.

@@ -28,6 +28,8 @@ const OTHER_GAP: f64 = 0.5;
 /// The same where the joints cannot follow the first curve: also one that differs only in that it is rounder.
 const INSTEAD: [[f64; 2]; 5] = [[1.0, 0.6], [1.0, 0.4], [0.7, 1.0], [0.6, 0.6], [1.0, 1.0]];
 const INSTEAD_GAP: f64 = 1.0;
+/// Time of the joints over its bound up to which a fitted curve is not compared with others.
+const UNEVEN: f64 = 1.06;
 /// Share by which the joints may be faster along another curve than their bound along it foretells.
 const SPREAD: f64 = 4e-3;
 /// The most that a motion takes over the bound along its curve for that to say something of other curves.
@@ -38,6 +40,9 @@ const FEW: usize = 20;
 /// A list of more poses than so is dear to plan for the tool alone: one that is dense is not searched with the joints, and one that
 /// does not turn is searched in parts.
 const MANY: usize = 60;
+
+/// Least tolerance, in mean legs of a list, within which its parts are searched: within less they take seconds and find nothing.
+const ROOM: f64 = 0.01;
 
 /// What is known before other curves are tried.
 #[derive(Clone, Copy)]
@@ -179,13 +184,23 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        let is_open = motion.tolerance > 0.0 && !curve.is_dense();
+        let is_open = self.has_room(motion, start) && !curve.is_dense();
         if !Self::has_many(motion) || !is_open || self.turns(motion, start) {
             return None;
         }
         let most = planned.trajectory.duration();
         let found = self.in_parts(motion, start)?;
         (found.trajectory.duration() < most).then_some(found)
+    }
+
+    /// Whether the tolerance leaves room beside the legs of a list for curves of another shape.
+    fn has_room(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+        let poses = self.through(motion, start);
+        let leg = |pair: &[Isometry3<f64>]| {
+            (pair[1].translation.vector - pair[0].translation.vector).norm()
+        };
+        let length: f64 = poses.windows(2).map(leg).sum();
+        motion.tolerance * motion.poses.len() as f64 >= ROOM * length
     }
 
     /// Whether a list has many poses for a search with the joints.
@@ -207,7 +222,7 @@ impl<const N: usize> Planner<N> {
 
     /// The fastest of the motion found and of those along curves planned for less speed along or about,
     /// where the joints rule: the fastest curve of the tool is not the fastest one for the joints. Only where
-    /// a curve is cheap to plan.
+    /// a curve is cheap to plan, and may be slow.
     fn for_the_joints(
         &self,
         motion: &Move,
@@ -215,10 +230,16 @@ impl<const N: usize> Planner<N> {
         (first, curve): (Along<N>, &Followed<N>),
     ) -> PlannedMove<N> {
         let time = first.planned.trajectory.duration();
-        if time <= RULED * first.tool || motion.tolerance <= 0.0 || first.spans > CHEAP {
+        let fitted = curve.path.is_fitted();
+        let cheap = first.spans <= CHEAP || fitted && first.spans <= 4 * motion.poses.len();
+        if time <= RULED * first.tool || motion.tolerance <= 0.0 || !cheap {
             return first.planned;
         }
         let least = self.least_along(curve, motion).unwrap_or(time);
+        // Where they do, the limits of jerk cost little along a fitted curve as it should be.
+        if fitted && time <= UNEVEN * least {
+            return first.planned;
+        }
         let known = Known {
             time,
             over: (time / least).min(FORETOLD),

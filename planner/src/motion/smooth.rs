@@ -16,6 +16,9 @@ use crate::task::{Move, Shape};
 /// Share of the tolerance that is tried where all of it fails with the joints.
 const QUARTER: f64 = 0.25;
 
+/// Tolerance (m) up to which a curve through dense poses meets the limits of the joints and the singular places that its legs meet.
+const NARROW: f64 = 2e-3;
+
 /// Whether a curve may be possible for the tool, and only the joints fail on it.
 fn is_of_the_joints(error: &MotionError) -> bool {
     matches!(
@@ -44,11 +47,17 @@ pub(super) struct Failure {
     pub(super) error: MotionError,
     /// Spans of the curve; none if there is no curve.
     spans: usize,
+    /// Whether there is a curve through dense poses, near to them.
+    near: bool,
 }
 
 impl From<MotionError> for Failure {
     fn from(error: MotionError) -> Self {
-        Self { error, spans: 0 }
+        Self {
+            error,
+            spans: 0,
+            near: false,
+        }
     }
 }
 
@@ -74,17 +83,33 @@ impl<const N: usize> Planner<N> {
         if let Some(windowed) = self.begin_windows(Cow::Borrowed(motion), start) {
             return self.all_windows(windowed);
         }
+        if let Some(corners) = self.corners(motion, start)
+            && let Ok(planned) = self.smooth_through(&corners.motion, start)
+            && let Some(whole) = self.through_all(motion, start, (planned, &corners))
+        {
+            return Ok(whole);
+        }
+        self.smooth_through(motion, start)
+    }
+
+    /// The same through all poses, as a whole.
+    fn smooth_through(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Result<PlannedMove<N>, MotionError> {
         if let Some(rounder) = self.rounder(motion, start)? {
             return self.or_straight(motion, start, rounder);
         }
         let planned = match self.blended(motion, start, motion) {
             Ok((first, curve)) => self.for_the_arm(motion, start, (first, &curve)),
-            Err(Failure { error, spans }) => {
-                let error = self.blamed(error, motion, start);
-                if motion.tolerance <= 0.0 || !is_of_the_joints(&error) {
+            Err(failure) => {
+                let refused = motion.tolerance <= 0.0 || self.is_refused(&failure, motion, start);
+                let error = self.blamed(failure.error, motion, start);
+                if refused || !is_of_the_joints(&error) {
                     return Err(error);
                 }
-                self.elsewhere(motion, start, (error, spans))?
+                self.elsewhere(motion, start, (error, failure.spans))?
             }
         };
         self.or_straight(motion, start, planned)
@@ -140,6 +165,16 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> bool {
         matches!(error, MotionError::Blocked { .. }) && !self.legs_are_free(motion, start)
+    }
+
+    /// Whether no other curve need be tried: the joints follow neither one through dense poses nor the straight legs, which it is near.
+    pub(super) fn is_refused(
+        &self,
+        failure: &Failure,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> bool {
+        failure.near && self.is_blocked_anyway(&failure.error, motion, start)
     }
 
     /// Whether the joints can follow straight legs to all poses; much cheaper than a curve.
@@ -244,11 +279,12 @@ impl<const N: usize> Planner<N> {
             return Err(MotionError::NoWay.into());
         }
         let (spans, fitted) = (path.plan.spans(), path.is_fitted());
+        let near = path.is_dense() && curve.tolerance <= NARROW;
         match self.joints_on(path, start, None) {
             Err(error) if fitted && !self.is_blocked_anyway(&error, curve, start) => {
                 self.curve(start, (curve, search), false)
             }
-            followed => followed.map_err(|error| Failure { error, spans }),
+            followed => followed.map_err(|error| Failure { error, spans, near }),
         }
     }
 
@@ -261,7 +297,11 @@ impl<const N: usize> Planner<N> {
     ) -> Result<Along<N>, Failure> {
         let path = &followed.path;
         let spans = path.plan.spans();
-        let failure = |error| Failure { error, spans };
+        let failure = |error| Failure {
+            error,
+            spans,
+            near: false,
+        };
         let mut planned = Err(MotionError::NoWay);
         let drafts = self.along_smooth(followed, motion, (start, most));
         for draft in drafts.map_err(failure)? {

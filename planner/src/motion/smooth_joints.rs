@@ -2,11 +2,12 @@
 
 use kinematics::follow::{self, FollowPoint, NullMotion};
 use nalgebra::{Isometry3, SVector};
-use trajectory::timing::PathTiming;
+use trajectory::timing::{self, PathTiming};
 use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, smooth};
 
 use super::cartesian::{Way, is_still, joint_path, pieces};
 use super::draft::{Crossing, Draft};
+use super::few_places::FewPlaces;
 use super::soonest::RESTING;
 use super::{Blend, MotionError, Planner, ROUNDING};
 use crate::task::Move;
@@ -26,6 +27,9 @@ const ALONG: TimingOptions = TimingOptions {
     gap: 1e-3,
     ..RESTING
 };
+
+/// What a joint path costs that is known at a few points.
+type Cost<'a, const N: usize> = dyn Fn(&[FollowPoint<N>]) -> f64 + 'a;
 
 impl<const N: usize> Planner<N> {
     /// The joints along a smooth path, with a null-space motion that was found with it, or without one that helps them.
@@ -77,20 +81,45 @@ impl<const N: usize> Planner<N> {
         if !followed.may_be_helped || most <= plan.duration() * HELPED {
             return Ok(first.into_iter().collect());
         }
-        let towards = |u: f64| path.towards(u);
-        let mut way = path.way(&towards);
-        let spare = self.helping(&way, points, start);
-        way.spare = spare.as_ref();
-        let other = way.spare.and_then(|_| {
-            let points = self.followed(&way, start).ok()?;
+        let mut drafts: Vec<_> = first.into_iter().collect();
+        for points in self.helped(followed, motion, start) {
+            let most = drafts.first().map_or(most, time);
             let draft = self.fastest_along(plan, (&points, most), (&crossings, motion));
-            draft.ok().filter(|draft| time(draft) < most)
-        });
-        let drafts: Vec<_> = other.into_iter().chain(first).collect();
+            if let Some(draft) = draft.ok().filter(|draft| time(draft) < most) {
+                drafts.insert(0, draft);
+            }
+        }
         if drafts.is_empty() {
             return Err(MotionError::NoWay);
         }
         Ok(drafts)
+    }
+
+    /// The joints along a smooth path with null-space motions that help them: one that is searched by the time they need at each
+    /// point and, through dense poses, which are searched in no other way, one by about the time of a law.
+    fn helped(
+        &self,
+        Followed { path, points, .. }: &Followed<N>,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Vec<Vec<FollowPoint<N>>> {
+        let towards = |u: f64| path.towards(u);
+        let way = path.way(&towards);
+        let few = FewPlaces::new(&path.plan);
+        let at_points = |points: &[FollowPoint<N>]| self.about_time(points);
+        let of_a_law = |points: &[FollowPoint<N>]| {
+            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
+            let path = joint_path(&few, points).ok();
+            path.and_then(about).unwrap_or(f64::INFINITY)
+        };
+        let costs: [&Cost<'_, N>; 2] = [&at_points, &of_a_law];
+        let costs = &costs[..if path.is_dense() { 2 } else { 1 }];
+        let helped = |cost: &&Cost<'_, N>| {
+            let spare = self.helping(&way, points, (start, *cost))?;
+            let spare = Some(&spare);
+            self.followed(&Way { spare, ..way }, start).ok()
+        };
+        costs.iter().filter_map(helped).collect()
     }
 
     /// A lower bound of the time of the joints along a smooth path, s: of the fastest law without limits of jerk.
@@ -168,17 +197,16 @@ impl<const N: usize> Planner<N> {
             .max(1.0)
     }
 
-    /// A null-space motion with which the joints need about less time for a curve whose parameter is time.
+    /// A null-space motion that costs the joints less along a curve whose parameter is time.
     fn helping(
         &self,
         way: &Way<'_, N>,
         points: &[FollowPoint<N>],
-        start: &SVector<f64, N>,
+        (start, cost): (&SVector<f64, N>, &Cost<'_, N>),
     ) -> Option<NullMotion<N>> {
         let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
-        let cost = |points: &[FollowPoint<N>]| self.about_time(points);
         let (tool, options) = (way.tool(), way.options());
-        follow::cheaper(&self.solver, &tool, (&grid, start), &options, &cost)
+        follow::cheaper(&self.solver, &tool, (&grid, start), &options, cost)
     }
 
     /// About the time that the joints need along points whose parameter is the time of the tool: at each point
@@ -240,8 +268,7 @@ pub(super) struct Followed<const N: usize> {
 impl<const N: usize> Followed<N> {
     /// Whether the poses of the curve are so near to each other that a tool that stops at each of them takes much longer.
     pub(super) fn is_dense(&self) -> bool {
-        let plan = &self.path.plan;
-        self.path.is_fitted() || plan.exact_stop() > DENSE * plan.duration()
+        self.path.is_dense()
     }
 }
 
@@ -267,6 +294,11 @@ impl SmoothPath {
     /// Whether it is along a curve fitted through a dense list.
     pub(super) fn is_fitted(&self) -> bool {
         self.plan.method() == smooth::Method::Fit
+    }
+
+    /// Whether its poses are so near to each other that a tool that stops at each of them takes much longer.
+    pub(super) fn is_dense(&self) -> bool {
+        self.is_fitted() || self.plan.exact_stop() > DENSE * self.plan.duration()
     }
 
     /// Whether nothing moves.

@@ -7,12 +7,13 @@
 use std::ops::RangeInclusive;
 
 use kinematics::follow::{
-    FollowError, FollowOptions, FollowPoint, NullMotion, TwistPoint, follow_choosing, refine,
+    self, FollowError, FollowOptions, FollowPoint, NullMotion, TwistPoint, follow_choosing,
+    follow_with, refine,
 };
 use kinematics::measure::dexterity;
 use nalgebra::SVector;
-use trajectory::JointPoint;
 use trajectory::smooth::{FittedCurve, FittedPart};
+use trajectory::{HermitePath, JointPoint, timing};
 
 use super::super::Planner;
 use crate::task::Move;
@@ -103,7 +104,12 @@ impl<const N: usize> Planner<N> {
         let known = knots(curve, 0..=if N > 6 { curve.last_knot() } else { 1 });
         covered(&mut part, known[known.len() - 1])?;
         let tool = |u: f64| twist(&part, u);
-        let (points, chosen) = follow_choosing(&self.solver, &tool, (&known, start), &options())?;
+        let at = (&known[..], start);
+        let (mut points, mut chosen) = follow_choosing(&self.solver, &tool, at, &options())?;
+        if let Some(quicker) = self.quicker_along(&part, at, motion) {
+            points = follow_with(&self.solver, &tool, at, &options(), &quicker)?;
+            chosen = quicker;
+        }
         let mut begin = (*points.first().ok_or(NoWay::Joints)?, 0.0);
         drop((points, known));
         let (mut begins, mut count, mut slowest) = (Vec::new(), 0, f64::INFINITY);
@@ -152,6 +158,22 @@ impl<const N: usize> Planner<N> {
         regular.then_some(checked).ok_or(NoWay::Joints)
     }
 
+    /// A null-space motion with which the joints need about less time for the whole curve, which the part covers.
+    fn quicker_along(
+        &self,
+        part: &FittedPart,
+        at: (&[f64], &SVector<f64, N>),
+        motion: &Move,
+    ) -> Option<NullMotion<N>> {
+        let cost = |points: &[FollowPoint<N>]| {
+            let path = HermitePath::new(points.iter().map(of_path).collect(), part);
+            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
+            path.and_then(about).unwrap_or(f64::INFINITY)
+        };
+        let tool = |u: f64| twist(part, u);
+        follow::cheaper(&self.solver, &tool, at, &options(), &cost)
+    }
+
     /// A stretch, followed again from its first point. The part covers it.
     pub(super) fn stretch(
         &self,
@@ -166,10 +188,7 @@ impl<const N: usize> Planner<N> {
         let known = (&grid[..], std::slice::from_ref(first));
         let points = refine(&self.solver, &tool, known, &options(), &along.motion).ok()?;
         let least = self.least_times(part, (&points, *time), motion);
-        let points = points
-            .into_iter()
-            .map(|point| (point.u, JointPoint { q: point.q }))
-            .collect();
+        let points = points.iter().map(of_path).collect();
         Some(Stretch { points, least })
     }
 
@@ -244,6 +263,11 @@ fn options() -> FollowOptions {
         most_points: MOST_POINTS,
         ..Default::default()
     }
+}
+
+/// A point of the joint path.
+fn of_path<const N: usize>(point: &FollowPoint<N>) -> (f64, JointPoint<N>) {
+    (point.u, JointPoint { q: point.q })
 }
 
 /// The tool at a parameter of the curve.

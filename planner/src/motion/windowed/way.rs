@@ -7,6 +7,7 @@ use trajectory::Boundary;
 use trajectory::smooth::{FittedCurve, SmoothOptions};
 
 use super::super::Planner;
+use super::super::corners::has_few;
 use super::WindowedMove;
 use super::ahead::Ahead;
 use super::joints::{Checked, NoWay};
@@ -21,7 +22,7 @@ impl<const N: usize> Planner<N> {
     /// Checks the whole way of a long smooth move: a curve passes every pose in order within 0.98 of
     /// its tolerances and stays in the corridor; the joints follow it on one branch, inside their
     /// ranges, away from singular places, from its first point to its last. The first window is planned
-    /// too. `None` if that cannot be done in this way: then the move is planned as a whole.
+    /// too. `None` if that cannot be done in this way, or if the list has few corners: then the move is planned as a whole.
     ///
     /// A list may be long, so it is not copied.
     pub(in super::super) fn begin_windows<'a>(
@@ -31,6 +32,9 @@ impl<const N: usize> Planner<N> {
     ) -> Option<WindowedMove<'a, N>> {
         let long = motion.shape == Shape::Smooth && motion.poses.len() >= LONG;
         if !long || motion.tolerance < LEAST_TOLERANCE || self.efforts.is_some() {
+            return None;
+        }
+        if has_few(&motion) {
             return None;
         }
         self.check_reach(&motion, start).ok()?;
