@@ -123,7 +123,8 @@ impl<const N: usize> Planner<N> {
         while time < until {
             let next = (time + step).min(until);
             let here = off(next);
-            if here >= least && nearer {
+            // A step may be too short to be seen.
+            if here >= least && nearer || next <= time {
                 break;
             }
             nearer |= here < least;

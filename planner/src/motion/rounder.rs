@@ -236,7 +236,7 @@ impl<const N: usize> Planner<N> {
             return first.planned;
         }
         let least = self.least_along(curve, motion).unwrap_or(time);
-        // Where they do, the limits of jerk cost little along a fitted curve as it should be.
+        // Along a fitted curve as it should be the limits of jerk cost the joints little.
         if fitted && time <= UNEVEN * least {
             return first.planned;
         }

@@ -106,9 +106,10 @@ impl<const N: usize> Planner<N> {
         let tool = |u: f64| twist(&part, u);
         let at = (&known[..], start);
         let (mut points, mut chosen) = follow_choosing(&self.solver, &tool, at, &options())?;
-        if let Some(quicker) = self.quicker_along(&part, at, motion) {
-            points = follow_with(&self.solver, &tool, at, &options(), &quicker)?;
-            chosen = quicker;
+        if let Some(quicker) = self.quicker_along(&part, at, motion)
+            && let Ok(followed) = follow_with(&self.solver, &tool, at, &options(), &quicker)
+        {
+            (points, chosen) = (followed, quicker);
         }
         let mut begin = (*points.first().ok_or(NoWay::Joints)?, 0.0);
         drop((points, known));
