@@ -184,8 +184,8 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         (planned, curve): (&PlannedMove<N>, &Followed<N>),
     ) -> Option<PlannedMove<N>> {
-        let is_open = self.has_room(motion, start) && !curve.is_dense();
-        if !Self::has_many(motion) || !is_open || self.turns(motion, start) {
+        let is_open = || self.has_room(motion, start) && !self.turns(motion, start);
+        if !Self::has_many(motion) || curve.is_dense() || !is_open() {
             return None;
         }
         let most = planned.trajectory.duration();

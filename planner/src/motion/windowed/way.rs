@@ -31,10 +31,8 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
     ) -> Option<WindowedMove<'a, N>> {
         let long = motion.shape == Shape::Smooth && motion.poses.len() >= LONG;
-        if !long || motion.tolerance < LEAST_TOLERANCE || self.efforts.is_some() {
-            return None;
-        }
-        if has_few(&motion) {
+        let narrow = motion.tolerance < LEAST_TOLERANCE;
+        if !long || narrow || self.efforts.is_some() || has_few(&motion) {
             return None;
         }
         self.check_reach(&motion, start).ok()?;
