@@ -72,10 +72,10 @@ fn filled(places: &[Vector3<f64>], step: f64) -> Vec<Vector3<f64>> {
     all
 }
 
-/// The corners of lines side by side, each driven back after the one before.
-fn raster() -> Vec<Vector3<f64>> {
+/// The corners of lines side by side, so far apart (m), each driven back after the one before.
+fn raster(lines: usize, apart: f64) -> Vec<Vector3<f64>> {
     let line = |k: usize| {
-        let (near, far, across) = (0.0, 0.1, 0.01 * k as f64);
+        let (near, far, across) = (0.0, 0.1, apart * k as f64);
         let ends = if k.is_multiple_of(2) {
             [near, far]
         } else {
@@ -83,7 +83,7 @@ fn raster() -> Vec<Vector3<f64>> {
         };
         ends.map(|along| Vector3::new(along, across, 0.0))
     };
-    (0..6).flat_map(line).skip(1).collect()
+    (0..lines).flat_map(line).skip(1).collect()
 }
 
 /// The corners of a star with narrow tips.
@@ -102,7 +102,7 @@ fn star() -> Vec<Vector3<f64>> {
 fn poses_on_the_legs_change_nothing() {
     let (ur5e, panda) = (Arm::<6>::new("ur5e"), Arm::<7>::new("panda"));
     for (list, corners, tolerances) in [
-        ("raster", raster(), &[2e-4, 1e-3][..]),
+        ("raster", raster(6, 0.01), &[2e-4, 1e-3][..]),
         ("star", star(), &[2e-4]),
     ] {
         for &tolerance in tolerances {
@@ -116,6 +116,17 @@ fn poses_on_the_legs_change_nothing() {
             }
         }
     }
+}
+
+/// A long motion through short corners takes no longer for each of them than a short one: the cells of its time law follow them all.
+/// With cells for a fiftieth of the motion, and for all corners where limits were exceeded between the cells, it stopped at each.
+#[test]
+fn many_lines_take_as_long_as_a_few_each() {
+    let mut arm = Arm::<6>::new("ur5e");
+    arm.limits.speed = 0.025;
+    let [few, many] = [4, 24].map(|lines| arm.time(&raster(lines, 0.002), 5e-4) / lines as f64);
+    println!("{few} s for each of 4 lines, {many} s for each of 24");
+    assert!(many < 1.003 * few);
 }
 
 /// A long curve within more tolerance takes no longer, and the spare joint is moved where that saves time. Knots that were nearer

@@ -243,3 +243,37 @@ fn any_number_of_cells() {
         last = certificate.duration;
     }
 }
+
+/// A fine law takes less time than one with few cells along long paths with narrow bends, within every limit, and is hardly
+/// stretched for that.
+#[test]
+fn a_fine_law_follows_narrow_bends() {
+    let limits = JointLimits::uniform(1.5, 20.0, 800.0);
+    let law = |path: &SplinePath<3>, fine: bool| {
+        let options = TimingOptions {
+            fine,
+            ..TimingOptions::default()
+        };
+        let timed = time_path(path, &limits, &ToolLimits::UNLIMITED, &options).unwrap();
+        let most = sampled(&timed, &limits);
+        assert!(most.iter().all(|ratio| *ratio < 1.0 + 1e-9), "{most:?}");
+        timed
+    };
+    let mut times = [0.0; 2];
+    for seed in 1..=12 {
+        let place = |i: u32, joint: u32| {
+            let along = if joint == 0 { f64::from(i / 3) } else { 0.0 };
+            0.4 * along + 0.3 * f64::from(seed * (3 + joint) * i / 3).sin()
+        };
+        let points: Vec<_> = (0..90)
+            .map(|i| [0, 1, 2].map(|joint| place(i, joint)))
+            .collect();
+        let path = spline(&points);
+        let [coarse, fine] = [false, true].map(|fine| law(&path, fine));
+        assert!(fine.certificate.stretch < 1.001, "seed {seed}");
+        let both = [coarse, fine].map(|timed| timed.trajectory.duration());
+        assert!(both[1] < both[0], "seed {seed}: {both:?}");
+        times = [times[0] + both[0], times[1] + both[1]];
+    }
+    assert!(times[1] < 0.96 * times[0], "{times:?}");
+}

@@ -24,6 +24,7 @@ const ALONG: TimingOptions = TimingOptions {
     start: Boundary::Free,
     end: Boundary::Free,
     rate_cap: Some(1.0),
+    fine: true,
     gap: 1e-3,
     ..RESTING
 };

@@ -38,6 +38,7 @@ pub(super) const RESTING: TimingOptions = TimingOptions {
     rate_cap: None,
     cells: None,
     widest: 8,
+    fine: false,
     fit: 1e-8,
     gap: 4e-4,
     reserve: 0.0,

@@ -8,6 +8,13 @@ use crate::{JointLimits, Path, ToolLimits};
 /// Cells over the time in which accelerations build up.
 const CELLS_PER_RAMP: f64 = 5.0;
 
+/// Least share of a law in which accelerations build up, for the choice of its cells.
+const COARSE: f64 = 0.02;
+/// The same of a fine one, where it is longer than [`SHORT`].
+const FINE: f64 = 3e-4;
+/// A time (s) in which accelerations build up that is short for a fine law.
+const SHORT: f64 = 0.01;
+
 /// Finer cells give no better law and a slower search.
 const MOST_CELLS_PER_RAMP: f64 = 40.0;
 /// Joined cells are that far from switches: times the time in which accelerations build up, two cells and each
@@ -82,6 +89,16 @@ impl LeadIn {
     }
 }
 
+/// The least time (s) in which accelerations are taken to build up in a law that is so fast (s).
+fn least_ramp(fast: f64, fine: bool) -> f64 {
+    let coarse = COARSE * fast;
+    if fine {
+        coarse.min(SHORT).max(FINE * fast)
+    } else {
+        coarse
+    }
+}
+
 impl Grid {
     /// The grid for a path with these knots, from the smoothed law of the reachability pass.
     pub(super) fn new(
@@ -91,7 +108,9 @@ impl Grid {
         options: &TimingOptions,
     ) -> Self {
         let fast = reachability.duration();
-        let ramp = reachability.ramp.clamp(0.02 * fast, fast);
+        let ramp = reachability
+            .ramp
+            .clamp(least_ramp(fast, options.fine), fast);
         let (start_rest, end_rest) = (
             options.start == Boundary::Rest,
             options.end == Boundary::Rest,

@@ -31,9 +31,9 @@ pub(super) type Place<const N: usize> = (Gridpoint<N>, ToolGridpoint);
 
 /// The path at all nodes and middles of a grid.
 #[derive(Clone, Debug)]
-pub(super) struct Gridpoints<'a, const N: usize> {
+pub(super) struct Gridpoints<const N: usize> {
     /// The grid.
-    pub grid: &'a Grid,
+    pub grid: Grid,
     /// Left end and middle of each cell.
     joints: Vec<[Gridpoint<N>; 2]>,
     /// The tool there; nowhere if nothing limits it.
@@ -77,19 +77,20 @@ impl ToolGridpoint {
     }
 }
 
-impl<'a, const N: usize> Gridpoints<'a, N> {
+impl<const N: usize> Gridpoints<N> {
     /// Looks at the path at the places of `grid`.
-    pub(super) fn new(bounded: Bounded<'_, N>, grid: &'a Grid) -> Self {
-        let (path, nodes) = (bounded.path, &grid.nodes);
-        let count = nodes.len() - 1;
+    pub(super) fn new(bounded: Bounded<'_, N>, grid: Grid) -> Self {
+        let count = grid.nodes.len() - 1;
         let limited = bounded.tool.limited();
         let mut gridpoints = Self {
-            grid,
             joints: Vec::with_capacity(count),
             tools: Vec::with_capacity(if limited { count } else { 0 }),
             before: Vec::new(),
             ends: Vec::with_capacity(count),
+            grid,
         };
+        let (path, grid) = (bounded.path, &gridpoints.grid);
+        let nodes = &grid.nodes;
         for k in 0..count {
             // The same place from both sides has the same values; only jerks differ.
             let side = if grid.knot[k] { 1.0 } else { 0.0 };

@@ -86,6 +86,14 @@ impl Interior {
         }
     }
 
+    /// The search continued over another grid, on which the law is this.
+    pub(super) fn over(&self, problem: &Problem, law: &[f64]) -> Self {
+        let mut over = Self::with(problem, self.build);
+        over.x[..law.len()].copy_from_slice(law);
+        over.iterations = self.iterations;
+        over
+    }
+
     /// How long the law takes (s).
     pub(super) fn time(&self) -> f64 {
         self.worth.time

@@ -1,12 +1,12 @@
 //! The law alone, before it is made into pieces and bounded.
 
 use super::TimingOptions;
+use super::draft::MOST_STEPS;
 use super::grid::{Bounded, Grid};
 use super::gridpoints::Gridpoints;
 use super::interior::{Descent, Interior};
 use super::problem::Problem;
 use super::reachability::ReachabilityPass;
-use super::tighten::MOST_STEPS;
 use crate::{JointLimits, Path, TimingError, ToolLimits};
 
 /// The optimisation inside [`time_path`](super::time_path), ready to be solved: for benchmarks,
@@ -45,7 +45,7 @@ impl LawProblem {
             tool,
             options,
         };
-        let problem = bounded.problem(&Gridpoints::new(bounded, &grid));
+        let problem = bounded.problem(&Gridpoints::new(bounded, grid));
         Ok(Self {
             problem,
             gap: options.gap,

@@ -10,7 +10,9 @@ mod band;
 mod block;
 mod bound;
 mod certificate;
+mod draft;
 mod evaluate;
+mod excess;
 mod grid;
 mod gridpoints;
 mod interior;
@@ -25,14 +27,13 @@ mod pieces;
 mod problem;
 mod reach;
 mod reachability;
+mod refined;
 mod reparametrization;
 mod rise;
 mod rows;
 mod search;
-
 mod state;
 mod step_length;
-mod tighten;
 
 pub use crate::limit::{ActiveSpan, Limit, LimitPeak};
 pub use certificate::TimeCertificate;
@@ -42,7 +43,6 @@ pub use options::{Boundary, TimingOptions};
 pub use reach::{ReachGrid, duration as reach_duration};
 
 use grid::{Bounded, Grid};
-use gridpoints::Gridpoints;
 use reachability::ReachabilityPass;
 
 use crate::limits::check_joints;
@@ -184,8 +184,8 @@ impl<'a, const N: usize> PathTiming<'a, N> {
     }
 
     /// The motion of a draft, slowed down until it keeps every limit.
-    fn finished(&self, draft: tighten::Draft<N>) -> Timed<N> {
-        let tighten::Draft { pieces, audit, .. } = draft;
+    fn finished(&self, draft: draft::Draft<N>) -> Timed<N> {
+        let draft::Draft { pieces, audit, .. } = draft;
         // A moving start fixes the law there, so it cannot be stretched and must hold as it is.
         let moving = matches!(self.bounded.options.start, Boundary::Moving { .. });
         let stretch = if moving {
@@ -225,7 +225,7 @@ fn draft<const N: usize>(
     bounded: Bounded<'_, N>,
     reachability: &ReachabilityPass,
     goal: (f64, &search::Manner),
-) -> Result<Option<tighten::Draft<N>>, TimingError> {
+) -> Result<Option<draft::Draft<N>>, TimingError> {
     let mut options = *bounded.options;
     let mut refused = None;
     for _ in 0..FINER {
@@ -235,11 +235,12 @@ fn draft<const N: usize>(
             bounded.path.end(),
             &options,
         );
-        match search::best(bounded, &Gridpoints::new(bounded, &grid), goal) {
+        let cells = grid.nodes.len() - 1;
+        match search::best(bounded, grid, goal) {
             Err(error @ TimingError::StartTooFast { .. }) => refused = refused.or(Some(error)),
             answer => return answer,
         }
-        options.cells = Some(2 * (grid.nodes.len() - 1));
+        options.cells = Some(2 * cells);
     }
     let unknown = String::new();
     Err(refused.unwrap_or(TimingError::StartTooFast {

@@ -4,11 +4,12 @@
 //! are widened to contain the first guess; the iterate moves to the centre of the feasible set; the
 //! limits are narrowed to what it needs; and so on until they are the true ones.
 
+use super::draft::{Draft, MOST_STEPS};
+use super::excess::Excess;
 use super::grid::Bounded;
 use super::gridpoints::Gridpoints;
 use super::interior::{Descent, Interior};
 use super::problem::Problem;
-use super::tighten::{Draft, MOST_STEPS, tighten};
 use crate::TimingError;
 use crate::limit::Limit;
 
@@ -26,7 +27,7 @@ const ROUNDING: f64 = 1e-6;
 /// The fastest law found over `grid` that meets every bound as it is.
 pub(super) fn best<const N: usize>(
     bounded: Bounded<'_, N>,
-    gridpoints: &Gridpoints<'_, N>,
+    gridpoints: &Gridpoints<N>,
     mut problem: Problem,
 ) -> Result<Draft<N>, TimingError> {
     reserve(
@@ -50,7 +51,8 @@ pub(super) fn best<const N: usize>(
         if draft.audit.stretch_after_first() <= 1.0 {
             return start_holds(draft);
         }
-        tighten(&mut problem, &draft, 1.0 + 5e-4 * (round + 1) as f64);
+        let excess = Excess::of(&draft).raised(1.0 + 5e-4 * (round + 1) as f64);
+        excess.narrow(&mut problem);
         problem.release_start();
     }
     Err(TimingError::StartTooFast {

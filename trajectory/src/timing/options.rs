@@ -35,6 +35,10 @@ pub struct TimingOptions {
     /// Where `cells` is `None`: so many of the cells may be one where the law without jerk limits does not switch from
     /// one limit to another. That costs less, and up to about 0.05 % of the speed.
     pub widest: usize,
+    /// Whether cells follow the accelerations of a long path too, in place of a fiftieth of its time at least, and are divided
+    /// where limits are exceeded between their gridpoints. It costs about a third more, and is worth it for a law that is
+    /// driven.
+    pub fine: bool,
     /// Largest distance (rad) of a joint from the path between the knots of the motion.
     pub fit: f64,
     /// Relative gap of the duration at which the search stops.
@@ -53,6 +57,7 @@ impl Default for TimingOptions {
             rate_cap: None,
             cells: None,
             widest: 1,
+            fine: false,
             fit: 1e-8,
             gap: 1e-3,
             reserve: 0.0,

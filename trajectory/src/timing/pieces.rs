@@ -55,7 +55,7 @@ impl<const N: usize> State<N> {
 /// Makes pieces out of one law.
 pub(super) struct Maker<'a, const N: usize> {
     bounded: Bounded<'a, N>,
-    gridpoints: &'a Gridpoints<'a, N>,
+    gridpoints: &'a Gridpoints<N>,
     /// One over the jerk limits.
     narrow: SVector<f64, N>,
     build: Build,
@@ -71,7 +71,7 @@ struct PieceEnd<'a, const N: usize> {
 
 impl<'a, const N: usize> Maker<'a, N> {
     /// For laws over the grid of `gridpoints`.
-    pub(super) fn new(bounded: Bounded<'a, N>, gridpoints: &'a Gridpoints<'a, N>) -> Self {
+    pub(super) fn new(bounded: Bounded<'a, N>, gridpoints: &'a Gridpoints<N>) -> Self {
         let count = 2 * gridpoints.grid.nodes.len();
         let out = Pieces {
             joint: Vec::with_capacity(count),
@@ -132,7 +132,7 @@ impl<'a, const N: usize> Maker<'a, N> {
             let state = if depth == DEPTH {
                 State::new(self.build, self.gridpoints.middle(k), spot)
             } else {
-                let grid = self.gridpoints.grid;
+                let grid = &self.gridpoints.grid;
                 State::new(
                     self.build,
                     &grid.place(self.bounded.path, middle, 0.0).0,

@@ -38,7 +38,7 @@ struct Rows<'a, const N: usize> {
 
 impl<const N: usize> Bounded<'_, N> {
     /// The problem over the places of `gridpoints`.
-    pub(super) fn problem(&self, gridpoints: &Gridpoints<'_, N>) -> Problem {
+    pub(super) fn problem(&self, gridpoints: &Gridpoints<N>) -> Problem {
         let tool = self.tool;
         let finite = |limits: [f64; 2]| limits.iter().filter(|x| x.is_finite()).count();
         let tools = [
@@ -77,7 +77,7 @@ impl<const N: usize> Bounded<'_, N> {
 
     /// The joints nearest to their limits of acceleration and of jerk, if these are the same along the
     /// whole path.
-    fn leading(&self, gridpoints: &Gridpoints<'_, N>) -> Option<[usize; 2]> {
+    fn leading(&self, gridpoints: &Gridpoints<N>) -> Option<[usize; 2]> {
         // At an end at rest the path does not move with the parameter.
         let step = gridpoints.middle(gridpoints.grid.nodes.len() / 2 - 1).joint[0];
         let limits = [&self.joint.acceleration, &self.joint.jerk];
@@ -89,7 +89,7 @@ impl<const N: usize> Bounded<'_, N> {
     fn set_cell(
         &self,
         rows: &Rows<'_, N>,
-        gridpoints: &Gridpoints<'_, N>,
+        gridpoints: &Gridpoints<N>,
         k: usize,
         problem: &mut Problem,
     ) {
@@ -233,8 +233,9 @@ mod tests {
             ..straight.clone()
         };
         let times = [straight, any].map(|grid| {
-            let problem = bounded.problem(&Gridpoints::new(bounded, &grid));
-            assert_eq!(problem.joints, if grid.straight { 1 } else { 3 });
+            let joints = if grid.straight { 1 } else { 3 };
+            let problem = bounded.problem(&Gridpoints::new(bounded, grid));
+            assert_eq!(problem.joints, joints);
             let mut interior = Interior::new(&problem);
             interior.slow_down(&problem);
             let descent = Descent {
