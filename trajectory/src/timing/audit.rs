@@ -7,6 +7,7 @@ use super::bound::{Precision, bound};
 use super::grid::Bounded;
 use super::gridpoints::ToolGridpoint;
 use super::pieces::Pieces;
+use super::reachability::ASIDE;
 use crate::active::Active;
 use crate::hull::{FLOOR, Hulls, TOLERANCE};
 use crate::limit::{ActiveSpan, Limit, LimitPeak, order, root};
@@ -56,13 +57,14 @@ impl Audit {
             let free = SVector::repeat(f64::INFINITY);
             JointBounds::new([SVector::repeat(cap), free, free])
         });
-        let mut seen = Seen::at(bounded.path, 0.0);
+        let mut seen = Seen::at(bounded.path, 0.0, 0.0);
+        let mut knots = Knots::new(bounded.path);
         for (piece, law) in pieces.joint.iter().zip(&pieces.law) {
             let row = audit.ratios.len();
             joint.push(piece, &mut audit.ratios);
             raise_near_ends(piece, bounded.joint, &mut audit.ratios[row..]);
             if bounded.tool.limited() {
-                audit.push_tool(bounded.path, law, (&tool, &mut seen));
+                audit.push_tool(bounded.path, law, &tool, (&mut seen, &mut knots));
             }
             if let Some(rate) = &rate {
                 rate.push(law, &mut audit.ratios);
@@ -77,11 +79,23 @@ impl Audit {
         &mut self,
         path: &dyn Path<N>,
         law: &Piece<1>,
-        (tool, seen): (&[Option<(Limit, f64)>; 6], &mut Seen),
+        tool: &[Option<(Limit, f64)>; 6],
+        (seen, knots): (&mut Seen, &mut Knots<'_>),
     ) {
+        // At a knot the jerk of the path may jump: it counts as seen from inside the piece.
+        let sides = [(0.0, 1.0), (law.duration, -1.0)].map(|(t, side)| {
+            let is_knot = knots.contain(law.sample(t).position[0]);
+            if is_knot { side } else { 0.0 }
+        });
         let narrow = tool.map(|entry| entry.map_or(0.0, |(_, limit)| 1.0 / limit));
         let at = |quarter: u8, seen: &mut Seen| {
-            let norms = tool_norms(path, law, 0.25 * law.duration * f64::from(quarter), seen);
+            let t = 0.25 * law.duration * f64::from(quarter);
+            let side = match quarter {
+                0 => sides[0],
+                4 => sides[1],
+                _ => 0.0,
+            };
+            let norms = tool_norms(path, law, (t, side), seen);
             SVector::from(norms).component_mul(&SVector::from(narrow))
         };
         let few = [at(0, seen), at(2, seen), at(4, seen)];
@@ -294,17 +308,47 @@ struct Seen {
 }
 
 impl Seen {
-    fn at<const N: usize>(path: &dyn Path<N>, u: f64) -> Self {
-        let tool = path.tool_at(u);
+    /// The tool there, or beside it: before it (-1) or after it (1).
+    fn at<const N: usize>(path: &dyn Path<N>, u: f64, side: f64) -> Self {
+        let end = path.end();
+        let tool = path.tool_at((u + side * ASIDE * end).clamp(0.0, end));
         Self { u, tool }
     }
 }
 
-/// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law.
+/// The knots of a path, for places that ascend.
+struct Knots<'a> {
+    /// Those that are not behind.
+    ahead: &'a [f64],
+    near: f64,
+}
+
+impl<'a> Knots<'a> {
+    fn new<const N: usize>(path: &'a dyn Path<N>) -> Self {
+        Self {
+            ahead: path.knots(),
+            near: NEAR * path.end(),
+        }
+    }
+
+    /// Whether a place, not before the one of the last question, is a knot.
+    fn contain(&mut self, u: f64) -> bool {
+        while let [first, rest @ ..] = self.ahead
+            && *first < u - self.near
+        {
+            self.ahead = rest;
+        }
+        let next = self.ahead.first();
+        next.is_some_and(|knot| *knot <= u + self.near)
+    }
+}
+
+/// Speed, acceleration, jerk of the tool, then the angular ones, at `t` in a piece of the law, as seen from before it (-1), there
+/// or after it (1).
 fn tool_norms<const N: usize>(
     path: &dyn Path<N>,
     law: &Piece<1>,
-    t: f64,
+    (t, side): (f64, f64),
     seen: &mut Seen,
 ) -> [f64; 6] {
     let at = law.sample(t);
@@ -317,8 +361,8 @@ fn tool_norms<const N: usize>(
     let (u, end) = (at.position[0].clamp(0.0, path.end()), path.end());
     // NaN is looked at again.
     let same = (u - seen.u).abs() <= SAME * end;
-    if !same {
-        *seen = Seen::at(path, u);
+    if !same || side != 0.0 {
+        *seen = Seen::at(path, u, side);
     }
     let local = ToolGridpoint::new(&seen.tool, reparametrization);
     let norm = |v: Vector3<f64>| v.norm();
@@ -329,3 +373,5 @@ fn tool_norms<const N: usize>(
 
 /// Places that are nearer to each other than this fraction of the path are the same.
 const SAME: f64 = 1e-13;
+/// The same of a knot: a law comes to it up to rounding.
+const NEAR: f64 = 1e-11;

@@ -5,10 +5,8 @@ use super::problem::Problem;
 
 /// Parts of a divided cell.
 const PARTS: usize = 4;
-/// Nodes are not nearer to each other than this share of a divided cell.
-const NEAREST: f64 = 1e-3;
-/// A cell is not divided if it is shorter than this share of the law.
-const SHORTEST: f64 = 1e-7;
+/// A shorter cell (s) is not divided, and none is made at a knot: rounding would look like a jerk in its pieces.
+const SHORTEST: f64 = 1e-4;
 
 /// A grid with divided cells.
 #[derive(Clone, Debug)]
@@ -31,10 +29,9 @@ impl Grid {
             },
             inside: Vec::with_capacity(self.nodes.len()),
         };
-        let least = SHORTEST * self.reparametrization.duration();
         for (k, pair) in self.nodes.windows(2).enumerate() {
             refined.push(pair[0], self.knot[k], k);
-            if pair[1] - pair[0] > least && divide(k) {
+            if pair[1] - pair[0] > SHORTEST && divide(k) {
                 for (w, knot) in self.inner(knots, [pair[0], pair[1]]) {
                     refined.push(w, knot, k);
                 }
@@ -50,14 +47,13 @@ impl Grid {
 
     /// The nodes that divide a cell, and whether they are knots.
     fn inner(&self, knots: &[f64], [from, to]: [f64; 2]) -> Vec<(f64, bool)> {
-        let least = NEAREST * (to - from);
         let [first, last] = [from, to].map(|w| self.reparametrization.at(w)[0]);
         let inside = &knots[knots.partition_point(|u| *u <= first)..];
         let mut inner: Vec<(f64, bool)> = Vec::new();
         for u in inside.iter().take_while(|u| **u < last) {
             let w = self.reparametrization.inverse(*u);
             let before = inner.last().map_or(from, |(w, _)| *w);
-            if w - before > least && to - w > least {
+            if w - before > SHORTEST && to - w > SHORTEST {
                 inner.push((w, true));
             }
         }
