@@ -33,6 +33,8 @@ pub struct TwistPoint {
     pub linear: [Vector3<f64>; 3],
     /// Its angular velocity and the first two derivatives of that, rad/u, rad/u2, rad/u3.
     pub angular: [Vector3<f64>; 3],
+    /// How much the last derivatives of both jump at `u`, m/u3 and rad/u3; given above is what they are after it.
+    pub jump: [Vector3<f64>; 2],
 }
 
 /// The joints at one path parameter.
@@ -42,6 +44,16 @@ pub struct FollowPoint<const N: usize> {
     pub u: f64,
     /// Joint positions (rad, m) and their first three derivatives to `u`.
     pub q: [SVector<f64, N>; 4],
+    /// How much the third derivative jumps at `u`, as that of the tool does; given above is what it is after it.
+    pub jump: SVector<f64, N>,
+}
+
+impl<const N: usize> FollowPoint<N> {
+    /// The joints and their derivatives as they are before `u`.
+    pub fn before(&self) -> [SVector<f64, N>; 4] {
+        let [q, q1, q2, q3] = self.q;
+        [q, q1, q2, q3 - self.jump]
+    }
 }
 
 /// How closely to follow.
@@ -154,7 +166,7 @@ impl<const N: usize> std::fmt::Debug for NullMotion<N> {
 ///     let mut pose = start;
 ///     pose.translation.vector.z += 0.1 * u;
 ///     let linear = [Vector3::z() * 0.1, Vector3::zeros(), Vector3::zeros()];
-///     TwistPoint { pose, linear, angular: [Vector3::zeros(); 3] }
+///     TwistPoint { pose, linear, angular: [Vector3::zeros(); 3], jump: [Vector3::zeros(); 2] }
 /// };
 /// let options = FollowOptions::default();
 /// // The fastest joint should be slow.
@@ -218,7 +230,7 @@ pub struct SpareSearch<'a, const N: usize> {
 ///     let mut pose = start;
 ///     pose.translation.vector.z += 0.1 * u;
 ///     let linear = [Vector3::z() * 0.1, Vector3::zeros(), Vector3::zeros()];
-///     TwistPoint { pose, linear, angular: [Vector3::zeros(); 3] }
+///     TwistPoint { pose, linear, angular: [Vector3::zeros(); 3], jump: [Vector3::zeros(); 2] }
 /// };
 /// let (at, options) = ((&[0.0, 0.5, 1.0][..], &q), FollowOptions::default());
 /// let (points, known) = follow_choosing(&solver, &tool, at, &options)?;

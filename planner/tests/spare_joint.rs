@@ -8,7 +8,8 @@ use planner::motion::{BlockedCause, MotionError, Planner};
 use planner::robot::{Robot, load};
 use planner::task::{Move, Shape};
 use trajectory::{
-    HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolLimits, ToolPoint, time_path,
+    HermitePath, HermitePoint, JointPoint, Line, TimingOptions, ToolCurve, ToolLimits, ToolPoint,
+    time_path,
 };
 
 /// Numbers from -1 to 1, the same each time.
@@ -63,14 +64,17 @@ fn with_ease(
             pose,
             linear,
             angular,
+            jump: [Vector3::zeros(); 2],
         }
     };
     let grid: Vec<f64> = (0..=80).map(|i| line.end() * f64::from(i) / 80.0).collect();
     let at = (&grid[..], start);
     let (points, _) = follow_choosing(solver, &tool, at, &FollowOptions::default()).ok()?;
-    let points = points
-        .iter()
-        .map(|point| (point.u, JointPoint { q: point.q }));
+    let points = points.iter().map(|point| HermitePoint {
+        u: point.u,
+        joint: JointPoint { q: point.q },
+        jump: point.jump,
+    });
     let path = HermitePath::new(points.collect(), line as &dyn ToolCurve)?;
     let joint = robot.joint_limits::<7>();
     let timed = time_path(&path, &joint, limits, &TimingOptions::default()).ok()?;

@@ -33,7 +33,7 @@ pub use bounds::MotionBounds;
 pub use error::TimingError;
 pub use extrema::JointPeaks;
 pub use helix::Helix;
-pub use hermite_path::HermitePath;
+pub use hermite_path::{HermitePath, HermitePoint};
 pub use joint_line::JointLine;
 pub use limits::{EndSpeeds, JointLimits, ToolLimits};
 pub use line::Line;

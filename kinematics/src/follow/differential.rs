@@ -53,7 +53,23 @@ pub(super) fn task_rows<const N: usize>(
     rows
 }
 
-/// First to third derivative of the joints to the path parameter at a point of the path, and at its value `u`.
+/// How much the third derivative of the joints jumps where that of the tool does: nothing else jumps there.
+fn jump<const N: usize>(system: &System<'_, N>, point: &TwistPoint) -> SVector<f64, N> {
+    let [v, w] = point.jump;
+    if v == Vector3::zeros() && w == Vector3::zeros() {
+        return SVector::zeros();
+    }
+    let mut b = [0.0; 8];
+    for i in 0..3 {
+        b[i] = v[i] / LENGTH;
+        b[3 + i] = w[i];
+    }
+    let x = system.solve(&b, &[0.0; 8]);
+    SVector::from_fn(|i, _| x[i])
+}
+
+/// First to third derivative of the joints to the path parameter at a point of the path, and at its value `u`, and how much
+/// the third jumps there.
 ///
 /// With `V` the twist of the tool as a screw in the frame that stands still, `S_i` the
 /// screw of joint `i` and `V_i` the motion of link `i`, `S_i' = V_i x S_i`; hence
@@ -69,7 +85,7 @@ pub(super) fn derivatives<const N: usize>(
     (u, point): (f64, &TwistPoint),
     null_space: &NullSpace<N>,
     prior: &[SVector<f64, N>; 3],
-) -> [SVector<f64, N>; 3] {
+) -> ([SVector<f64, N>; 3], SVector<f64, N>) {
     let rows = task_rows(jacobian, null_space);
     let system = System::<N>::new(&rows);
     let u_rows = null_space.rates(u);
@@ -122,5 +138,5 @@ pub(super) fn derivatives<const N: usize>(
         bias = bias.plus(&s_1, 2.0 * q2[i]).plus(&s_2, q1[i]);
     }
     let q3 = solve(&twist_2.plus(&bias, -1.0), 2);
-    [q1, q2, q3]
+    ([q1, q2, q3], jump(&system, point))
 }

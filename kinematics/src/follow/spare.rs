@@ -25,7 +25,7 @@ impl<const N: usize> NullMotion<N> {
     /// let pose = solver.chain().forward(&q);
     /// // The tool stands still, and the elbow turns by about 0.2 rad.
     /// let tool = |_: f64| TwistPoint {
-    ///     pose, linear: [Vector3::zeros(); 3], angular: [Vector3::zeros(); 3],
+    ///     pose, linear: [Vector3::zeros(); 3], angular: [Vector3::zeros(); 3], jump: [Vector3::zeros(); 2],
     /// };
     /// let direction = spare_direction(solver.chain(), &q).unwrap();
     /// let first = direction.dot(&q);

@@ -157,6 +157,7 @@ impl<const N: usize> Task<'_, N> {
         let still = FollowPoint {
             u,
             q: [*start, SVector::zeros(), SVector::zeros(), SVector::zeros()],
+            jump: SVector::zeros(),
         };
         let seen = (self.tool)(u);
         // The start may be off by rounding; the path continues from the exact point.
@@ -276,10 +277,11 @@ impl<const N: usize> Task<'_, N> {
             last.q[3],
         ];
         let (_, jacobian) = self.solver.chain().jacobian(q);
-        let [q1, q2, q3] = derivatives(&jacobian, (u, seen), null_space, &prior);
+        let ([q1, q2, q3], jump) = derivatives(&jacobian, (u, seen), null_space, &prior);
         FollowPoint {
             u,
             q: [*q, q1, q2, q3],
+            jump,
         }
     }
 
@@ -339,11 +341,11 @@ fn predict<const N: usize>(last: &FollowPoint<N>, u: f64) -> SVector<f64, N> {
 /// as its eight control points give it.
 fn midpoint<const N: usize>(a: &FollowPoint<N>, b: &FollowPoint<N>) -> SVector<f64, N> {
     let h = b.u - a.u;
-    let side = |p: &FollowPoint<N>, h: f64| {
-        let one = p.q[0] + p.q[1] * (h / 7.0);
-        let two = one * 2.0 - p.q[0] + p.q[2] * (h * h / 42.0);
-        let three = two * 3.0 - one * 3.0 + p.q[0] + p.q[3] * (h * h * h / 210.0);
-        p.q[0] + one * 7.0 + two * 21.0 + three * 35.0
+    let side = |[q, q1, q2, q3]: [SVector<f64, N>; 4], h: f64| {
+        let one = q + q1 * (h / 7.0);
+        let two = one * 2.0 - q + q2 * (h * h / 42.0);
+        let three = two * 3.0 - one * 3.0 + q + q3 * (h * h * h / 210.0);
+        q + one * 7.0 + two * 21.0 + three * 35.0
     };
-    (side(a, h) + side(b, -h)) / 128.0
+    (side(a.q, h) + side(b.before(), -h)) / 128.0
 }

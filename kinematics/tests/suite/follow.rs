@@ -47,6 +47,7 @@ fn curve(start: &Isometry3<f64>, scale: f64) -> impl Fn(f64) -> TwistPoint + use
                 axis.into_inner() * scale,
                 Vector3::zeros(),
             ],
+            jump: [Vector3::zeros(); 2],
         }
     }
 }
@@ -90,6 +91,74 @@ fn follows<const N: usize>(name: &str) {
 fn joint_paths_are_exact_and_continuous() {
     SIX.iter().for_each(|name| follows::<6>(name));
     SEVEN.iter().for_each(|name| follows::<7>(name));
+}
+
+/// A tool from rest whose jerk (m/u3, rad/u3) changes its sign at `u` 0.5, and whether it says by how much.
+fn jerked(start: &Isometry3<f64>, told: bool) -> impl Fn(f64) -> TwistPoint + use<> {
+    let start = *start;
+    let (along, about) = (Vector3::new(0.9, -0.6, 0.3), Vector3::new(0.6, 1.2, -0.9));
+    move |u| {
+        // The jerk is 1, then -1.
+        let late = (u - 0.5).max(0.0);
+        let jerk = if u < 0.5 { 1.0 } else { -1.0 };
+        let way = [
+            u.powi(3) / 6.0 - late.powi(3) / 3.0,
+            u * u / 2.0 - late * late,
+            u - 2.0 * late,
+            jerk,
+        ];
+        let jump = if told && u == 0.5 { -2.0 } else { 0.0 };
+        TwistPoint {
+            pose: Isometry3::from_parts(
+                Translation3::from(start.translation.vector + along * way[0]),
+                UnitQuaternion::from_scaled_axis(about * way[0]) * start.rotation,
+            ),
+            linear: [1, 2, 3].map(|k| along * way[k]),
+            angular: [1, 2, 3].map(|k| about * way[k]),
+            jump: [along * jump, about * jump],
+        }
+    }
+}
+
+fn jumps<const N: usize>(name: &str) {
+    let solver = Solver::new(arms::chain::<N>(name));
+    let start = ready::<N>(name);
+    let followed = |told: bool| {
+        let tool = jerked(&solver.chain().forward(&start), told);
+        let grid = [0.0, 0.5, 1.0];
+        follow(&solver, &tool, &grid, &start, &FollowOptions::default()).unwrap()
+    };
+    let (points, more) = (followed(true), followed(false));
+    assert!(points.len() < more.len(), "{name}: {}", points.len());
+    let knot = points.iter().position(|point| point.u == 0.5).unwrap();
+    // What the third derivative is on either side is what the second one changes by there.
+    let tool = jerked(&solver.chain().forward(&start), true);
+    let fine: Vec<f64> = (0..=2000).map(|i| f64::from(i) / 2000.0).collect();
+    let fine = follow(&solver, &tool, &fine, &start, &FollowOptions::default()).unwrap();
+    let middle = fine.iter().position(|point| point.u == 0.5).unwrap();
+    let change = |i: usize| (fine[i + 1].q[2] - fine[i].q[2]) / (fine[i + 1].u - fine[i].u);
+    let point = &points[knot];
+    let size = 1.0 + point.q[3].amax();
+    assert!((point.jump).amax() > 0.5, "{name}: {}", point.jump);
+    assert!(
+        (point.before()[3] - change(middle - 1)).amax() < 0.02 * size,
+        "{name}"
+    );
+    assert!((point.q[3] - change(middle)).amax() < 0.02 * size, "{name}");
+    let others = points.iter().filter(|point| point.u != 0.5);
+    assert!(
+        others
+            .into_iter()
+            .all(|point| point.jump == SVector::zeros()),
+        "{name}"
+    );
+}
+
+/// Where the tool's jerk jumps, that of the joints does, and is known on both sides: fewer points are needed.
+#[test]
+fn the_jerk_of_the_joints_jumps_with_that_of_the_tool() {
+    SIX.iter().for_each(|name| jumps::<6>(name));
+    SEVEN.iter().for_each(|name| jumps::<7>(name));
 }
 
 /// Between the places of a path, the sum of the fastest joint's ways (rad).
@@ -205,6 +274,7 @@ fn an_end_out_of_reach_is_named() {
             pose: Isometry3::from_parts((pose.translation.vector + far * u).into(), pose.rotation),
             linear: [far, Vector3::zeros(), Vector3::zeros()],
             angular: [Vector3::zeros(); 3],
+            jump: [Vector3::zeros(); 2],
         };
         let grid: Vec<f64> = (0..=80).map(|i| f64::from(i) / 80.0).collect();
         let refused = follow(&solver, &line, &grid, &start, &FollowOptions::default()).unwrap_err();
@@ -317,6 +387,7 @@ fn refusals_name_place_and_cause() {
         ),
         linear: [Vector3::zeros(); 3],
         angular: [axis.into_inner() * 9.0, Vector3::zeros(), Vector3::zeros()],
+        jump: [Vector3::zeros(); 2],
     };
     let refused = follow(&solver, &spin, &grid, &start, &options).unwrap_err();
     assert_eq!(
@@ -344,6 +415,7 @@ fn a_wrist_singularity_is_passed() {
         ),
         linear: [Vector3::zeros(); 3],
         angular: [Vector3::y() * -0.4, Vector3::zeros(), Vector3::zeros()],
+        jump: [Vector3::zeros(); 2],
     };
     let grid: Vec<f64> = (0..=40).map(|i| f64::from(i) / 40.0).collect();
     let points = follow(&solver, &tilt, &grid, &start, &FollowOptions::default()).unwrap();
@@ -379,6 +451,7 @@ fn steady(
         ),
         linear: [way, Vector3::zeros(), Vector3::zeros()],
         angular: [turn, Vector3::zeros(), Vector3::zeros()],
+        jump: [Vector3::zeros(); 2],
     }
 }
 

@@ -4,11 +4,13 @@ use kinematics::follow::{
     self, FollowCause, FollowError, FollowOptions, FollowPoint, NullMotion, SpareSearch, TwistPoint,
 };
 use kinematics::{Chain, IkFailure};
-use nalgebra::{Isometry3, SVector};
+use nalgebra::{Isometry3, SVector, Vector3};
 use realtime::{Piece, Sample};
 use trajectory::smooth::angular_tolerance;
 use trajectory::timing::{self, PathTiming};
-use trajectory::{HermitePath, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory};
+use trajectory::{
+    HermitePath, HermitePoint, JointPoint, Line, TimingOptions, ToolCurve, ToolPoint, Trajectory,
+};
 
 use super::soonest::RESTING;
 use super::{BlockedCause, Draft, MotionError, Planner};
@@ -296,16 +298,28 @@ impl<'a, const N: usize> Way<'a, N> {
 
     /// The motion of the tool.
     pub(super) fn tool(&self) -> impl Fn(f64) -> TwistPoint {
-        |u| {
+        let (knots, aside) = (self.curve.knots(), ASIDE * self.curve.end());
+        move |u| {
             let ToolPoint {
                 pose,
-                linear,
-                angular,
+                mut linear,
+                mut angular,
             } = self.curve.at(u);
+            let mut jump = [Vector3::zeros(); 2];
+            let knot = knots.get(knots.partition_point(|knot| *knot < u - aside));
+            if knot.is_some_and(|knot| *knot <= u + aside) {
+                let [before, after] = [-2.0, 2.0].map(|side| self.curve.at(u + side * aside));
+                jump = [
+                    after.linear[2] - before.linear[2],
+                    after.angular[2] - before.angular[2],
+                ];
+                (linear[2], angular[2]) = (after.linear[2], after.angular[2]);
+            }
             TwistPoint {
                 pose,
                 linear,
                 angular,
+                jump,
             }
         }
     }
@@ -333,18 +347,26 @@ fn piece<const N: usize>(from: &FollowPoint<N>, to: &FollowPoint<N>) -> Piece<N>
     Piece::hermite(to.u - from.u, &sample(from), &sample(to))
 }
 
+/// A followed point as one of the path of the joints.
+pub(super) fn of_path<const N: usize>(point: &FollowPoint<N>) -> HermitePoint<N> {
+    HermitePoint {
+        u: point.u,
+        joint: JointPoint { q: point.q },
+        jump: point.jump,
+    }
+}
+
 /// The followed points as a path of the joints.
 pub(super) fn joint_path<'a, const N: usize>(
     curve: &'a dyn ToolCurve,
     points: &[FollowPoint<N>],
 ) -> Result<HermitePath<N, &'a dyn ToolCurve>, MotionError> {
-    let points = points
-        .iter()
-        .map(|point| (point.u, JointPoint { q: point.q }))
-        .collect();
+    let points = points.iter().map(of_path).collect();
     HermitePath::new(points, curve).ok_or(MotionError::NoWay)
 }
 
+/// Distance from a knot at which derivatives are those of its side, as a share of the curve.
+const ASIDE: f64 = 1e-9;
 /// Share of a curve up to which two of its knots are one: between nearer points rounding looks like a jump of the acceleration.
 const NEAR: f64 = 1e-6;
 

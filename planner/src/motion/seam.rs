@@ -123,6 +123,7 @@ impl Seam {
         let point = |u: f64| FollowPoint {
             u,
             q: self.at(parts, u),
+            jump: SVector::zeros(),
         };
         (0..=POINTS).map(time).map(point).collect()
     }

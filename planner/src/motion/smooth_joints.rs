@@ -183,8 +183,12 @@ impl<const N: usize> Planner<N> {
 
     /// The factor by which time has to be stretched so that the joints keep their limits at a point.
     pub(super) fn slowdown(&self, point: &FollowPoint<N>) -> f64 {
+        self.factor(&point.q).max(self.factor(&point.before()))
+    }
+
+    /// The same of joints with their derivatives to time.
+    fn factor(&self, [_, velocity, acceleration, jerk]: &[SVector<f64, N>; 4]) -> f64 {
         let limits = &self.limits;
-        let [_, velocity, acceleration, jerk] = &point.q;
         let most = |rates: &SVector<f64, N>, limits: &SVector<f64, N>| {
             let ratios = rates
                 .iter()
@@ -214,7 +218,7 @@ impl<const N: usize> Planner<N> {
     /// the factor by which it must be stretched.
     pub(super) fn about_time(&self, points: &[FollowPoint<N>]) -> f64 {
         let parts = points.windows(2).map(|pair| {
-            let mean = 0.5 * (self.slowdown(&pair[0]) + self.slowdown(&pair[1]));
+            let mean = 0.5 * (self.factor(&pair[0].q) + self.factor(&pair[1].before()));
             mean * (pair[1].u - pair[0].u)
         });
         parts.sum()

@@ -42,7 +42,7 @@ impl<const N: usize> Ahead<N> {
     /// Frees the joints and the curve before a parameter at which so many poses are passed.
     fn forget(&mut self, (u, poses): (f64, usize)) {
         self.part.forget(&self.curve, (u, poses));
-        let passed = self.open.points.partition_point(|(at, _)| *at <= u);
+        let passed = self.open.points.partition_point(|point| point.u <= u);
         let before = passed.saturating_sub(1);
         self.open.points.drain(..before);
         self.open.least.drain(..before);
@@ -53,12 +53,14 @@ impl<const N: usize> Ahead<N> {
     fn horizon(&self, from: f64, time: f64) -> Option<f64> {
         let Stretch { points, least } = &self.open;
         let (end, whole) = self.joints.end();
-        let now = points.partition_point(|(u, _)| *u <= from).checked_sub(1)?;
+        let now = points
+            .partition_point(|point| point.u <= from)
+            .checked_sub(1)?;
         let after = least.partition_point(|at| *at < least[now] + time);
         let far = after.min(now + MOST_POINTS).max(now + 2);
         match points.get(far) {
             // A short rest of the way joins this window.
-            Some((u, _)) if whole - least[far] > 0.5 * time => Some(*u),
+            Some(point) if whole - least[far] > 0.5 * time => Some(point.u),
             Some(_) => Some(end),
             None => (self.next == self.joints.count()).then_some(end),
         }
@@ -81,7 +83,7 @@ impl<const N: usize> Planner<N> {
     ) -> Option<f64> {
         loop {
             let to = ahead.horizon(from, time);
-            let reached = ahead.open.points.last().map_or(-1.0, |(u, _)| *u);
+            let reached = ahead.open.points.last().map_or(-1.0, |point| point.u);
             if let Some(to) = to.filter(|to| *to <= reached) {
                 return Some(to);
             }

@@ -11,11 +11,12 @@ use kinematics::follow::{
     follow_with, refine,
 };
 use kinematics::measure::dexterity;
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector3};
 use trajectory::smooth::{FittedCurve, FittedPart};
-use trajectory::{HermitePath, JointPoint, timing};
+use trajectory::{HermitePath, HermitePoint, timing};
 
 use super::super::Planner;
+use super::super::cartesian::of_path;
 use crate::task::Move;
 
 /// Knots of the curve from the first point of a stretch to that of the next.
@@ -51,7 +52,7 @@ pub(super) struct Checked<const N: usize> {
 /// Points of the joint path, and about the least time from the start to each (s).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stretch<const N: usize> {
-    pub points: Vec<(f64, JointPoint<N>)>,
+    pub points: Vec<HermitePoint<N>>,
     pub least: Vec<f64>,
 }
 
@@ -197,8 +198,7 @@ impl<const N: usize> Planner<N> {
     /// joints: it lies between the least and the largest of its Bernstein points.
     fn stays_inside(&self, pair: &[FollowPoint<N>]) -> bool {
         let step = pair[1].u - pair[0].u;
-        let side = |point: &FollowPoint<N>, h: f64| {
-            let [q, q1, q2, q3] = point.q;
+        let side = |[q, q1, q2, q3]: [SVector<f64, N>; 4], h: f64| {
             let one = q + q1 * (h / 7.0);
             let two = one * 2.0 - q + q2 * (h * h / 42.0);
             let three = two * 3.0 - one * 3.0 + q + q3 * (h * h * h / 210.0);
@@ -208,7 +208,7 @@ impl<const N: usize> Planner<N> {
         let inside = |q: &SVector<f64, N>| {
             (0..N).all(|j| q[j] >= limits.lower[j] + MARGIN && q[j] <= limits.upper[j] - MARGIN)
         };
-        let (left, right) = (side(&pair[0], step), side(&pair[1], -step));
+        let (left, right) = (side(pair[0].q, step), side(pair[1].before(), -step));
         left.iter().chain(&right).all(inside)
     }
 
@@ -266,18 +266,14 @@ fn options() -> FollowOptions {
     }
 }
 
-/// A point of the joint path.
-fn of_path<const N: usize>(point: &FollowPoint<N>) -> (f64, JointPoint<N>) {
-    (point.u, JointPoint { q: point.q })
-}
-
-/// The tool at a parameter of the curve.
+/// The tool at a parameter of the curve, no derivative of which jumps.
 fn twist(curve: &FittedPart, u: f64) -> TwistPoint {
     let seen = curve.tool(u);
     TwistPoint {
         pose: seen.pose,
         linear: seen.linear,
         angular: seen.angular,
+        jump: [Vector3::zeros(); 2],
     }
 }
 
@@ -328,7 +324,7 @@ mod tests {
             let stretch = stretch.unwrap();
             let (point, least) = along.begins.get(index + 1).unwrap_or(&along.end);
             let last = stretch.points.last().unwrap();
-            assert_eq!((last.0, last.1.q), (point.u, point.q));
+            assert_eq!((last.u, last.joint.q), (point.u, point.q));
             assert_eq!(stretch.least.last(), Some(least));
         }
         assert_eq!(along.end().0, curve.end());
