@@ -149,7 +149,7 @@ fn jumps<const N: usize>(name: &str) {
     assert!(
         others
             .into_iter()
-            .all(|point| point.jump == SVector::zeros()),
+            .all(|point| point.jump == SVector::<f64, N>::zeros()),
         "{name}"
     );
 }
