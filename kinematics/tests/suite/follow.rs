@@ -96,7 +96,7 @@ fn joint_paths_are_exact_and_continuous() {
 /// A tool from rest whose jerk (m/u3, rad/u3) changes its sign at `u` 0.5, and whether it says by how much.
 fn jerked(start: &Isometry3<f64>, told: bool) -> impl Fn(f64) -> TwistPoint + use<> {
     let start = *start;
-    let (along, about) = (Vector3::new(0.9, -0.6, 0.3), Vector3::new(0.6, 1.2, -0.9));
+    let (along, about) = (Vector3::new(-0.3, 0.3, -0.2), Vector3::new(0.4, 0.6, -0.5));
     move |u| {
         // The jerk is 1, then -1.
         let late = (u - 0.5).max(0.0);
