@@ -83,7 +83,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The fastest motion of searches with the joints that begin at those along rough curves and at straight moves to each pose, and of
-    /// searches of parts of the list; `None` if the list is dense, or if the tool rules.
+    /// searches of parts of the list; that along a rough curve if the list is dense; `None` if the tool rules.
     ///
     /// # Errors
     ///
@@ -93,7 +93,13 @@ impl<const N: usize> Planner<N> {
         motion: &Move,
         start: &SVector<f64, N>,
     ) -> Result<Option<PlannedMove<N>>, MotionError> {
-        let Some(mut tried) = self.tried_from_rough(motion, start)? else {
+        let first = match self.rough(motion, start, BEGINNINGS[0]) {
+            Ok((curve, course)) if curve.is_dense() => {
+                return Ok(self.along_dense(motion, start, (curve, &course)));
+            }
+            first => first,
+        };
+        let Some(mut tried) = self.tried_from_rough(motion, start, first)? else {
             return Ok(None);
         };
         let stops = if tried.is_fast() {
@@ -110,7 +116,7 @@ impl<const N: usize> Planner<N> {
         }
     }
 
-    /// What searches have found that begin at rough curves; `None` if the list is dense or the tool rules.
+    /// What searches have found that begin at rough curves, the first of which is known; `None` if the list is dense or the tool rules.
     ///
     /// # Errors
     ///
@@ -119,19 +125,22 @@ impl<const N: usize> Planner<N> {
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
+        first: Result<(Followed<N>, Course<N>), Failure>,
     ) -> Result<Option<Tried<N>>, MotionError> {
-        let mut tried = Tried::nothing();
+        let (mut tried, mut first) = (Tried::nothing(), Some(first));
         for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
-            let (curve, course) = match self.rough(motion, start, beginning) {
-                Ok(rough) => rough,
-                Err(failure) => {
-                    if k == 0 && self.is_refused(&failure, motion, start) {
-                        return Err(self.blamed(failure.error, motion, start));
+            let rough = first.take();
+            let (curve, course) =
+                match rough.unwrap_or_else(|| self.rough(motion, start, beginning)) {
+                    Ok(rough) => rough,
+                    Err(failure) => {
+                        if k == 0 && self.is_refused(&failure, motion, start) {
+                            return Err(self.blamed(failure.error, motion, start));
+                        }
+                        tried.failed.get_or_insert(failure.error);
+                        continue;
                     }
-                    tried.failed.get_or_insert(failure.error);
-                    continue;
-                }
-            };
+                };
             let time = course.time;
             if curve.is_dense() || k == 0 && time <= RULED * curve.path.plan.duration() {
                 return Ok(None);

@@ -10,6 +10,7 @@ mod cartesian;
 mod certificate;
 mod corners;
 mod course;
+mod dense;
 mod draft;
 mod efforts;
 mod fault;

@@ -86,6 +86,8 @@ impl<const N: usize> Planner<N> {
             self.through_many(motion, start)?
         } else if motion.poses.len() <= FEW {
             self.rounder_of_few(motion, start)
+        } else if Self::has_many(motion) {
+            self.through_dense(motion, start)
         } else {
             None
         };
@@ -195,12 +197,7 @@ impl<const N: usize> Planner<N> {
 
     /// Whether the tolerance leaves room beside the legs of a list for curves of another shape.
     fn has_room(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
-        let poses = self.through(motion, start);
-        let leg = |pair: &[Isometry3<f64>]| {
-            (pair[1].translation.vector - pair[0].translation.vector).norm()
-        };
-        let length: f64 = poses.windows(2).map(leg).sum();
-        motion.tolerance * motion.poses.len() as f64 >= ROOM * length
+        motion.tolerance >= ROOM * self.mean_leg(motion, start)
     }
 
     /// Whether a list has many poses for a search with the joints.
@@ -209,7 +206,7 @@ impl<const N: usize> Planner<N> {
     }
 
     /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
-    fn foretells_joints(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+    pub(super) fn foretells_joints(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
         let tool: f64 = self.least_of_legs(motion, start).iter().sum();
         let mut from = *start;
         let mut leg = |pose: &Isometry3<f64>| {

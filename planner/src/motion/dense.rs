@@ -1,0 +1,91 @@
+//! MoveSmoothlyTo through dense poses where the joints rule: along a rough curve of the tool, which a short search finds.
+//!
+//! The fastest curve of the tool takes ten to a hundred times the planning, and the joints are no faster along it.
+
+use nalgebra::{Isometry3, SVector};
+
+use super::course::Course;
+use super::many::BEGINNINGS;
+use super::smooth::Search;
+use super::smooth_joints::Followed;
+use super::{PlannedMove, Planner};
+use crate::task::Move;
+
+/// Time of the joints along the rough curve, over that of the tool alone, up to which the tool rules.
+const RULED: f64 = 1.05;
+/// Time of a fitted curve over its bound from which on a spline may be faster, where the tolerance is that of mean legs.
+const FAR: f64 = 1.15;
+/// Most poses at which it is foretold whether the joints rule.
+const LOOKS: usize = 32;
+
+impl<const N: usize> Planner<N> {
+    /// The motion along a rough curve through a dense list of many poses that does not turn; `None` if the list is another one, and
+    /// where the tool rules.
+    pub(super) fn through_dense(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+    ) -> Option<PlannedMove<N>> {
+        let step = motion.poses.len().div_ceil(LOOKS);
+        let poses = motion.poses.iter().rev().step_by(step).rev();
+        let few = Move {
+            poses: poses.copied().collect(),
+            ..motion.clone()
+        };
+        if !self.foretells_joints(&few, start) {
+            return None;
+        }
+        let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
+        if !curve.is_dense() {
+            return None;
+        }
+        self.along_dense(motion, start, (curve, &course))
+    }
+
+    /// The motion along a rough curve through a dense list; `None` where the tool rules.
+    pub(super) fn along_dense(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (curve, course): (Followed<N>, &Course<N>),
+    ) -> Option<PlannedMove<N>> {
+        if course.time <= RULED * curve.path.plan.duration() {
+            return None;
+        }
+        let other = self.spline_instead(motion, start, (&curve, course.time));
+        let curve = other.unwrap_or(curve);
+        let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
+        Some(self.for_the_arm(motion, start, (first, &curve)))
+    }
+
+    /// The joints along a spline where they need about less time than along a fitted curve (s): it may cut corners of a list that is
+    /// finer than its tolerance.
+    fn spline_instead(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (curve, time): (&Followed<N>, f64),
+    ) -> Option<Followed<N>> {
+        let plan = &curve.path.plan;
+        let far = plan.duration() > FAR * plan.certificate().lower_bound;
+        if !curve.path.is_fitted() || !far || motion.tolerance < self.mean_leg(motion, start) {
+            return None;
+        }
+        let search = Search {
+            gap: BEGINNINGS[0].0,
+            most: f64::INFINITY,
+        };
+        let spline = self.curve(start, (motion, search), false).ok()?;
+        (self.about_time(&spline.points) < time).then_some(spline)
+    }
+
+    /// The mean length of the legs of a list, m.
+    pub(super) fn mean_leg(&self, motion: &Move, start: &SVector<f64, N>) -> f64 {
+        let poses = self.through(motion, start);
+        let leg = |pair: &[Isometry3<f64>]| {
+            (pair[1].translation.vector - pair[0].translation.vector).norm()
+        };
+        let length: f64 = poses.windows(2).map(leg).sum();
+        length / motion.poses.len() as f64
+    }
+}
