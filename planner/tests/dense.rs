@@ -127,22 +127,38 @@ fn poses_on_the_legs_change_nothing() {
     }
 }
 
-/// A curve on which no joint is at its limits takes an arm no longer than the tool alone: the jerk of its joints jumps with that of the
-/// tool. With one jerk at such a place the joints bent before it, and their law was 0.3 % longer.
-#[test]
-fn an_arm_that_has_time_is_as_fast_as_its_tool() {
-    let arm = Arm::<6>::new("ur5e");
-    let place = |k: usize| {
-        let along = k as f64 / 1000.0;
-        let (sine, cosine) = (4.0 * TAU * along).sin_cos();
-        Vector3::new(0.04 * (cosine - 1.0), 0.04 * sine, 0.08 * along)
+/// Poses as they are taught by hand, with noise, along a closed curve.
+fn taught(noise: f64) -> Vec<Vector3<f64>> {
+    let place = |k: u32| {
+        let turn = TAU * f64::from(k) / 400.0;
+        let at = |times: f64| (times * turn).sin();
+        let off = |times: f64| noise * (times * f64::from(k)).sin();
+        Vector3::new(
+            0.05 * at(2.0) + off(12.9),
+            0.05 * at(3.0) + off(78.2),
+            0.02 * (1.0 - turn.cos()) + off(37.7),
+        )
     };
-    let places: Vec<_> = (1..=1000).map(place).collect();
-    for tolerance in [2e-4, 1e-3] {
-        let time = arm.time(&places, tolerance);
-        let tool = arm.tool_time(&places, tolerance);
-        println!("within {tolerance} m: {time} s, the tool alone {tool} s");
-        assert!(time < 1.002 * tool);
+    (1..=400).map(place).collect()
+}
+
+/// Where the joints rule, a dense list takes them no longer within more tolerance than its noise, though the fastest curve of the tool,
+/// which cuts through the noise, is not searched for.
+#[test]
+fn a_taught_curve_is_smoothed_for_the_joints() {
+    let (ur5e, panda) = (Arm::<6>::new("ur5e"), Arm::<7>::new("panda"));
+    let places = taught(2e-5);
+    let mut least = [f64::INFINITY; 2];
+    for tolerance in [5e-5, 2e-4, 1e-3, 5e-3] {
+        let times = [
+            ur5e.time(&places, tolerance),
+            panda.time(&places, tolerance),
+        ];
+        println!("within {tolerance} m: {times:?} s");
+        for (least, time) in least.iter_mut().zip(times) {
+            assert!(time < 1.02 * *least, "{time} s, {least} s within less");
+            *least = least.min(time);
+        }
     }
 }
 

@@ -13,8 +13,10 @@ use crate::task::Move;
 
 /// Time of the joints along the rough curve, over that of the tool alone, up to which the tool rules.
 const RULED: f64 = 1.05;
-/// Time of a fitted curve over its bound from which on a spline may be faster, where the tolerance is that of mean legs.
+/// Time of a fitted curve over its bound from which on a spline may be faster, where the tolerance is that of mean legs or more, and
+/// the gap to its optimum at which the search for that ends.
 const FAR: f64 = 1.15;
+const GAP: f64 = 0.01;
 /// Most poses at which it is foretold whether the joints rule.
 const LOOKS: usize = 32;
 
@@ -58,8 +60,8 @@ impl<const N: usize> Planner<N> {
         Some(self.for_the_arm(motion, start, (first, &curve)))
     }
 
-    /// The joints along a spline where they need about less time than along a fitted curve (s): it may cut corners of a list that is
-    /// finer than its tolerance.
+    /// The joints along a spline, nearer to its optimum, where they need about less time for it than along the rough curve (s): it may cut
+    /// the corners of a list that is finer than its tolerance.
     fn spline_instead(
         &self,
         motion: &Move,
@@ -68,11 +70,11 @@ impl<const N: usize> Planner<N> {
     ) -> Option<Followed<N>> {
         let plan = &curve.path.plan;
         let far = plan.duration() > FAR * plan.certificate().lower_bound;
-        if !curve.path.is_fitted() || !far || motion.tolerance < self.mean_leg(motion, start) {
+        if curve.path.is_fitted() && !far || motion.tolerance < self.mean_leg(motion, start) {
             return None;
         }
         let search = Search {
-            gap: BEGINNINGS[0].0,
+            gap: Some(GAP),
             most: f64::INFINITY,
         };
         let spline = self.curve(start, (motion, search), false).ok()?;
