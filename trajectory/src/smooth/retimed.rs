@@ -46,7 +46,7 @@ pub(super) fn motion(
     let pose = |time: f64| way.at(law.sample(time).position[0]).pose;
     let ends = [&poses[0], &poses[poses.len() - 1]];
     let near = options.tolerance.min(options.corridor());
-    let mut spans = dense::spans_along(&pose, law.duration(), ends, (near, &options.limits));
+    let mut spans = dense::spans_along(&pose, law.duration(), ends, (near, options));
     certify_slowed(&mut spans, (poses, false), options, STRETCH);
     let motion = Motion {
         eased: known.eased,

@@ -275,7 +275,7 @@ impl<'a, const D: usize> Section<'a, D> {
         let law = &best.timed.law;
         let pose = |time: f64| best.curve.pose(law.sample(time).position[0]);
         let ends = [&self.poses[0], &self.poses[self.poses.len() - 1]];
-        let near = (self.units.length, &self.options.limits);
+        let near = (self.units.length, self.options);
         spans_along(&pose, law.duration(), ends, near)
     }
 

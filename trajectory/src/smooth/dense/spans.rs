@@ -11,8 +11,8 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::ToolLimits;
 use crate::line::body_turn;
+use crate::smooth::SmoothOptions;
 use crate::smooth::span::Span;
 use crate::smooth::spline::{START, power, turns};
 
@@ -27,8 +27,9 @@ const EASED: [f64; 2] = [0.991_76, 0.999_36];
 
 /// Share of the tolerance that the spans may cut off corners.
 const CUT: f64 = 0.1;
-/// Least number of knots of the spans in a ramp of the acceleration, most of a motion.
+/// Least number of knots of the spans in a ramp of the acceleration, of those of a rough motion, and most of a motion.
 const KNOTS_PER_RAMP: f64 = 20.0;
+const ROUGH_KNOTS_PER_RAMP: f64 = 2.0;
 const MOST_KNOTS: f64 = 1e5;
 
 /// Spans of a motion that has a `pose` at each time up to a `duration` (s), from rest in `ends[0]` to rest in `ends[1]`.
@@ -37,17 +38,18 @@ pub(in crate::smooth) fn spans_along(
     pose: &dyn Fn(f64) -> Isometry3<f64>,
     duration: f64,
     ends: [&Isometry3<f64>; 2],
-    (near, limits): (f64, &ToolLimits),
+    (near, options): (f64, &SmoothOptions),
 ) -> Vec<Span> {
+    let limits = &options.limits;
+    let knots = if options.is_rough() {
+        ROUGH_KNOTS_PER_RAMP
+    } else {
+        KNOTS_PER_RAMP
+    };
     let ramp = limits.acceleration / limits.jerk;
     let cut = (CUT * near * 4.8 / limits.acceleration).sqrt();
     let least = duration / MOST_KNOTS;
-    spans(
-        pose,
-        duration,
-        ends,
-        cut.min(ramp / KNOTS_PER_RAMP).max(least),
-    )
+    spans(pose, duration, ends, cut.min(ramp / knots).max(least))
 }
 
 /// The same with knots about `spacing` apart, s.
