@@ -95,7 +95,7 @@ impl<const N: usize> Planner<N> {
     ) -> Result<Option<PlannedMove<N>>, MotionError> {
         let first = match self.rough(motion, start, BEGINNINGS[0]) {
             Ok((curve, course)) if curve.is_dense() => {
-                return Ok(self.along_dense(motion, start, (curve, &course)));
+                return Ok(self.on_rough(motion, start, (curve, &course)));
             }
             first => first,
         };

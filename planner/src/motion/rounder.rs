@@ -84,12 +84,10 @@ impl<const N: usize> Planner<N> {
         }
         let planned = if self.has_many_turns(motion, start) {
             self.through_many(motion, start)?
-        } else if motion.poses.len() <= FEW {
-            self.rounder_of_few(motion, start)
-        } else if Self::has_many(motion) {
-            self.through_dense(motion, start)
         } else {
-            None
+            let few = motion.poses.len() <= FEW;
+            let rounder = few.then(|| self.rounder_of_few(motion, start)).flatten();
+            rounder.or_else(|| self.along_rough(motion, start))
         };
         let rests =
             |planned: &PlannedMove<N>| planned.blend.is_some_and(|blend| blend.fallbacks > 0);

@@ -1,4 +1,4 @@
-//! MoveSmoothlyTo through dense poses where the joints rule: along a rough curve of the tool, which a short search finds.
+//! MoveSmoothlyTo where the joints rule: along a rough curve of the tool, which a short search finds.
 //!
 //! The fastest curve of the tool takes ten to a hundred times the planning, and the joints are no faster along it.
 
@@ -21,9 +21,8 @@ const GAP: f64 = 0.01;
 const LOOKS: usize = 32;
 
 impl<const N: usize> Planner<N> {
-    /// The motion along a rough curve through a dense list of many poses that does not turn; `None` if the list is another one, and
-    /// where the tool rules.
-    pub(super) fn through_dense(
+    /// The motion along a rough curve; `None` where the tool rules.
+    pub(super) fn along_rough(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
@@ -38,14 +37,11 @@ impl<const N: usize> Planner<N> {
             return None;
         }
         let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
-        if !curve.is_dense() {
-            return None;
-        }
-        self.along_dense(motion, start, (curve, &course))
+        self.on_rough(motion, start, (curve, &course))
     }
 
-    /// The motion along a rough curve through a dense list; `None` where the tool rules.
-    pub(super) fn along_dense(
+    /// The motion along a rough curve that the joints follow; `None` where the tool rules.
+    pub(super) fn on_rough(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
