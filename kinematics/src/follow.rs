@@ -14,6 +14,7 @@ mod nearby;
 mod null_space;
 mod null_space_grid;
 mod null_space_path;
+mod null_space_spline;
 mod redundancy;
 mod spare;
 mod trace;

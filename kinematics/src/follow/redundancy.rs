@@ -3,6 +3,7 @@
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
+use super::null_space_spline::{self, BASIS};
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
 use crate::ik::IkFailure;
@@ -147,6 +148,11 @@ pub(super) const SHAPES: [NullSpacePolynomial; 4] = [
 ];
 /// Sizes that are tried of each shape, one after the other, rad.
 const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
+/// Sizes that are tried of each coefficient of a spline, rad, most rounds with one size, and least share of the cost that a round has to
+/// save for another one.
+const SPLINE_SIZES: [f64; 4] = [0.3, 0.15, 0.07, 0.035];
+const SPLINE_ROUNDS: usize = 2;
+const SPLINE_GAIN: f64 = 2e-3;
 /// What is added to the coefficient of a joint in the measure, one after the other.
 const TILTS: [f64; 2] = [0.5, 0.2];
 /// Least share of the cost that a round of steps has to save for a round of smaller ones.
@@ -162,9 +168,9 @@ const COARSE: f64 = 1e-3;
 pub(super) const WORTH: f64 = 0.01;
 
 /// The null-space motion that costs least, from `start`, among those that stay as far from limits and
-/// singular poses as the first without one, if it saves something. It is searched in two steps, along
+/// singular poses as the first without one, if it saves something. It is searched in three steps, along
 /// one coordinate after the other: the function of the joints that stays constant, then how its value
-/// changes. The search may miss the best.
+/// changes over the path, then how it changes along parts of it. The search may miss the best.
 pub(super) fn cheapest<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
@@ -189,11 +195,15 @@ pub(super) fn cheapest<const N: usize>(
     if after.least < none {
         after.shape();
     }
-    let found = if after.least < alone.least {
+    let mut found = if after.least < alone.least {
         after
     } else {
         alone
     };
+    // With two spare joints there would be two functions.
+    if N == 7 {
+        found.spline();
+    }
     (found.least < none * (1.0 - WORTH)).then_some(found.best)
 }
 
@@ -240,6 +250,46 @@ impl<const N: usize> Search<'_, N> {
             }
             if round > 0 && self.least >= before * (1.0 - GAIN) {
                 return;
+            }
+        }
+    }
+
+    /// Searches how its value changes along parts of the path.
+    fn spline(&mut self) {
+        let (whole, mut coefficients) = (self.best.clone(), [0.0; BASIS]);
+        for size in SPLINE_SIZES {
+            for _ in 0..SPLINE_ROUNDS {
+                let before = self.least;
+                for k in 0..BASIS {
+                    self.coefficient(&whole, &mut coefficients, (k, size));
+                }
+                if self.least >= before * (1.0 - SPLINE_GAIN) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Changes one coefficient of the spline in steps of a size while they save something.
+    fn coefficient(
+        &mut self,
+        whole: &NullSpace<N>,
+        coefficients: &mut [f64; BASIS],
+        (k, size): (usize, f64),
+    ) {
+        for sign in [1.0, -1.0] {
+            for taken in 0..REPEATS {
+                let mut changed = *coefficients;
+                changed[k] += sign * size;
+                let other = null_space_spline::added(whole, changed);
+                match (self.judge)(&other).filter(|cost| *cost < self.least) {
+                    Some(cost) => {
+                        (self.best, self.least) = (other, cost);
+                        *coefficients = changed;
+                    }
+                    None if taken > 0 => return,
+                    None => break,
+                }
             }
         }
     }

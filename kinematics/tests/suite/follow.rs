@@ -4,6 +4,7 @@ use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;
 use kinematics::follow::{
     NullMotion, SpareSearch, cheaper, cheaper_near, follow_choosing, follow_with, refine,
+    spare_direction,
 };
 use kinematics::{FollowCause, FollowOptions, FollowPoint, IkFailure, Solver, TwistPoint, follow};
 use nalgebra::{Isometry3, SVector, Translation3, Unit, UnitQuaternion, Vector3};
@@ -167,6 +168,35 @@ fn fastest<const N: usize>(points: &[FollowPoint<N>]) -> f64 {
         .windows(2)
         .map(|pair| (pair[1].q[0] - pair[0].q[0]).amax())
         .sum()
+}
+
+/// Where the spare joint should move along a part of the path only, it does, and hardly along the rest.
+#[test]
+fn the_spare_joint_moves_along_a_part() {
+    for name in SEVEN {
+        let solver = Solver::new(arms::chain::<7>(name));
+        let start = ready::<7>(name);
+        let tool = curve(&solver.chain().forward(&start), 1.0);
+        let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
+        let direction = spare_direction(solver.chain(), &start).unwrap();
+        let wanted = |u: f64| {
+            let within = ((u - 0.5) / 0.3).clamp(0.0, 1.0);
+            0.2 * (std::f64::consts::PI * within).sin().powi(2)
+        };
+        let off =
+            |point: &FollowPoint<7>| (direction.dot(&(point.q[0] - start)) - wanted(point.u)).abs();
+        let cost = |points: &[FollowPoint<7>]| {
+            0.01 + points.iter().map(off).sum::<f64>() / points.len() as f64
+        };
+        let at = (&grid[..], &start);
+        let options = FollowOptions::default();
+        let still = follow(&solver, &tool, &grid, &start, &options).unwrap();
+        let motion = cheaper(&solver, &tool, at, &options, &cost).unwrap();
+        let points = follow_with(&solver, &tool, at, &options, &motion).unwrap();
+        let (before, after) = (cost(&still), cost(&points));
+        println!("{name}: {before} without, {after} with");
+        assert!(after < 0.6 * before, "{name}: {after}, {before} without");
+    }
 }
 
 /// A null-space motion that costs less is found, costs less on the fine grid too, and is on the path, inside the
