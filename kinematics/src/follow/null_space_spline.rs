@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_part_of_the_path_changes() {
         let mut motion = NullSpace::<7>::none();
-        motion.directions[0] = SVector::repeat(1.0).normalize();
+        motion.directions[0] = SVector::<f64, 7>::repeat(1.0).normalize();
         motion.polynomials[0] = [0.4, -0.3, 0.2, 0.0, 0.1, 0.0];
         (motion.from, motion.span) = (1.0, 2.0);
         let mut coefficients = [0.0; BASIS];
