@@ -143,7 +143,8 @@ fn taught(noise: f64) -> Vec<Vector3<f64>> {
 }
 
 /// Where the joints rule, a dense list takes them no longer within more tolerance than its noise, though the fastest curve of the tool,
-/// which cuts through the noise, is not searched for.
+/// which cuts through the noise, is not searched for. The spare joint of a Panda is moved by a search that ends elsewhere along another
+/// curve.
 #[test]
 fn a_taught_curve_is_smoothed_for_the_joints() {
     let (ur5e, panda) = (Arm::<6>::new("ur5e"), Arm::<7>::new("panda"));
@@ -155,8 +156,8 @@ fn a_taught_curve_is_smoothed_for_the_joints() {
             panda.time(&places, tolerance),
         ];
         println!("within {tolerance} m: {times:?} s");
-        for (least, time) in least.iter_mut().zip(times) {
-            assert!(time < 1.02 * *least, "{time} s, {least} s within less");
+        for ((least, time), more) in least.iter_mut().zip(times).zip([1.02, 1.1]) {
+            assert!(time < more * *least, "{time} s, {least} s within less");
             *least = least.min(time);
         }
     }
