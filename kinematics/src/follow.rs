@@ -214,8 +214,8 @@ pub struct SpareSearch<'a, const N: usize> {
 
 /// A null-space motion that costs less than a known one, and stays nearly as far inside the limits and away from singular poses: less
 /// work than [`cheaper`], as the function of the joints stays and only its values change. The other arguments are those of
-/// [`follow`]; `None` where nothing is found that saves one percent, for a motion that is [given](NullMotion::given), and
-/// always with six joints or fewer.
+/// [`follow`]; `None` where nothing is found that saves one percent, for a motion that is [given](NullMotion::given)
+/// or was found by [`cheaper`], and always with six joints or fewer.
 ///
 /// ```
 /// use kinematics::follow::{
