@@ -146,6 +146,7 @@ impl<const N: usize> std::fmt::Debug for NullMotion<N> {
         let mut shown = f.debug_struct("NullMotion");
         shown.field("directions", &motion.directions);
         shown.field("polynomials", &motion.polynomials);
+        shown.field("spline", &motion.spline);
         shown.field("given", &motion.course.is_some()).finish()
     }
 }
@@ -214,8 +215,8 @@ pub struct SpareSearch<'a, const N: usize> {
 
 /// A null-space motion that costs less than a known one, and stays nearly as far inside the limits and away from singular poses: less
 /// work than [`cheaper`], as the function of the joints stays and only its values change. The other arguments are those of
-/// [`follow`]; `None` where nothing is found that saves one percent, for a motion that is [given](NullMotion::given)
-/// or was found by [`cheaper`], and always with six joints or fewer.
+/// [`follow`]; `None` where nothing is found that saves one percent, for a motion that is [given](NullMotion::given), and
+/// always with six joints or fewer.
 ///
 /// ```
 /// use kinematics::follow::{

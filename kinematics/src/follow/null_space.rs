@@ -5,6 +5,7 @@
 //! polynomial of `u`. So it has exact derivatives and does not drift. With two redundant joints,
 //! the second function is constant. With one, `r` may be given by the caller instead.
 
+use super::null_space_spline::Spline;
 use nalgebra::SVector;
 use std::rc::Rc;
 
@@ -22,6 +23,8 @@ pub(super) struct NullSpace<const N: usize> {
     pub(super) from: f64,
     pub(super) span: f64,
     pub(super) still_ends: bool,
+    /// A spline that is added to the first polynomial.
+    pub(super) spline: Option<Spline>,
     /// The values of the first function, if the caller gives them.
     pub(super) course: Option<SpareCourse>,
 }
@@ -35,6 +38,7 @@ impl<const N: usize> NullSpace<N> {
             from: 0.0,
             span: 1.0,
             still_ends: false,
+            spline: None,
             course: None,
         }
     }
@@ -50,8 +54,13 @@ impl<const N: usize> NullSpace<N> {
             return [course(u)[0], 0.0];
         }
         let [w, ..] = self.progress((u - self.from) / self.span);
-        self.polynomials
-            .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c))
+        let mut values = self
+            .polynomials
+            .map(|null_space_path| null_space_path.iter().rev().fold(0.0, |sum, c| sum * w + c));
+        if let Some(spline) = &self.spline {
+            values[0] += spline.at((u - self.from, self.span))[0];
+        }
+        values
     }
 
     /// Progress of the polynomials and its first three derivatives at `x` from 0 to 1: `x` itself,
@@ -76,7 +85,7 @@ impl<const N: usize> NullSpace<N> {
             return [[first, second, third], [0.0; 3]];
         }
         let [w, w1, w2, w3] = self.progress((u - self.from) / self.span);
-        self.polynomials.map(|null_space_path| {
+        let mut rates = self.polynomials.map(|null_space_path| {
             let mut c = null_space_path;
             let [r1, r2, r3]: [f64; 3] = std::array::from_fn(|_| {
                 for k in 0..5 {
@@ -96,7 +105,14 @@ impl<const N: usize> NullSpace<N> {
                 to_x[1] / (span * span),
                 to_x[2] / (span * span * span),
             ]
-        })
+        });
+        if let Some(spline) = &self.spline {
+            let [_, added @ ..] = spline.at((u - self.from, self.span));
+            for (rate, added) in rates[0].iter_mut().zip(added) {
+                *rate += added;
+            }
+        }
+        rates
     }
 }
 

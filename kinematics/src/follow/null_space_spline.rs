@@ -1,28 +1,22 @@
 //! A spline added to a null-space motion: it changes the motion along a part of a path, and nothing of the rest.
 
-use std::rc::Rc;
-
-use super::null_space::NullSpace;
-
 /// Basis functions of a spline.
 pub(super) const BASIS: usize = 14;
 /// Degree of the spline: its third derivative is smooth.
 const DEGREE: usize = 5;
 
-/// The motion with a spline of these coefficients (rad) added to its first function. The spline begins and ends with the path, as level
-/// as four derivatives that are zero make it.
-pub(super) fn added<const N: usize>(
-    motion: &NullSpace<N>,
-    coefficients: [f64; BASIS],
-) -> NullSpace<N> {
-    let inner = motion.clone();
-    let step = inner.span / (BASIS + DEGREE) as f64;
-    let course = move |u: f64| {
-        let [first, second, third] = inner.rates(u)[0];
-        let mut sum = [inner.at(u)[0], first, second, third];
-        let x = (u - inner.from) / step;
+/// A spline over a path, by its coefficients, rad. It begins and ends with the path, as level as four derivatives that are zero make it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Spline(pub(super) [f64; BASIS]);
+
+impl Spline {
+    /// Its value and first three derivatives where the path parameter has gone so far of its span.
+    pub(super) fn at(&self, (gone, span): (f64, f64)) -> [f64; 4] {
+        let step = span / (BASIS + DEGREE) as f64;
+        let x = gone / step;
         let begin = (x.max(0.0) as usize).saturating_sub(DEGREE);
-        for (k, coefficient) in coefficients.iter().enumerate().skip(begin).take(DEGREE + 1) {
+        let mut sum = [0.0; 4];
+        for (k, coefficient) in self.0.iter().enumerate().skip(begin).take(DEGREE + 1) {
             let mut scale = *coefficient;
             for (sum, value) in sum.iter_mut().zip(basis(x - k as f64)) {
                 *sum += scale * value;
@@ -30,10 +24,6 @@ pub(super) fn added<const N: usize>(
             }
         }
         sum
-    };
-    NullSpace {
-        course: Some(Rc::new(course)),
-        ..motion.clone()
     }
 }
 
@@ -60,6 +50,7 @@ fn basis(x: f64) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::null_space::NullSpace;
     use super::*;
     use nalgebra::SVector;
 
@@ -72,7 +63,10 @@ mod tests {
         (motion.from, motion.span) = (1.0, 2.0);
         let mut coefficients = [0.0; BASIS];
         (coefficients[0], coefficients[1]) = (0.3, -0.2);
-        let other = added(&motion, coefficients);
+        let other = NullSpace {
+            spline: Some(Spline(coefficients)),
+            ..motion.clone()
+        };
         let late = 1.0 + 2.0 * 0.6;
         assert_eq!(other.at(late)[0], motion.at(late)[0]);
         assert_eq!(other.rates(late)[0], motion.rates(late)[0]);

@@ -3,7 +3,7 @@
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
-use super::null_space_spline::{self, BASIS};
+use super::null_space_spline::BASIS;
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
 use crate::ik::IkFailure;
@@ -256,39 +256,18 @@ impl<const N: usize> Search<'_, N> {
 
     /// Searches how its value changes along parts of the path.
     fn spline(&mut self) {
-        let (whole, mut coefficients) = (self.best.clone(), [0.0; BASIS]);
         for size in SPLINE_SIZES {
             for _ in 0..SPLINE_ROUNDS {
                 let before = self.least;
                 for k in 0..BASIS {
-                    self.coefficient(&whole, &mut coefficients, (k, size));
+                    self.along(|from, sign| {
+                        let mut other = from.clone();
+                        other.spline.get_or_insert_default().0[k] += sign * size;
+                        other
+                    });
                 }
                 if self.least >= before * (1.0 - SPLINE_GAIN) {
                     break;
-                }
-            }
-        }
-    }
-
-    /// Changes one coefficient of the spline in steps of a size while they save something.
-    fn coefficient(
-        &mut self,
-        whole: &NullSpace<N>,
-        coefficients: &mut [f64; BASIS],
-        (k, size): (usize, f64),
-    ) {
-        for sign in [1.0, -1.0] {
-            for taken in 0..REPEATS {
-                let mut changed = *coefficients;
-                changed[k] += sign * size;
-                let other = null_space_spline::added(whole, changed);
-                match (self.judge)(&other).filter(|cost| *cost < self.least) {
-                    Some(cost) => {
-                        (self.best, self.least) = (other, cost);
-                        *coefficients = changed;
-                    }
-                    None if taken > 0 => return,
-                    None => break,
                 }
             }
         }
@@ -328,6 +307,7 @@ fn resting<const N: usize>(
         from,
         span: to - from,
         still_ends: task.options.still_ends,
+        spline: None,
         course: None,
     }
 }

@@ -95,7 +95,7 @@ impl<const N: usize> Planner<N> {
     ) -> Result<Option<PlannedMove<N>>, MotionError> {
         let first = match self.rough(motion, start, BEGINNINGS[0]) {
             Ok((curve, course)) if curve.is_dense() => {
-                return Ok(self.on_rough(motion, start, (curve, &course)));
+                return Ok(self.on_rough(motion, start, (curve, course.time)));
             }
             first => first,
         };
@@ -127,20 +127,20 @@ impl<const N: usize> Planner<N> {
         start: &SVector<f64, N>,
         first: Result<(Followed<N>, Course<N>), Failure>,
     ) -> Result<Option<Tried<N>>, MotionError> {
-        let (mut tried, mut first) = (Tried::nothing(), Some(first));
-        for (k, beginning) in BEGINNINGS.into_iter().enumerate() {
-            let rough = first.take();
-            let (curve, course) =
-                match rough.unwrap_or_else(|| self.rough(motion, start, beginning)) {
-                    Ok(rough) => rough,
-                    Err(failure) => {
-                        if k == 0 && self.is_refused(&failure, motion, start) {
-                            return Err(self.blamed(failure.error, motion, start));
-                        }
-                        tried.failed.get_or_insert(failure.error);
-                        continue;
+        let mut tried = Tried::nothing();
+        let others = BEGINNINGS[1..].iter();
+        let others = others.map(|beginning| self.rough(motion, start, *beginning));
+        for (k, rough) in std::iter::once(first).chain(others).enumerate() {
+            let (curve, course) = match rough {
+                Ok(rough) => rough,
+                Err(failure) => {
+                    if k == 0 && self.is_refused(&failure, motion, start) {
+                        return Err(self.blamed(failure.error, motion, start));
                     }
-                };
+                    tried.failed.get_or_insert(failure.error);
+                    continue;
+                }
+            };
             let time = course.time;
             if curve.is_dense() || k == 0 && time <= RULED * curve.path.plan.duration() {
                 return Ok(None);

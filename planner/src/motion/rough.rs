@@ -4,8 +4,6 @@
 
 use nalgebra::{Isometry3, SVector};
 
-use super::course::Course;
-use super::many::BEGINNINGS;
 use super::smooth::Search;
 use super::smooth_joints::Followed;
 use super::{PlannedMove, Planner};
@@ -17,40 +15,19 @@ const RULED: f64 = 1.05;
 /// the gap to its optimum at which the search for that ends.
 const FAR: f64 = 1.15;
 const GAP: f64 = 0.01;
-/// Most poses at which it is foretold whether the joints rule.
-const LOOKS: usize = 32;
 
 impl<const N: usize> Planner<N> {
-    /// The motion along a rough curve; `None` where the tool rules.
-    pub(super) fn along_rough(
-        &self,
-        motion: &Move,
-        start: &SVector<f64, N>,
-    ) -> Option<PlannedMove<N>> {
-        let step = motion.poses.len().div_ceil(LOOKS);
-        let poses = motion.poses.iter().rev().step_by(step).rev();
-        let few = Move {
-            poses: poses.copied().collect(),
-            ..motion.clone()
-        };
-        if !self.foretells_joints(&few, start) {
-            return None;
-        }
-        let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
-        self.on_rough(motion, start, (curve, &course))
-    }
-
-    /// The motion along a rough curve that the joints follow; `None` where the tool rules.
+    /// The motion along a rough curve that the joints follow, in about that time (s); `None` where the tool rules.
     pub(super) fn on_rough(
         &self,
         motion: &Move,
         start: &SVector<f64, N>,
-        (curve, course): (Followed<N>, &Course<N>),
+        (curve, time): (Followed<N>, f64),
     ) -> Option<PlannedMove<N>> {
-        if course.time <= RULED * curve.path.plan.duration() {
+        if time <= RULED * curve.path.plan.duration() {
             return None;
         }
-        let other = self.spline_instead(motion, start, (&curve, course.time));
+        let other = self.spline_instead(motion, start, (&curve, time));
         let curve = other.unwrap_or(curve);
         let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
         Some(self.for_the_arm(motion, start, (first, &curve)))

@@ -37,6 +37,8 @@ const FORETOLD: f64 = 1.1;
 /// Most spans of a curve, and most poses of a list, that is cheap enough for others.
 const CHEAP: usize = 400;
 const FEW: usize = 20;
+/// Most poses at which it is foretold whether the joints rule.
+const LOOKS: usize = 32;
 /// A list of more poses than so is dear to plan for the tool alone: one that is dense is not searched with the joints, and one that
 /// does not turn is searched in parts.
 const MANY: usize = 60;
@@ -85,28 +87,40 @@ impl<const N: usize> Planner<N> {
         let planned = if self.has_many_turns(motion, start) {
             self.through_many(motion, start)?
         } else {
-            let few = motion.poses.len() <= FEW;
-            let rounder = few.then(|| self.rounder_of_few(motion, start)).flatten();
-            rounder.or_else(|| self.along_rough(motion, start))
+            self.near_rough(motion, start)
         };
         let rests =
             |planned: &PlannedMove<N>| planned.blend.is_some_and(|blend| blend.fallbacks > 0);
         Ok(planned.filter(|planned| !rests(planned)))
     }
 
-    /// The fastest motion of a search with the joints that begins at the one along a rounder curve and, where that saves
-    /// little, at the one along others.
-    fn rounder_of_few(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
+    /// The motion near a rough curve, if the joints rule.
+    fn near_rough(&self, motion: &Move, start: &SVector<f64, N>) -> Option<PlannedMove<N>> {
         if !self.foretells_joints(motion, start) {
             return None;
         }
-        let (curve, course) = self.ruled(motion, start)?;
+        let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
+        let (time, tool) = (course.time, curve.path.plan.duration());
+        let searched = motion.poses.len() <= FEW && time > RULED * tool;
+        let found = searched.then(|| self.rounder_of_few(motion, start, (&curve, course)));
+        let along = || self.on_rough(motion, start, (curve, time));
+        found.flatten().or_else(along)
+    }
+
+    /// The fastest motion of a search with the joints that begins at the one along a rough curve through few poses and, where that saves
+    /// little, at the one along others.
+    fn rounder_of_few(
+        &self,
+        motion: &Move,
+        start: &SVector<f64, N>,
+        (curve, course): (&Followed<N>, Course<N>),
+    ) -> Option<PlannedMove<N>> {
         let (about, tool) = (course.time, curve.path.plan.duration());
         let found = match self.with_joints(motion, start, course) {
             Some(found) if found.trajectory.duration() <= ENOUGH * about => found,
             found => {
-                let first = self.on(&curve, motion, (start, f64::INFINITY)).ok()?;
-                let other = self.on_others(motion, start, (first, &curve), false);
+                let first = self.on(curve, motion, (start, f64::INFINITY)).ok()?;
+                let other = self.on_others(motion, start, (first, curve), false);
                 sooner(found, other)
             }
         };
@@ -115,13 +129,6 @@ impl<const N: usize> Planner<N> {
         }
         let other = self.searched_from_stops(motion, start).ok().flatten();
         or_sooner(Some(found), other)
-    }
-
-    /// The joints along a curve that is found by a short search, if they rule.
-    fn ruled(&self, motion: &Move, start: &SVector<f64, N>) -> Option<(Followed<N>, Course<N>)> {
-        let (curve, course) = self.rough(motion, start, BEGINNINGS[0]).ok()?;
-        let ruled = course.time > RULED * curve.path.plan.duration();
-        ruled.then_some((curve, course))
     }
 
     /// The fastest motion of searches with the joints that begin at the one along a curve or, where that saves little, at the
@@ -203,8 +210,14 @@ impl<const N: usize> Planner<N> {
         motion.poses.len() > MANY && Self::has_inverse()
     }
 
-    /// Whether the joints that reach the poses one after the other take longer, from stop to stop, than the tool.
-    pub(super) fn foretells_joints(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+    /// Whether the joints that reach the poses, or some of many, one after the other take longer, from stop to stop, than the tool.
+    fn foretells_joints(&self, motion: &Move, start: &SVector<f64, N>) -> bool {
+        let step = motion.poses.len().div_ceil(LOOKS);
+        let some = motion.poses.iter().rev().step_by(step).rev();
+        let motion = &Move {
+            poses: some.copied().collect(),
+            ..motion.clone()
+        };
         let tool: f64 = self.least_of_legs(motion, start).iter().sum();
         let mut from = *start;
         let mut leg = |pose: &Isometry3<f64>| {
