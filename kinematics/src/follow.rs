@@ -17,6 +17,7 @@ mod null_space_path;
 mod null_space_spline;
 mod redundancy;
 mod spare;
+mod spare_model;
 mod trace;
 
 pub use error::{FollowCause, FollowError};
@@ -152,9 +153,10 @@ impl<const N: usize> std::fmt::Debug for NullMotion<N> {
 }
 
 /// A null-space motion along a path that costs less than none, and stays as far inside the limits and
-/// away from singular poses. `cost` is that of a joint path at a few places, in the unit of the caller,
-/// for example about the time that the joints need. The other arguments are those of [`follow`]; `None`
-/// where nothing is found that saves one percent, which is always so with six joints or fewer.
+/// away from singular poses. Each of `costs` is that of a joint path at a few places, in the unit of the caller,
+/// for example about the time that the joints need: the motion is searched with the first, then changed to save some of the next. The
+/// first should be known in little time. The other arguments are those of [`follow`]; `None`
+/// where nothing is found that saves one percent of the last cost, which is always so with six joints or fewer.
 ///
 /// ```
 /// use kinematics::follow::{FollowOptions, FollowPoint, TwistPoint, cheaper, follow_with};
@@ -176,7 +178,7 @@ impl<const N: usize> std::fmt::Debug for NullMotion<N> {
 ///     points.iter().map(|point| point.q[1].amax()).fold(0.0, f64::max)
 /// };
 /// let at = (&[0.0, 0.5, 1.0][..], &q);
-/// if let Some(motion) = cheaper(&solver, &tool, at, &options, &cost) {
+/// if let Some(motion) = cheaper(&solver, &tool, at, &options, &[&cost]) {
 ///     let points = follow_with(&solver, &tool, at, &options, &motion)?;
 ///     assert!(points.len() >= 3);
 /// }
@@ -187,7 +189,7 @@ pub fn cheaper<const N: usize>(
     tool: &dyn Fn(f64) -> TwistPoint,
     (grid, start): (&[f64], &SVector<f64, N>),
     options: &FollowOptions,
-    cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
+    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
 ) -> Option<NullMotion<N>> {
     let task = task(solver, tool, (grid, start), options).ok()?;
     // A constant: only arms with a null space carry the code of the search in it.
@@ -199,7 +201,7 @@ pub fn cheaper<const N: usize>(
         }
     };
     search
-        .and_then(|search| search(&task, start, cost))
+        .and_then(|search| search(&task, start, costs))
         .map(NullMotion)
 }
 
@@ -281,7 +283,7 @@ type Nearby<const N: usize> = fn(
 type Search<const N: usize> = fn(
     &trace::Task<'_, N>,
     &SVector<f64, N>,
-    &dyn Fn(&[FollowPoint<N>]) -> f64,
+    &[&dyn Fn(&[FollowPoint<N>]) -> f64],
 ) -> Option<null_space::NullSpace<N>>;
 
 /// The joint path of a tool path with a null-space motion that was found for the same path from the same

@@ -78,6 +78,12 @@ impl<const N: usize> NullSpace<N> {
         [1.0 - w, w1, -w2, w3]
     }
 
+    /// Value of the first function at `u`, and its first three derivatives.
+    pub(super) fn jet(&self, u: f64) -> [f64; 4] {
+        let [first, second, third] = self.rates(u)[0];
+        [self.at(u)[0], first, second, third]
+    }
+
     /// First to third derivative of each function to `u`: of a polynomial by the chain rule through its progress.
     pub(super) fn rates(&self, u: f64) -> [[f64; 3]; 2] {
         if let Some(course) = &self.course {

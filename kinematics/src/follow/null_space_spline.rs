@@ -1,7 +1,7 @@
 //! A spline added to a null-space motion: it changes the motion along a part of a path, and nothing of the rest.
 
 /// Basis functions of a spline.
-pub(super) const BASIS: usize = 14;
+pub(super) const BASIS: usize = 20;
 /// Degree of the spline: its third derivative is smooth.
 const DEGREE: usize = 5;
 

@@ -3,9 +3,10 @@
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
-use super::null_space_spline::BASIS;
+use super::spare_model::Price;
 use super::trace::Task;
 use super::{FollowOptions, FollowPoint};
+use crate::Chain;
 use crate::ik::IkFailure;
 use crate::measure::{self, NIMBLE, ROOM};
 use nalgebra::{SMatrix, SVector};
@@ -148,11 +149,9 @@ pub(super) const SHAPES: [NullSpacePolynomial; 4] = [
 ];
 /// Sizes that are tried of each shape, one after the other, rad.
 const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
-/// Sizes that are tried of each coefficient of a spline, rad, most rounds with one size, and least share of the cost that a round has to
-/// save for another one.
-const SPLINE_SIZES: [f64; 4] = [0.3, 0.15, 0.07, 0.035];
-const SPLINE_ROUNDS: usize = 2;
-const SPLINE_GAIN: f64 = 2e-3;
+/// Sizes that are tried of each part of a change along the path, with the first cost and with others, rad.
+const PART_SIZES: [f64; 5] = [0.3, 0.15, 0.07, 0.035, 0.017];
+const FINE_SIZES: [f64; 3] = [0.1, 0.04, 0.016];
 /// What is added to the coefficient of a joint in the measure, one after the other.
 const TILTS: [f64; 2] = [0.5, 0.2];
 /// Least share of the cost that a round of steps has to save for a round of smaller ones.
@@ -168,14 +167,16 @@ const COARSE: f64 = 1e-3;
 pub(super) const WORTH: f64 = 0.01;
 
 /// The null-space motion that costs least, from `start`, among those that stay as far from limits and
-/// singular poses as the first without one, if it saves something. It is searched in three steps, along
-/// one coordinate after the other: the function of the joints that stays constant, then how its value
-/// changes over the path, then how it changes along parts of it. The search may miss the best.
+/// singular poses as the first without one, if it saves something. It is searched in three steps: the
+/// function of the joints that stays constant, how its value changes over the path, and how it changes
+/// along parts of it. Each of the costs after the first is searched along parts from what was found before.
+/// The search may miss the best.
 pub(super) fn cheapest<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-    cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
+    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
 ) -> Option<NullSpace<N>> {
+    let (cost, last) = (*costs.first()?, costs.last()?);
     let places = Coarse::new(task, JUDGED);
     let coarse = places.of(task);
     let still = resting_from(task, start);
@@ -195,16 +196,41 @@ pub(super) fn cheapest<const N: usize>(
     if after.least < none {
         after.shape();
     }
-    let mut found = if after.least < alone.least {
-        after
-    } else {
-        alone
+    let begun = [(alone.best, alone.least), (after.best, after.least)];
+    let (best, least) = along_parts((&coarse, start, ease), costs, begun)?;
+    (least < last(&first) * (1.0 - WORTH)).then_some(best)
+}
+
+/// The best of motions whose first costs are known, after searches along parts of the path, with its last cost.
+fn along_parts<const N: usize>(
+    (coarse, start, ease): (&Task<'_, N>, &SVector<f64, N>, f64),
+    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
+    begun: [(NullSpace<N>, f64); 2],
+) -> Option<(NullSpace<N>, f64)> {
+    let cheapest = |motions: [(NullSpace<N>, f64); 2]| {
+        let [one, other] = motions;
+        if other.1 < one.1 { other } else { one }
     };
     // With two spare joints there would be two functions.
-    if N == 7 {
-        found.spline();
+    if N != 7 {
+        return Some(cheapest(begun));
     }
-    (found.least < none * (1.0 - WORTH)).then_some(found.best)
+    let search = |cost: &dyn Fn(&[FollowPoint<N>]) -> f64, sizes: &[f64], known: &NullSpace<N>| {
+        let price = Price {
+            coarse,
+            start,
+            ease,
+            cost,
+        };
+        price.near(known, sizes)
+    };
+    let (first, others) = costs.split_first()?;
+    let begun = begun.map(|known| search(*first, &PART_SIZES, &known.0).unwrap_or(known));
+    let mut found = cheapest(begun);
+    for cost in others {
+        found = search(*cost, &FINE_SIZES, &found.0)?;
+    }
+    Some(found)
 }
 
 /// A search of the null-space motion that costs least.
@@ -254,25 +280,6 @@ impl<const N: usize> Search<'_, N> {
         }
     }
 
-    /// Searches how its value changes along parts of the path.
-    fn spline(&mut self) {
-        for size in SPLINE_SIZES {
-            for _ in 0..SPLINE_ROUNDS {
-                let before = self.least;
-                for k in 0..BASIS {
-                    self.along(|from, sign| {
-                        let mut other = from.clone();
-                        other.spline.get_or_insert_default().0[k] += sign * size;
-                        other
-                    });
-                }
-                if self.least >= before * (1.0 - SPLINE_GAIN) {
-                    break;
-                }
-            }
-        }
-    }
-
     /// Takes steps in one direction, or against it, while they save something.
     fn along(&mut self, step: impl Fn(&NullSpace<N>, f64) -> NullSpace<N>) {
         for sign in [1.0, -1.0] {
@@ -316,20 +323,23 @@ fn resting<const N: usize>(
 /// its start.
 pub(super) fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
     let chain = task.solver.chain();
-    // The smaller of the quality at a point and `least`, which is known.
-    let one = |least: f64, point: &FollowPoint<N>| {
-        let q = &point.q[0];
-        let room = (0..N).fold(f64::INFINITY, |room, i| room.min(chain.room(i, q[i])));
-        let least = least.min(room / ROOM);
-        if measure::surely_nimble(chain, q, least * NIMBLE) {
-            return least;
-        }
-        least.min(measure::dexterity(chain, q).smallest / NIMBLE)
-    };
     let start = points
         .first()
-        .map_or(1.0, |point| one(f64::INFINITY, point));
-    points.iter().fold(f64::INFINITY, one) / start.clamp(1e-6, 1.0)
+        .map_or(1.0, |point| ease_at(chain, &point.q[0], f64::INFINITY));
+    let least = points.iter().fold(f64::INFINITY, |least, point| {
+        ease_at(chain, &point.q[0], least)
+    });
+    least / start.clamp(1e-6, 1.0)
+}
+
+/// How well joints are inside limits and away from singular poses, or `least`, if that is less.
+pub(super) fn ease_at<const N: usize>(chain: &Chain<N>, q: &SVector<f64, N>, least: f64) -> f64 {
+    let room = (0..N).fold(f64::INFINITY, |room, i| room.min(chain.room(i, q[i])));
+    let least = least.min(room / ROOM);
+    if measure::surely_nimble(chain, q, least * NIMBLE) {
+        return least;
+    }
+    least.min(measure::dexterity(chain, q).smallest / NIMBLE)
 }
 
 /// Directions in which the joints can move without moving the tool: `N - 6` of them,

@@ -285,6 +285,31 @@ impl<const N: usize> Task<'_, N> {
         }
     }
 
+    /// The joints and their derivatives at a point of a path where the first spare function has another value: by so much more than the
+    /// motion says, the same all along the path.
+    pub(super) fn beside(
+        &self,
+        point: &FollowPoint<N>,
+        null_space: &NullSpace<N>,
+        by: f64,
+    ) -> Option<[SVector<f64, N>; 4]> {
+        let u = point.u;
+        let seen = (self.tool)(u);
+        let (_, jacobian) = self.solver.chain().jacobian(&point.q[0]);
+        let rows = task_rows(&jacobian, null_space);
+        let mut b = [0.0; 8];
+        b[6] = by;
+        let x = solve_once::<N>(self.solver.chain().build(), &rows, &b);
+        let guess = Guess {
+            q: &(point.q[0] + SVector::from_fn(|i, _| x[i])),
+            within: OTHER_BRANCH,
+            exact: EXACT,
+        };
+        let [first, second] = null_space.at(u);
+        let q = self.newton(&guess, &seen.pose, null_space, &[first + by, second])?;
+        Some(self.finish((u, &seen), &q, point, null_space).q)
+    }
+
     fn overrun(&self, u: f64, q: &SVector<f64, N>) -> Overrun {
         let chain = self.solver.chain();
         let mut worst = Overrun {

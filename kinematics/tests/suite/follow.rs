@@ -191,7 +191,7 @@ fn the_spare_joint_moves_along_a_part() {
         let at = (&grid[..], &start);
         let options = FollowOptions::default();
         let still = follow(&solver, &tool, &grid, &start, &options).unwrap();
-        let motion = cheaper(&solver, &tool, at, &options, &cost).unwrap();
+        let motion = cheaper(&solver, &tool, at, &options, &[&cost]).unwrap();
         let points = follow_with(&solver, &tool, at, &options, &motion).unwrap();
         let (before, after) = (cost(&still), cost(&points));
         println!("{name}: {before} without, {after} with");
@@ -214,7 +214,7 @@ fn the_spare_joint_takes_what_costs_less() {
             ..FollowOptions::default()
         };
         let at = (&grid[..], &start);
-        let Some(motion) = cheaper(&solver, &tool, at, &options, &fastest) else {
+        let Some(motion) = cheaper(&solver, &tool, at, &options, &[&fastest]) else {
             continue;
         };
         found += 1;
@@ -230,6 +230,41 @@ fn the_spare_joint_takes_what_costs_less() {
         }
     }
     assert!(found >= 3, "{found}");
+}
+
+/// What is searched with one cost is changed to save some of the next: of two functions that the spare joint is to follow, it follows the last
+/// one more closely, and begins near the first.
+#[test]
+fn the_last_cost_decides() {
+    for name in SEVEN {
+        let solver = Solver::new(arms::chain::<7>(name));
+        let start = ready::<7>(name);
+        let tool = curve(&solver.chain().forward(&start), 1.0);
+        let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
+        let direction = spare_direction(solver.chain(), &start).unwrap();
+        let cost = |size: f64| {
+            move |points: &[FollowPoint<7>]| {
+                let wanted = |u: f64| size * (std::f64::consts::PI * u).sin().powi(2);
+                let off = |point: &FollowPoint<7>| {
+                    (direction.dot(&(point.q[0] - start)) - wanted(point.u)).abs()
+                };
+                0.01 + points.iter().map(off).sum::<f64>() / points.len() as f64
+            }
+        };
+        let (first, last) = (cost(0.2), cost(0.15));
+        let (at, options) = ((&grid[..], &start), FollowOptions::default());
+        let found = |costs: &[&dyn Fn(&[FollowPoint<7>]) -> f64]| {
+            let motion = cheaper(&solver, &tool, at, &options, costs).unwrap();
+            let points = follow_with(&solver, &tool, at, &options, &motion).unwrap();
+            [first(&points), last(&points)]
+        };
+        let (one, both) = (found(&[&first]), found(&[&first, &last]));
+        assert!(one[0] < one[1], "{name}: {one:?}");
+        assert!(
+            both[1] < both[0] && both[1] < 0.7 * one[1],
+            "{name}: {both:?}, {one:?}"
+        );
+    }
 }
 
 /// Sum over a path of the speed of the fastest joint, to the path parameter (rad).
@@ -366,7 +401,7 @@ fn six_joints_have_nothing_to_choose() {
     let start = ready::<6>("ur5e");
     let tool = curve(&solver.chain().forward(&start), 1.0);
     let at = (&[0.0, 0.5, 1.0][..], &start);
-    assert!(cheaper(&solver, &tool, at, &FollowOptions::default(), &fastest).is_none());
+    assert!(cheaper(&solver, &tool, at, &FollowOptions::default(), &[&fastest]).is_none());
 }
 
 /// The answer does not depend on anything but the question.

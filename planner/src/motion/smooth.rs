@@ -302,13 +302,20 @@ impl<const N: usize> Planner<N> {
             spans,
             near: false,
         };
-        let mut planned = Err(MotionError::NoWay);
-        let drafts = self.along_smooth(followed, motion, (start, most));
-        for draft in drafts.map_err(failure)? {
-            planned = self.certify(motion, start, draft);
-            if planned.is_ok() {
-                break;
+        let certified = |help: bool| {
+            let mut planned = Err(MotionError::NoWay);
+            for draft in self.along_smooth((followed, help), motion, (start, most))? {
+                planned = self.certify(motion, start, draft);
+                if planned.is_ok() {
+                    break;
+                }
             }
+            planned
+        };
+        let mut planned = certified(true);
+        // One that is slower than with help was perhaps not timed.
+        if followed.may_be_helped && matches!(planned, Err(MotionError::Uncertified(_))) {
+            planned = certified(false);
         }
         Ok(Along {
             planned: PlannedMove {

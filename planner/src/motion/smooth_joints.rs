@@ -58,10 +58,10 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The motions of the joints along a smooth path, slowed down where a joint needs it, to be certified: the fastest
-    /// first. [`MotionError::NoWay`] if none is shorter than `most` (s).
+    /// first. `help` says whether another null-space motion is searched. [`MotionError::NoWay`] if none is shorter than `most` (s).
     pub(super) fn along_smooth(
         &self,
-        followed: &Followed<N>,
+        (followed, help): (&Followed<N>, bool),
         motion: &Move,
         (start, most): (&SVector<f64, N>, f64),
     ) -> Result<Vec<Draft<N>>, MotionError> {
@@ -72,38 +72,52 @@ impl<const N: usize> Planner<N> {
             let at_once = Crossing::at(&crossings, |_| 0.0);
             return Ok(vec![passing(Trajectory::new(Vec::new()), at_once)]);
         }
-        let first = match self.fastest_along(plan, (points, most), (&crossings, motion)) {
-            // The spare joint may help.
-            Err(MotionError::NoWay) if followed.may_be_helped => None,
-            first => Some(first?),
+        let along = |points: &[FollowPoint<N>], most: f64| {
+            let draft = self.fastest_along(plan, (points, most), (&crossings, motion))?;
+            let shorter = draft.trajectory.duration() < most;
+            shorter.then_some(draft).ok_or(MotionError::NoWay)
+        };
+        let helped = |most: f64| {
+            let points = self.helped(followed, motion, start)?;
+            along(&points, most).ok()
         };
         let time = |draft: &Draft<N>| draft.trajectory.duration();
-        let most = first.as_ref().map_or(most, time);
-        if !followed.may_be_helped || most <= plan.duration() * HELPED {
-            return Ok(first.into_iter().collect());
+        let help = help && followed.may_be_helped;
+        let ruled = HELPED * plan.duration();
+        // Where the joints are sure to need help, it is timed first: then less of the other motion need be known.
+        let mut other = None;
+        let sure = help && self.about_time(points) > ruled;
+        if sure {
+            other = helped(most);
         }
-        let mut drafts: Vec<_> = first.into_iter().collect();
-        for points in self.helped(followed, motion, start) {
-            let most = drafts.first().map_or(most, time);
-            let draft = self.fastest_along(plan, (&points, most), (&crossings, motion));
-            if let Some(draft) = draft.ok().filter(|draft| time(draft) < most) {
-                drafts.insert(0, draft);
+        let first = match along(points, other.as_ref().map_or(most, time)) {
+            // The spare joint helps, or may help.
+            Err(MotionError::NoWay) if help => None,
+            Err(_) if other.is_some() => None,
+            first => Some(first?),
+        };
+        if help && !sure {
+            let known = first.as_ref().map_or(most, time);
+            if known > ruled {
+                other = helped(known);
             }
         }
+        let mut drafts: Vec<_> = first.into_iter().chain(other).collect();
+        drafts.sort_by(|a, b| time(a).total_cmp(&time(b)));
         if drafts.is_empty() {
             return Err(MotionError::NoWay);
         }
         Ok(drafts)
     }
 
-    /// The joints along a smooth path with null-space motions that help them: one that is searched by the time they need at each
-    /// point and, through dense poses, which are searched in no other way, one by about the time of a law.
+    /// The joints along a smooth path with a null-space motion that helps them: searched by the time they need at each
+    /// point and, through dense poses, which are searched in no other way, then by about the time of a law.
     fn helped(
         &self,
         Followed { path, points, .. }: &Followed<N>,
         motion: &Move,
         start: &SVector<f64, N>,
-    ) -> Vec<Vec<FollowPoint<N>>> {
+    ) -> Option<Vec<FollowPoint<N>>> {
         let towards = |u: f64| path.towards(u);
         let way = path.way(&towards);
         let few = FewPlaces::new(&path.plan);
@@ -114,13 +128,10 @@ impl<const N: usize> Planner<N> {
             path.and_then(about).unwrap_or(f64::INFINITY)
         };
         let costs: [&Cost<'_, N>; 2] = [&at_points, &of_a_law];
-        let costs = &costs[..if path.is_dense() { 2 } else { 1 }];
-        let helped = |cost: &&Cost<'_, N>| {
-            let spare = self.helping(&way, points, (start, *cost))?;
-            let spare = Some(&spare);
-            self.followed(&Way { spare, ..way }, start).ok()
-        };
-        costs.iter().filter_map(helped).collect()
+        let count = if path.is_dense() { 2 } else { 1 };
+        let spare = self.helping(&way, points, (start, &costs[..count]))?;
+        let spare = Some(&spare);
+        self.followed(&Way { spare, ..way }, start).ok()
     }
 
     /// A lower bound of the time of the joints along a smooth path, s: of the fastest law without limits of jerk.
@@ -207,11 +218,11 @@ impl<const N: usize> Planner<N> {
         &self,
         way: &Way<'_, N>,
         points: &[FollowPoint<N>],
-        (start, cost): (&SVector<f64, N>, &Cost<'_, N>),
+        (start, costs): (&SVector<f64, N>, &[&Cost<'_, N>]),
     ) -> Option<NullMotion<N>> {
         let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
         let (tool, options) = (way.tool(), way.options());
-        follow::cheaper(&self.solver, &tool, (&grid, start), &options, cost)
+        follow::cheaper(&self.solver, &tool, (&grid, start), &options, costs)
     }
 
     /// About the time that the joints need along points whose parameter is the time of the tool: at each point
@@ -267,7 +278,7 @@ pub(super) struct Followed<const N: usize> {
     pub(super) path: SmoothPath,
     pub(super) points: Vec<FollowPoint<N>>,
     /// Whether another null-space motion may be searched that helps the joints.
-    may_be_helped: bool,
+    pub(super) may_be_helped: bool,
 }
 
 impl<const N: usize> Followed<N> {

@@ -173,7 +173,7 @@ impl<const N: usize> Planner<N> {
             path.and_then(about).unwrap_or(f64::INFINITY)
         };
         let tool = |u: f64| twist(part, u);
-        follow::cheaper(&self.solver, &tool, at, &options(), &cost)
+        follow::cheaper(&self.solver, &tool, at, &options(), &[&cost])
     }
 
     /// A stretch, followed again from its first point. The part covers it.
