@@ -152,10 +152,12 @@ impl<const N: usize> std::fmt::Debug for NullMotion<N> {
     }
 }
 
+/// What a joint path costs that is known at a few places, in the unit of the caller: for example about the time that the joints need.
+pub type Cost<'a, const N: usize> = dyn Fn(&[FollowPoint<N>]) -> f64 + 'a;
+
 /// A null-space motion along a path that costs less than none, and stays as far inside the limits and
-/// away from singular poses. Each of `costs` is that of a joint path at a few places, in the unit of the caller,
-/// for example about the time that the joints need: the motion is searched with the first, then changed to save some of the next. The
-/// first should be known in little time. The other arguments are those of [`follow`]; `None`
+/// away from singular poses. The motion is searched with the first of `costs`,
+/// which should be known in little time, then changed to save some of the next. The other arguments are those of [`follow`]; `None`
 /// where nothing is found that saves one percent of the last cost, which is always so with six joints or fewer.
 ///
 /// ```
@@ -189,7 +191,7 @@ pub fn cheaper<const N: usize>(
     tool: &dyn Fn(f64) -> TwistPoint,
     (grid, start): (&[f64], &SVector<f64, N>),
     options: &FollowOptions,
-    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
+    costs: &[&Cost<'_, N>],
 ) -> Option<NullMotion<N>> {
     let task = task(solver, tool, (grid, start), options).ok()?;
     // A constant: only arms with a null space carry the code of the search in it.
@@ -210,7 +212,7 @@ pub struct SpareSearch<'a, const N: usize> {
     /// The motion from which it begins, of the same path.
     pub known: &'a NullMotion<N>,
     /// What a joint path costs, known at a few places, in the unit of the caller.
-    pub cost: &'a dyn Fn(&[FollowPoint<N>]) -> f64,
+    pub cost: &'a Cost<'a, N>,
     /// Most motions that are tried.
     pub trials: usize,
 }
@@ -275,16 +277,13 @@ pub fn cheaper_near<const N: usize>(
 type Nearby<const N: usize> = fn(
     &trace::Task<'_, N>,
     (&SVector<f64, N>, &null_space::NullSpace<N>),
-    &dyn Fn(&[FollowPoint<N>]) -> f64,
+    &Cost<'_, N>,
     usize,
 ) -> Option<null_space::NullSpace<N>>;
 
 /// Searches a null-space motion of least cost.
-type Search<const N: usize> = fn(
-    &trace::Task<'_, N>,
-    &SVector<f64, N>,
-    &[&dyn Fn(&[FollowPoint<N>]) -> f64],
-) -> Option<null_space::NullSpace<N>>;
+type Search<const N: usize> =
+    fn(&trace::Task<'_, N>, &SVector<f64, N>, &[&Cost<'_, N>]) -> Option<null_space::NullSpace<N>>;
 
 /// The joint path of a tool path with a null-space motion that was found for the same path from the same
 /// start, perhaps on another grid.

@@ -4,7 +4,7 @@
 //! R. Hooke, T. A. Jeeves, "Direct search solution of numerical and statistical problems", J. ACM 8(2), 1961 (exploratory moves),
 //! with a step of its own for each coordinate.
 
-use super::FollowPoint;
+use super::Cost;
 use super::null_space::NullSpace;
 use super::redundancy::{Coarse, SHAPES, WORTH, judge, quality};
 use super::trace::Task;
@@ -26,7 +26,7 @@ const EASE: f64 = 0.9;
 pub(super) fn cheapest<const N: usize>(
     task: &Task<'_, N>,
     (start, known): (&SVector<f64, N>, &NullSpace<N>),
-    cost: &dyn Fn(&[FollowPoint<N>]) -> f64,
+    cost: &Cost<'_, N>,
     trials: usize,
 ) -> Option<NullSpace<N>> {
     let places = Coarse::new(task, JUDGED);

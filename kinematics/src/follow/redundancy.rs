@@ -5,7 +5,7 @@ use super::null_space::{NullSpace, NullSpacePolynomial};
 use super::null_space_path;
 use super::spare_model::Price;
 use super::trace::Task;
-use super::{FollowOptions, FollowPoint};
+use super::{Cost, FollowOptions, FollowPoint};
 use crate::Chain;
 use crate::ik::IkFailure;
 use crate::measure::{self, NIMBLE, ROOM};
@@ -131,7 +131,7 @@ pub(super) fn judge<'a, const N: usize>(
     coarse: &'a Task<'_, N>,
     start: &'a SVector<f64, N>,
     ease: f64,
-    cost: &'a dyn Fn(&[FollowPoint<N>]) -> f64,
+    cost: &'a Cost<'a, N>,
 ) -> impl Fn(&NullSpace<N>) -> Option<f64> + 'a {
     move |moving| {
         let points = coarse.trace(start, moving).ok()?;
@@ -174,7 +174,7 @@ pub(super) const WORTH: f64 = 0.01;
 pub(super) fn cheapest<const N: usize>(
     task: &Task<'_, N>,
     start: &SVector<f64, N>,
-    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
+    costs: &[&Cost<'_, N>],
 ) -> Option<NullSpace<N>> {
     let (cost, last) = (*costs.first()?, costs.last()?);
     let places = Coarse::new(task, JUDGED);
@@ -204,7 +204,7 @@ pub(super) fn cheapest<const N: usize>(
 /// The best of motions whose first costs are known, after searches along parts of the path, with its last cost.
 fn along_parts<const N: usize>(
     (coarse, start, ease): (&Task<'_, N>, &SVector<f64, N>, f64),
-    costs: &[&dyn Fn(&[FollowPoint<N>]) -> f64],
+    costs: &[&Cost<'_, N>],
     begun: [(NullSpace<N>, f64); 2],
 ) -> Option<(NullSpace<N>, f64)> {
     let cheapest = |motions: [(NullSpace<N>, f64); 2]| {
@@ -215,7 +215,7 @@ fn along_parts<const N: usize>(
     if N != 7 {
         return Some(cheapest(begun));
     }
-    let search = |cost: &dyn Fn(&[FollowPoint<N>]) -> f64, sizes: &[f64], known: &NullSpace<N>| {
+    let search = |cost: &Cost<'_, N>, sizes: &[f64], known: &NullSpace<N>| {
         let price = Price {
             coarse,
             start,
@@ -225,10 +225,10 @@ fn along_parts<const N: usize>(
         price.near(known, sizes)
     };
     let (first, others) = costs.split_first()?;
-    let begun = begun.map(|known| search(*first, &PART_SIZES, &known.0).unwrap_or(known));
+    let begun = begun.map(|known| search(first, &PART_SIZES, &known.0).unwrap_or(known));
     let mut found = cheapest(begun);
     for cost in others {
-        found = search(*cost, &FINE_SIZES, &found.0)?;
+        found = search(cost, &FINE_SIZES, &found.0)?;
     }
     Some(found)
 }

@@ -4,11 +4,11 @@
 //! joints that says where the spare joint is. With that and the derivatives of a change along the path, the joints with the
 //! change and their derivatives are sums of a few terms. So a change is searched with these, and the path is followed anew only when it is found.
 
-use super::FollowPoint;
 use super::null_space::NullSpace;
 use super::null_space_spline::{BASIS, Spline};
 use super::redundancy::{SHAPES, ease_at, quality};
 use super::trace::Task;
+use super::{Cost, FollowPoint};
 use nalgebra::SVector;
 use std::ops::Range;
 
@@ -43,7 +43,7 @@ pub(super) struct Price<'a, const N: usize> {
     /// Least ease of its path.
     pub(super) ease: f64,
     /// The cost of a path.
-    pub(super) cost: &'a dyn Fn(&[FollowPoint<N>]) -> f64,
+    pub(super) cost: &'a Cost<'a, N>,
 }
 
 impl<const N: usize> Price<'_, N> {

@@ -3,7 +3,7 @@
 use crate::arms::{self, SEVEN, SIX};
 use crate::ik::error;
 use kinematics::follow::{
-    NullMotion, SpareSearch, cheaper, cheaper_near, follow_choosing, follow_with, refine,
+    Cost, NullMotion, SpareSearch, cheaper, cheaper_near, follow_choosing, follow_with, refine,
     spare_direction,
 };
 use kinematics::{FollowCause, FollowOptions, FollowPoint, IkFailure, Solver, TwistPoint, follow};
@@ -253,7 +253,7 @@ fn the_last_cost_decides() {
         };
         let (first, last) = (cost(0.2), cost(0.15));
         let (at, options) = ((&grid[..], &start), FollowOptions::default());
-        let found = |costs: &[&dyn Fn(&[FollowPoint<7>]) -> f64]| {
+        let found = |costs: &[&Cost<'_, 7>]| {
             let motion = cheaper(&solver, &tool, at, &options, costs).unwrap();
             let points = follow_with(&solver, &tool, at, &options, &motion).unwrap();
             [first(&points), last(&points)]

@@ -1,6 +1,6 @@
 //! MoveSmoothlyTo: the joints along a smooth motion of the tool.
 
-use kinematics::follow::{self, FollowPoint, NullMotion};
+use kinematics::follow::{self, Cost, FollowPoint, NullMotion};
 use nalgebra::{Isometry3, SVector};
 use trajectory::timing::{self, PathTiming};
 use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, smooth};
@@ -28,9 +28,6 @@ const ALONG: TimingOptions = TimingOptions {
     gap: 1e-3,
     ..RESTING
 };
-
-/// What a joint path costs that is known at a few points.
-type Cost<'a, const N: usize> = dyn Fn(&[FollowPoint<N>]) -> f64 + 'a;
 
 impl<const N: usize> Planner<N> {
     /// The joints along a smooth path, with a null-space motion that was found with it, or without one that helps them.
