@@ -195,7 +195,12 @@ impl<const N: usize> Planner<N> {
     }
 
     /// The same of joints with their derivatives to time.
-    fn factor(&self, [_, velocity, acceleration, jerk]: &[SVector<f64, N>; 4]) -> f64 {
+    fn factor(&self, joints: &[SVector<f64, N>; 4]) -> f64 {
+        self.slowness(joints).max(1.0)
+    }
+
+    /// The least time for one of a parameter in which joints with such derivatives to it keep their limits.
+    pub(super) fn slowness(&self, [_, first, second, third]: &[SVector<f64, N>; 4]) -> f64 {
         let limits = &self.limits;
         let most = |rates: &SVector<f64, N>, limits: &SVector<f64, N>| {
             let ratios = rates
@@ -204,10 +209,9 @@ impl<const N: usize> Planner<N> {
                 .map(|(rate, limit)| rate.abs() / limit);
             ratios.fold(0.0, f64::max)
         };
-        most(velocity, &limits.velocity)
-            .max(most(acceleration, &limits.acceleration).sqrt())
-            .max(most(jerk, &limits.jerk).cbrt())
-            .max(1.0)
+        most(first, &limits.velocity)
+            .max(most(second, &limits.acceleration).sqrt())
+            .max(most(third, &limits.jerk).cbrt())
     }
 
     /// A null-space motion that costs the joints less along a curve whose parameter is time.

@@ -13,7 +13,7 @@ use kinematics::follow::{
 use kinematics::measure::dexterity;
 use nalgebra::{SVector, Vector3};
 use trajectory::smooth::{FittedCurve, FittedPart};
-use trajectory::{HermitePath, HermitePoint, timing};
+use trajectory::{HermitePoint, ToolLimits, ToolPoint};
 
 use super::super::Planner;
 use super::super::cartesian::of_path;
@@ -167,13 +167,28 @@ impl<const N: usize> Planner<N> {
         at: (&[f64], &SVector<f64, N>),
         motion: &Move,
     ) -> Option<NullMotion<N>> {
-        let cost = |points: &[FollowPoint<N>]| {
-            let path = HermitePath::new(points.iter().map(of_path).collect(), part);
-            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
-            path.and_then(about).unwrap_or(f64::INFINITY)
-        };
+        let cost = |points: &[FollowPoint<N>]| self.about_time_along(part, points, motion);
         let tool = |u: f64| twist(part, u);
         follow::cheaper(&self.solver, &tool, at, &options(), &[&cost])
+    }
+
+    /// About the time (s) that the joints and the tool need along points of a curve: at each point the least in which they keep their
+    /// limits.
+    fn about_time_along(
+        &self,
+        curve: &FittedPart,
+        points: &[FollowPoint<N>],
+        motion: &Move,
+    ) -> f64 {
+        let slowness = |point: &FollowPoint<N>| {
+            let tool = tool_slowness(&curve.tool(point.u), &motion.limits);
+            self.slowness(&point.q).max(tool)
+        };
+        let slow: Vec<f64> = points.iter().map(slowness).collect();
+        let parts = points.windows(2).zip(slow.windows(2));
+        parts
+            .map(|(pair, slow)| 0.5 * (slow[0] + slow[1]) * (pair[1].u - pair[0].u))
+            .sum()
     }
 
     /// A stretch, followed again from its first point. The part covers it.
@@ -264,6 +279,27 @@ fn options() -> FollowOptions {
         most_points: MOST_POINTS,
         ..Default::default()
     }
+}
+
+/// The least time for one of the parameter in which the tool keeps its limits at a point of a curve.
+fn tool_slowness(seen: &ToolPoint, limits: &ToolLimits) -> f64 {
+    let most = |rates: &[Vector3<f64>; 3], limits: [f64; 3]| {
+        let [first, second, third] = [0, 1, 2].map(|k| rates[k].norm() / limits[k]);
+        first.max(second.sqrt()).max(third.cbrt())
+    };
+    let place = most(
+        &seen.linear,
+        [limits.speed, limits.acceleration, limits.jerk],
+    );
+    let turn = most(
+        &seen.angular,
+        [
+            limits.angular_speed,
+            limits.angular_acceleration,
+            limits.angular_jerk,
+        ],
+    );
+    place.max(turn)
 }
 
 /// The tool at a parameter of the curve, no derivative of which jumps.
