@@ -8,6 +8,7 @@
 //! for example near a singular pose, where joints turn fast over a short distance.
 
 mod differential;
+mod ease;
 mod error;
 mod linear;
 mod nearby;

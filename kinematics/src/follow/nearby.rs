@@ -5,8 +5,9 @@
 //! with a step of its own for each coordinate.
 
 use super::Cost;
-use super::null_space::NullSpace;
-use super::redundancy::{Coarse, SHAPES, WORTH, judge, quality};
+use super::ease::ease_along;
+use super::null_space::{NullSpace, SHAPES};
+use super::redundancy::{Coarse, WORTH, judge};
 use super::trace::Task;
 use nalgebra::SVector;
 
@@ -32,7 +33,7 @@ pub(super) fn cheapest<const N: usize>(
     let places = Coarse::new(task, JUDGED);
     let coarse = places.of(task);
     let first = coarse.trace(start, known).ok()?;
-    let ease = EASE * quality(&coarse, &first).min(1.0);
+    let ease = EASE * ease_along(&coarse, &first).min(1.0);
     let judge = judge(&coarse, start, ease, cost);
     let now = cost(&first);
     let mut search = Search {

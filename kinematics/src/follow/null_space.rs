@@ -15,6 +15,14 @@ type SpareCourse = Rc<dyn Fn(f64) -> [f64; 4]>;
 /// Coefficients of a polynomial `r(u) = sum r_k x^k`, `x` from 0 to 1 over the path.
 pub(super) type NullSpacePolynomial = [f64; 6];
 
+/// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
+/// to another place at the end, there and back, and so with one and two more turns.
+pub(super) const SHAPES: [NullSpacePolynomial; 4] = [
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 4.0, -4.0, 0.0, 0.0, 0.0],
+    [0.0, 10.4, -31.2, 20.8, 0.0, 0.0],
+    [0.0, 16.0, -80.0, 128.0, -64.0, 0.0],
+];
 /// Null-space motion: up to two linear functions of the joints with their polynomials.
 #[derive(Clone)]
 pub(super) struct NullSpace<const N: usize> {

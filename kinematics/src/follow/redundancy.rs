@@ -1,14 +1,13 @@
 //! The null-space motion of arms with more than six joints: chosen over the whole path.
 
+use super::ease::ease_along;
 use super::error::{FollowCause, FollowError};
-use super::null_space::{NullSpace, NullSpacePolynomial};
+use super::null_space::{NullSpace, SHAPES};
 use super::null_space_path;
 use super::spare_model::Price;
 use super::trace::Task;
 use super::{Cost, FollowOptions, FollowPoint};
-use crate::Chain;
 use crate::ik::IkFailure;
-use crate::measure::{self, NIMBLE, ROOM};
 use nalgebra::{SMatrix, SVector};
 
 /// A joint path and its null-space motion.
@@ -24,7 +23,7 @@ pub(super) fn resolve<const N: usize>(
     let first = task.trace(start, &still);
     let ease = first
         .as_ref()
-        .map_or(f64::NEG_INFINITY, |points| quality(task, points));
+        .map_or(f64::NEG_INFINITY, |points| ease_along(task, points));
     // A path cannot be expected to be better than its start.
     let answer = first.map(|points| (points, still.clone()));
     if ease >= 1.0 || is_beyond(&answer) {
@@ -86,7 +85,7 @@ fn judged<const N: usize>(
         let Ok(points) = coarse.trace(start, &moving) else {
             continue;
         };
-        let ease = quality(&coarse, &points).min(1.0);
+        let ease = ease_along(&coarse, &points).min(1.0);
         found.push((ease, moving));
         if ease >= 1.0 {
             break;
@@ -135,18 +134,10 @@ pub(super) fn judge<'a, const N: usize>(
 ) -> impl Fn(&NullSpace<N>) -> Option<f64> + 'a {
     move |moving| {
         let points = coarse.trace(start, moving).ok()?;
-        (quality(coarse, &points) >= ease).then(|| cost(&points))
+        (ease_along(coarse, &points) >= ease).then(|| cost(&points))
     }
 }
 
-/// Shapes of a null-space motion over the progress along the path, each zero at the start and of size 1:
-/// to another place at the end, there and back, and so with one and two more turns.
-pub(super) const SHAPES: [NullSpacePolynomial; 4] = [
-    [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
-    [0.0, 4.0, -4.0, 0.0, 0.0, 0.0],
-    [0.0, 10.4, -31.2, 20.8, 0.0, 0.0],
-    [0.0, 16.0, -80.0, 128.0, -64.0, 0.0],
-];
 /// Sizes that are tried of each shape, one after the other, rad.
 const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
 /// Sizes that are tried of each part of a change along the path, with the first cost and with others, rad.
@@ -181,7 +172,7 @@ pub(super) fn cheapest<const N: usize>(
     let coarse = places.of(task);
     let still = resting_from(task, start);
     let first = coarse.trace(start, &still).ok()?;
-    let ease = quality(&coarse, &first).min(1.0);
+    let ease = ease_along(&coarse, &first).min(1.0);
     let judge = judge(&coarse, start, ease, cost);
     let none = cost(&first);
     let begin = Search {
@@ -317,29 +308,6 @@ fn resting<const N: usize>(
         spline: None,
         course: None,
     }
-}
-
-/// How well a path stays inside limits and away from singular poses: 1 is good, or no worse than at
-/// its start.
-pub(super) fn quality<const N: usize>(task: &Task<'_, N>, points: &[FollowPoint<N>]) -> f64 {
-    let chain = task.solver.chain();
-    let start = points
-        .first()
-        .map_or(1.0, |point| ease_at(chain, &point.q[0], f64::INFINITY));
-    let least = points.iter().fold(f64::INFINITY, |least, point| {
-        ease_at(chain, &point.q[0], least)
-    });
-    least / start.clamp(1e-6, 1.0)
-}
-
-/// How well joints are inside limits and away from singular poses, or `least`, if that is less.
-pub(super) fn ease_at<const N: usize>(chain: &Chain<N>, q: &SVector<f64, N>, least: f64) -> f64 {
-    let room = (0..N).fold(f64::INFINITY, |room, i| room.min(chain.room(i, q[i])));
-    let least = least.min(room / ROOM);
-    if measure::surely_nimble(chain, q, least * NIMBLE) {
-        return least;
-    }
-    least.min(measure::dexterity(chain, q).smallest / NIMBLE)
 }
 
 /// Directions in which the joints can move without moving the tool: `N - 6` of them,
