@@ -16,6 +16,7 @@ mod null_space;
 mod null_space_grid;
 mod null_space_path;
 mod null_space_spline;
+mod price;
 mod redundancy;
 mod spare;
 mod spare_model;

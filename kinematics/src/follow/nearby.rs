@@ -7,7 +7,8 @@
 use super::Cost;
 use super::ease::ease_along;
 use super::null_space::{NullSpace, SHAPES};
-use super::redundancy::{Coarse, WORTH, judge};
+use super::price::Price;
+use super::redundancy::{Coarse, WORTH};
 use super::trace::Task;
 use nalgebra::SVector;
 
@@ -34,10 +35,15 @@ pub(super) fn cheapest<const N: usize>(
     let coarse = places.of(task);
     let first = coarse.trace(start, known).ok()?;
     let ease = EASE * ease_along(&coarse, &first).min(1.0);
-    let judge = judge(&coarse, start, ease, cost);
+    let price = Price {
+        coarse: &coarse,
+        start,
+        ease,
+        cost,
+    };
     let now = cost(&first);
     let mut search = Search {
-        judge: &judge,
+        price,
         best: known.clone(),
         least: now,
         trials,
@@ -48,8 +54,7 @@ pub(super) fn cheapest<const N: usize>(
 
 /// What a search has come to.
 struct Search<'a, const N: usize> {
-    /// The cost of a motion that is good enough.
-    judge: &'a dyn Fn(&NullSpace<N>) -> Option<f64>,
+    price: Price<'a, N>,
     best: NullSpace<N>,
     least: f64,
     /// Trials that are left.
@@ -77,10 +82,8 @@ impl<const N: usize> Search<'_, N> {
             }
             self.trials -= 1;
             let mut other = self.best.clone();
-            for (c, s) in other.polynomials[0].iter_mut().zip(SHAPES[shape]) {
-                *c += sign * size * s;
-            }
-            if let Some(cost) = (self.judge)(&other).filter(|cost| *cost < self.least) {
+            other.add_shape(&SHAPES[shape], sign * size);
+            if let Some(cost) = self.price.below(self.least, &other) {
                 (self.best, self.least) = (other, cost);
                 return sign * GROWS;
             }

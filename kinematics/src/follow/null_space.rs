@@ -51,6 +51,13 @@ impl<const N: usize> NullSpace<N> {
         }
     }
 
+    /// Adds a polynomial of a size to the first one.
+    pub(super) fn add_shape(&mut self, shape: &NullSpacePolynomial, size: f64) {
+        for (c, s) in self.polynomials[0].iter_mut().zip(shape) {
+            *c += size * s;
+        }
+    }
+
     /// The direction of a linear function.
     pub(super) fn direction(&self, k: usize) -> &SVector<f64, N> {
         &self.directions[k]

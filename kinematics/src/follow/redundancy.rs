@@ -4,7 +4,8 @@ use super::ease::ease_along;
 use super::error::{FollowCause, FollowError};
 use super::null_space::{NullSpace, SHAPES};
 use super::null_space_path;
-use super::spare_model::Price;
+use super::price::{Price, both_ways};
+use super::spare_model;
 use super::trace::Task;
 use super::{Cost, FollowOptions, FollowPoint};
 use crate::ik::IkFailure;
@@ -125,19 +126,6 @@ impl Coarse {
     }
 }
 
-/// The cost of a null-space motion along a path, if it has that ease.
-pub(super) fn judge<'a, const N: usize>(
-    coarse: &'a Task<'_, N>,
-    start: &'a SVector<f64, N>,
-    ease: f64,
-    cost: &'a Cost<'a, N>,
-) -> impl Fn(&NullSpace<N>) -> Option<f64> + 'a {
-    move |moving| {
-        let points = coarse.trace(start, moving).ok()?;
-        (ease_along(coarse, &points) >= ease).then(|| cost(&points))
-    }
-}
-
 /// Sizes that are tried of each shape, one after the other, rad.
 const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
 /// Sizes that are tried of each part of a change along the path, with the first cost and with others, rad.
@@ -147,8 +135,6 @@ const FINE_SIZES: [f64; 3] = [0.1, 0.04, 0.016];
 const TILTS: [f64; 2] = [0.5, 0.2];
 /// Least share of the cost that a round of steps has to save for a round of smaller ones.
 const GAIN: f64 = 1e-3;
-/// How often one step is taken in one direction.
-const REPEATS: usize = 3;
 /// Points of the path for each step along it in which a motion is judged, and fewest steps.
 const JUDGED: [usize; 2] = [4, 24];
 /// Most such steps, and how far from the path the joints may be between two of them, m.
@@ -173,10 +159,15 @@ pub(super) fn cheapest<const N: usize>(
     let still = resting_from(task, start);
     let first = coarse.trace(start, &still).ok()?;
     let ease = ease_along(&coarse, &first).min(1.0);
-    let judge = judge(&coarse, start, ease, cost);
+    let price = Price {
+        coarse: &coarse,
+        start,
+        ease,
+        cost,
+    };
     let none = cost(&first);
     let begin = Search {
-        judge: &judge,
+        price,
         best: still,
         least: none,
     };
@@ -188,14 +179,15 @@ pub(super) fn cheapest<const N: usize>(
         after.shape();
     }
     let begun = [(alone.best, alone.least), (after.best, after.least)];
-    let (best, least) = along_parts((&coarse, start, ease), costs, begun)?;
+    let (best, least) = along_parts(price, &costs[1..], begun)?;
     (least < last(&first) * (1.0 - WORTH)).then_some(best)
 }
 
-/// The best of motions whose first costs are known, after searches along parts of the path, with its last cost.
+/// The best of motions whose costs are known, after searches along parts of the path with that cost, then with the others; and the last
+/// cost of it.
 fn along_parts<const N: usize>(
-    (coarse, start, ease): (&Task<'_, N>, &SVector<f64, N>, f64),
-    costs: &[&Cost<'_, N>],
+    price: Price<'_, N>,
+    others: &[&Cost<'_, N>],
     begun: [(NullSpace<N>, f64); 2],
 ) -> Option<(NullSpace<N>, f64)> {
     let cheapest = |motions: [(NullSpace<N>, f64); 2]| {
@@ -206,20 +198,15 @@ fn along_parts<const N: usize>(
     if N != 7 {
         return Some(cheapest(begun));
     }
-    let search = |cost: &Cost<'_, N>, sizes: &[f64], known: &NullSpace<N>| {
-        let price = Price {
-            coarse,
-            start,
-            ease,
-            cost,
-        };
-        price.near(known, sizes)
-    };
-    let (first, others) = costs.split_first()?;
-    let begun = begun.map(|known| search(first, &PART_SIZES, &known.0).unwrap_or(known));
+    let begun =
+        begun.map(|known| spare_model::cheaper(&price, &known.0, &PART_SIZES).unwrap_or(known));
     let mut found = cheapest(begun);
     for cost in others {
-        found = search(cost, &FINE_SIZES, &found.0)?;
+        let price = Price {
+            cost: *cost,
+            ..price
+        };
+        found = spare_model::cheaper(&price, &found.0, &FINE_SIZES)?;
     }
     Some(found)
 }
@@ -227,8 +214,7 @@ fn along_parts<const N: usize>(
 /// A search of the null-space motion that costs least.
 #[derive(Clone)]
 struct Search<'a, const N: usize> {
-    /// The cost of a motion that is good enough.
-    judge: &'a dyn Fn(&NullSpace<N>) -> Option<f64>,
+    price: Price<'a, N>,
     best: NullSpace<N>,
     least: f64,
 }
@@ -259,9 +245,7 @@ impl<const N: usize> Search<'_, N> {
             for shape in SHAPES {
                 self.along(|from, sign| {
                     let mut other = from.clone();
-                    for (c, s) in other.polynomials[0].iter_mut().zip(shape) {
-                        *c += sign * size * s;
-                    }
+                    other.add_shape(&shape, sign * size);
                     other
                 });
             }
@@ -273,16 +257,14 @@ impl<const N: usize> Search<'_, N> {
 
     /// Takes steps in one direction, or against it, while they save something.
     fn along(&mut self, step: impl Fn(&NullSpace<N>, f64) -> NullSpace<N>) {
-        for sign in [1.0, -1.0] {
-            for taken in 0..REPEATS {
-                let other = step(&self.best, sign);
-                match (self.judge)(&other).filter(|cost| *cost < self.least) {
-                    Some(cost) => (self.best, self.least) = (other, cost),
-                    None if taken > 0 => return,
-                    None => break,
-                }
+        both_ways(|sign| {
+            let other = step(&self.best, sign);
+            let cost = self.price.below(self.least, &other);
+            if let Some(cost) = cost {
+                (self.best, self.least) = (other, cost);
             }
-        }
+            cost.is_some()
+        });
     }
 }
 

@@ -4,11 +4,12 @@
 //! joints that says where the spare joint is. With that and the derivatives of a change along the path, the joints with the
 //! change and their derivatives are sums of a few terms. So a change is searched with these, and the path is followed anew only when it is found.
 
-use super::ease::{ease_along, ease_at};
+use super::FollowPoint;
+use super::ease::ease_at;
 use super::null_space::{NullSpace, SHAPES};
 use super::null_space_spline::{BASIS, Spline};
+use super::price::{Price, both_ways};
 use super::trace::Task;
-use super::{Cost, FollowPoint};
 use nalgebra::SVector;
 use std::ops::Range;
 
@@ -19,8 +20,6 @@ const REACH: f64 = 4.0;
 /// Most rounds with one size, and least share of the cost that a round has to save for another one.
 const ROUNDS: usize = 3;
 const GAIN: f64 = 1e-3;
-/// How often one step is taken in one direction.
-const REPEATS: usize = 3;
 /// Most changes, one after the other, and shares that are followed of each until one costs less.
 const CHANGES: usize = 8;
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
@@ -35,51 +34,33 @@ type Parts = [f64; PARTS];
 /// A value and its first three derivatives along a path.
 type Jet = [f64; 4];
 
-/// What a null-space motion costs.
-pub(super) struct Price<'a, const N: usize> {
-    /// Its path at a few places.
-    pub(super) coarse: &'a Task<'a, N>,
-    pub(super) start: &'a SVector<f64, N>,
-    /// Least ease of its path.
-    pub(super) ease: f64,
-    /// The cost of a path.
-    pub(super) cost: &'a Cost<'a, N>,
-}
-
-impl<const N: usize> Price<'_, N> {
-    /// The path of a motion and its cost, if it has the ease.
-    fn of(&self, moving: &NullSpace<N>) -> Option<(Vec<FollowPoint<N>>, f64)> {
-        let points = self.coarse.trace(self.start, moving).ok()?;
-        let eased = ease_along(self.coarse, &points) >= self.ease;
-        eased
-            .then(|| (self.cost)(&points))
-            .map(|cost| (points, cost))
-    }
-
-    /// A motion of less cost near a known one, if there is one, otherwise that one, and its cost; `None` if it does not have the
-    /// ease. Steps of these sizes (rad) are tried of each part of a change, one after the other.
-    pub(super) fn near(&self, known: &NullSpace<N>, sizes: &[f64]) -> Option<(NullSpace<N>, f64)> {
-        let (mut points, mut least) = self.of(known)?;
-        let mut best = known.clone();
-        for _ in 0..CHANGES {
-            let model = Model::new(self.coarse, &best, &points);
-            let parts = model.cheaper(self, sizes);
-            let found = SHARES.into_iter().find_map(|share| {
-                let other = changed(&best, &parts.map(|part| part * share));
-                let (points, cost) = self.of(&other)?;
-                (cost < least).then_some((other, points, cost))
-            });
-            let Some((other, path, cost)) = found else {
-                break;
-            };
-            let saved = 1.0 - cost / least;
-            (best, points, least) = (other, path, cost);
-            if saved < ENOUGH {
-                break;
-            }
+/// A motion of less cost near a known one, if there is one, otherwise that one, and its cost; `None` if it does not have the
+/// ease. Steps of these sizes (rad) are tried of each part of a change, one after the other.
+pub(super) fn cheaper<const N: usize>(
+    price: &Price<'_, N>,
+    known: &NullSpace<N>,
+    sizes: &[f64],
+) -> Option<(NullSpace<N>, f64)> {
+    let (mut points, mut least) = price.of(known)?;
+    let mut best = known.clone();
+    for _ in 0..CHANGES {
+        let model = Model::new(price.coarse, &best, &points);
+        let parts = model.cheaper(price, sizes);
+        let found = SHARES.into_iter().find_map(|share| {
+            let other = changed(&best, &parts.map(|part| part * share));
+            let (points, cost) = price.of(&other)?;
+            (cost < least).then_some((other, points, cost))
+        });
+        let Some((other, path, cost)) = found else {
+            break;
+        };
+        let saved = 1.0 - cost / least;
+        (best, points, least) = (other, path, cost);
+        if saved < ENOUGH {
+            break;
         }
-        Some((best, least))
     }
+    Some((best, least))
 }
 
 /// A motion with parts added to it.
@@ -91,9 +72,7 @@ fn changed<const N: usize>(known: &NullSpace<N>, parts: &Parts) -> NullSpace<N> 
         *c += part;
     }
     for (shape, part) in SHAPES.iter().zip(shapes) {
-        for (c, s) in other.polynomials[0].iter_mut().zip(shape) {
-            *c += part * s;
-        }
+        other.add_shape(shape, *part);
     }
     other
 }
@@ -175,26 +154,11 @@ impl<const N: usize> Search<'_, N> {
             for _ in 0..ROUNDS {
                 let before = self.least;
                 for part in 0..PARTS {
-                    self.along(part, *size);
+                    both_ways(|sign| self.step(part, sign * size));
                 }
                 if self.least >= before * (1.0 - GAIN) {
                     break;
                 }
-            }
-        }
-    }
-
-    /// Takes steps of one part in one direction, or against it, while they save something.
-    fn along(&mut self, part: usize, size: f64) {
-        for size in [size, -size] {
-            for taken in 0..REPEATS {
-                if self.step(part, size) {
-                    continue;
-                }
-                if taken > 0 {
-                    return;
-                }
-                break;
             }
         }
     }

@@ -170,6 +170,18 @@ fn fastest<const N: usize>(points: &[FollowPoint<N>]) -> f64 {
         .sum()
 }
 
+/// What it costs that the spare joint does not follow a function of the path parameter (rad): the mean difference, and a little more.
+fn not_following<'a>(
+    (solver, start): (&Solver<7>, &'a SVector<f64, 7>),
+    wanted: impl Fn(f64) -> f64 + 'a,
+) -> impl Fn(&[FollowPoint<7>]) -> f64 + 'a {
+    let direction = spare_direction(solver.chain(), start).unwrap();
+    let off = move |point: &FollowPoint<7>| {
+        (direction.dot(&(point.q[0] - start)) - wanted(point.u)).abs()
+    };
+    move |points| 0.01 + points.iter().map(&off).sum::<f64>() / points.len() as f64
+}
+
 /// Where the spare joint should move along a part of the path only, it does, and hardly along the rest.
 #[test]
 fn the_spare_joint_moves_along_a_part() {
@@ -178,16 +190,11 @@ fn the_spare_joint_moves_along_a_part() {
         let start = ready::<7>(name);
         let tool = curve(&solver.chain().forward(&start), 1.0);
         let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
-        let direction = spare_direction(solver.chain(), &start).unwrap();
         let wanted = |u: f64| {
             let within = ((u - 0.5) / 0.3).clamp(0.0, 1.0);
             0.2 * (std::f64::consts::PI * within).sin().powi(2)
         };
-        let off =
-            |point: &FollowPoint<7>| (direction.dot(&(point.q[0] - start)) - wanted(point.u)).abs();
-        let cost = |points: &[FollowPoint<7>]| {
-            0.01 + points.iter().map(off).sum::<f64>() / points.len() as f64
-        };
+        let cost = not_following((&solver, &start), wanted);
         let at = (&grid[..], &start);
         let options = FollowOptions::default();
         let still = follow(&solver, &tool, &grid, &start, &options).unwrap();
@@ -241,15 +248,9 @@ fn the_last_cost_decides() {
         let start = ready::<7>(name);
         let tool = curve(&solver.chain().forward(&start), 1.0);
         let grid: Vec<f64> = (0..=200).map(|i| f64::from(i) / 200.0).collect();
-        let direction = spare_direction(solver.chain(), &start).unwrap();
         let cost = |size: f64| {
-            move |points: &[FollowPoint<7>]| {
-                let wanted = |u: f64| size * (std::f64::consts::PI * u).sin().powi(2);
-                let off = |point: &FollowPoint<7>| {
-                    (direction.dot(&(point.q[0] - start)) - wanted(point.u)).abs()
-                };
-                0.01 + points.iter().map(off).sum::<f64>() / points.len() as f64
-            }
+            let wanted = move |u: f64| size * (std::f64::consts::PI * u).sin().powi(2);
+            not_following((&solver, &start), wanted)
         };
         let (first, last) = (cost(0.2), cost(0.15));
         let (at, options) = ((&grid[..], &start), FollowOptions::default());

@@ -104,11 +104,7 @@ impl<const N: usize> Planner<N> {
         if N <= 6 {
             return None;
         }
-        let cost = |points: &[FollowPoint<N>]| {
-            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
-            let path = joint_path(way.curve, points).ok();
-            path.and_then(about).unwrap_or(f64::INFINITY)
-        };
+        let cost = |points: &[FollowPoint<N>]| self.about_law(way.curve, points, motion);
         let grid: Vec<f64> = points.iter().map(|point| point.u).collect();
         let (tool, options) = (way.tool(), way.options());
         let at = (&grid[..], start);
@@ -123,6 +119,18 @@ impl<const N: usize> Planner<N> {
             ..*way
         };
         self.followed(&way, start).ok()
+    }
+
+    /// About the time of a law of the joints along a curve (s), infinite where there is none.
+    pub(super) fn about_law(
+        &self,
+        curve: &dyn ToolCurve,
+        points: &[FollowPoint<N>],
+        motion: &Move,
+    ) -> f64 {
+        let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
+        let path = joint_path(curve, points).ok();
+        path.and_then(about).unwrap_or(f64::INFINITY)
     }
 
     /// Solves inverse kinematics along a curve, on one branch, on a grid fine

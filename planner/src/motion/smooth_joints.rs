@@ -2,7 +2,7 @@
 
 use kinematics::follow::{self, Cost, FollowPoint, NullMotion};
 use nalgebra::{Isometry3, SVector};
-use trajectory::timing::{self, PathTiming};
+use trajectory::timing::PathTiming;
 use trajectory::{Boundary, HermitePath, TimingOptions, ToolCurve, Trajectory, smooth};
 
 use super::cartesian::{Way, is_still, joint_path, pieces};
@@ -119,11 +119,7 @@ impl<const N: usize> Planner<N> {
         let way = path.way(&towards);
         let few = FewPlaces::new(&path.plan);
         let at_points = |points: &[FollowPoint<N>]| self.about_time(points);
-        let of_a_law = |points: &[FollowPoint<N>]| {
-            let about = |path| timing::about_time(&path, &self.limits, &motion.limits).ok();
-            let path = joint_path(&few, points).ok();
-            path.and_then(about).unwrap_or(f64::INFINITY)
-        };
+        let of_a_law = |points: &[FollowPoint<N>]| self.about_law(&few, points, motion);
         let costs: [&Cost<'_, N>; 2] = [&at_points, &of_a_law];
         let count = if path.is_dense() { 2 } else { 1 };
         let spare = self.helping(&way, points, (start, &costs[..count]))?;

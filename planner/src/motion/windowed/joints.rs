@@ -184,11 +184,10 @@ impl<const N: usize> Planner<N> {
             let tool = tool_slowness(&curve.tool(point.u), &motion.limits);
             self.slowness(&point.q).max(tool)
         };
-        let slow: Vec<f64> = points.iter().map(slowness).collect();
-        let parts = points.windows(2).zip(slow.windows(2));
-        parts
-            .map(|(pair, slow)| 0.5 * (slow[0] + slow[1]) * (pair[1].u - pair[0].u))
-            .sum()
+        times_along((points, 0.0), slowness)
+            .last()
+            .copied()
+            .unwrap_or(0.0)
     }
 
     /// A stretch, followed again from its first point. The part covers it.
@@ -242,18 +241,26 @@ impl<const N: usize> Planner<N> {
             let joint = |j: usize| point.q[1][j].abs() / joints.velocity[j];
             (0..N).map(joint).fold(place.max(turn), f64::max)
         };
-        let (mut time, mut before) = (first, None);
-        let mut least = Vec::with_capacity(points.len());
-        for point in points {
-            let slow = slowness(point);
-            if let Some((u, other)) = before {
-                time += 0.5 * (slow + other) * (point.u - u);
-            }
-            least.push(time);
-            before = Some((point.u, slow));
-        }
-        least
+        times_along((points, first), slowness)
     }
+}
+
+/// The times (s) from the start to points, that of the first of which is given, where each has a time for one of the parameter.
+fn times_along<const N: usize>(
+    (points, first): (&[FollowPoint<N>], f64),
+    slowness: impl Fn(&FollowPoint<N>) -> f64,
+) -> Vec<f64> {
+    let (mut time, mut before) = (first, None);
+    let mut times = Vec::with_capacity(points.len());
+    for point in points {
+        let slow = slowness(point);
+        if let Some((u, other)) = before {
+            time += 0.5 * (slow + other) * (point.u - u);
+        }
+        times.push(time);
+        before = Some((point.u, slow));
+    }
+    times
 }
 
 /// The last point of a stretch, and the least time to it.
