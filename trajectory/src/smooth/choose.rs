@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::certificate::{certify_made, certify_slowed, corridor_of_legs};
+use super::certificate::{certify_made, certify_slowed};
 use super::crossing::{Crossing, RESOLUTION, settled};
 use super::exact_stop;
 use super::judged::Judged;
@@ -12,12 +12,13 @@ use super::motion::Motion;
 use super::narrowing::{between, broken, narrow, narrow_legs, narrow_missed};
 use super::options::SmoothOptions;
 use super::rest::RestCause;
-use super::seed::Seed;
 use super::shares::Shares;
 use super::span::Span;
 pub(crate) use super::span::stretch;
-use super::spline::{self, Ahead, Effort, Found, Moving, Request};
+use super::spline::{self, Effort, Found, Moving, Request};
 use crate::ToolPoint;
+
+mod onward;
 
 /// Effort of one spline, but for the gap to its optimum.
 const EFFORT: Effort = Effort {
@@ -52,9 +53,6 @@ const HOPELESS: [f64; 2] = [10.0, 3.5];
 /// Attempts, the first ones, after which only the tolerances of poses that were missed and the corridor along legs that were left are
 /// narrowed; after later ones those of all.
 const SINGLY: usize = 2;
-
-/// Most searches that go on from one another in a corridor that is narrower along the legs that were left.
-const INSIDE: usize = 4;
 
 /// A bound that is broken by more than this is narrowed by so much that the motion may be slow.
 const FAR: f64 = 1.2;
@@ -242,7 +240,7 @@ impl<'a> Window<'a> {
     }
 }
 
-impl Attempts<'_> {
+impl<'a> Attempts<'a> {
     /// A certified spline, and whether an attempt before it failed by far; between two ends in motion else the first
     /// that exceeds its limits by no more than [`NEARLY`].
     fn run(mut self) -> Option<(Vec<Span>, bool)> {
@@ -260,22 +258,13 @@ impl Attempts<'_> {
     /// The same without the one that is `nearly` within its limits; bounds that one attempt breaks are narrowed for
     /// the next one.
     fn held(&mut self, nearly: &mut Option<(Vec<Span>, bool)>) -> Option<(Vec<Span>, bool)> {
-        let Window { moving, finish, .. } = self.window;
         let whole = self.inner.clone();
-        let mut retried = false;
+        let (mut retried, mut early) = (false, false);
         for attempt in 0..5_usize {
             let (narrowed, shares) = (self.inner.clone(), self.shares.clone());
-            let mut request = Request {
-                poses: self.window.poses,
-                options: &narrowed,
-                shares: &shares,
-                moving,
-                finish,
-                effort: self.effort,
-                coupled: false,
-                known: self.known,
-                arm: None,
-            };
+            let mut request = self.request(&narrowed, &shares);
+            // A list and its reverse are searched alike as long as no pose is passed too early.
+            request.backwards &= early;
             let [places, turns] = request.moves();
             request.coupled = self.couples(&request, turns)?;
             let Some(Found { mut spans, seed }) = spline::plan(&request) else {
@@ -287,26 +276,28 @@ impl Attempts<'_> {
             if seen.holds() {
                 return Some((spans, retried));
             }
+            let later = self.later(&request, &spans, &seed);
+            early |= !later.is_empty();
             if attempt == 0
                 && let Some(found) = self.gone_on(&request, (&spans, seed, &seen))
             {
                 return Some(found);
             }
-            let Judged {
-                certificate,
-                crossings,
-                settled,
-            } = &seen;
-            if self.keeps && *settled {
+            let (certificate, crossings) = (&seen.certificate, &seen.crossings);
+            if self.keeps && seen.settled {
                 self.keep(&spans, crossings, retried);
             }
-            if finish.is_some() && nearly.is_none() && certificate.holds_within(NEARLY) {
+            let between = self.window.finish.is_some();
+            if between && nearly.is_none() && certificate.holds_within(NEARLY) {
                 *nearly = Some((spans.clone(), retried));
             }
             // Narrower bounds make it slower still.
             let slow = spans.last().map_or(0.0, Span::end) > self.most;
             let last = request.coupled || !turns;
-            if last && (slow || broken(certificate, crossings) > HOPELESS[attempt.min(1)]) {
+            // A pose that is passed too early moves the passes of all that follow.
+            let first = attempt == 0 && !later.is_empty();
+            let far = broken(certificate, crossings);
+            if last && (slow || !first && far > HOPELESS[attempt.min(1)]) {
                 return None;
             }
             let again = attempt == 1 && self.dear && !seen.only_leaves();
@@ -317,11 +308,32 @@ impl Attempts<'_> {
                 (self.inner, self.shares) = (whole.clone(), Shares::default());
                 continue;
             }
-            retried |= broken(certificate, crossings) > FAR;
+            retried |= far > FAR;
             let coupled = request.coupled && places;
-            self.narrow(attempt, (&spans, &seen), coupled)?;
+            if !self.keep_beside(&later) {
+                self.narrow(attempt, (&spans, &seen), coupled)?;
+            }
         }
         None
+    }
+
+    /// What is asked of a spline under narrowed bounds, with an orientation that follows the path.
+    fn request<'b>(&self, options: &'b SmoothOptions, shares: &'b Shares) -> Request<'b>
+    where
+        'a: 'b,
+    {
+        Request {
+            poses: self.window.poses,
+            options,
+            shares,
+            moving: self.window.moving,
+            finish: self.window.finish,
+            effort: self.effort,
+            coupled: false,
+            known: self.known,
+            backwards: self.window.backwards,
+            arm: None,
+        }
     }
 
     /// How a motion keeps what is asked of the window, slowed down as a whole where that helps.
@@ -341,64 +353,6 @@ impl Attempts<'_> {
             certificate,
             crossings,
         }
-    }
-
-    /// A motion that holds, from where the first search ended, and whether that failed by far.
-    fn gone_on(
-        &self,
-        request: &Request<'_>,
-        (spans, seed, seen): (&[Span], Seed, &Judged),
-    ) -> Option<(Vec<Span>, bool)> {
-        let forward = self.forward(request, (&seed, seen));
-        let inside = || self.inside(request, (spans, seed, seen));
-        forward
-            .map(|spans| (spans, true))
-            .or_else(|| Some((inside()?, false)))
-    }
-
-    /// A motion that holds, from where a search ended that approaches poses before the tool is turned: its place goes forward there.
-    fn forward(&self, request: &Request<'_>, (seed, seen): (&Seed, &Judged)) -> Option<Vec<Span>> {
-        if seen.crossings.iter().all(Crossing::holds) {
-            return None;
-        }
-        let backwards = self.window.backwards;
-        [false, true].into_iter().find_map(|both| {
-            let ahead = Some(Ahead { backwards, both });
-            let mut spans = spline::further(request, seed, ahead)?.spans;
-            self.judge(&mut spans).holds().then_some(spans)
-        })
-    }
-
-    /// A motion that holds, from where searches ended that leave the corridor between its samples, and keep all else: the corridor is
-    /// narrowed along the legs where they do.
-    fn inside(
-        &self,
-        request: &Request<'_>,
-        (spans, mut seed, seen): (&[Span], Seed, &Judged),
-    ) -> Option<Vec<Span>> {
-        let mut left = seen.only_leaves().then(|| self.outside(spans, seen));
-        let mut shares = request.shares.clone();
-        for _ in 0..INSIDE {
-            narrow_legs(&mut shares, &left?);
-            let narrower = Request {
-                shares: &shares,
-                ..*request
-            };
-            let mut found = spline::further(&narrower, &seed, None)?;
-            let seen = self.judge(&mut found.spans);
-            if seen.holds() {
-                return Some(found.spans);
-            }
-            let outside = || self.outside(&found.spans, &seen);
-            (left, seed) = (seen.only_leaves().then(outside), found.seed);
-        }
-        None
-    }
-
-    /// The greatest distance of a motion from each leg over half the width of the corridor (m), by the pose at the end of the leg.
-    fn outside(&self, spans: &[Span], seen: &Judged) -> Vec<f64> {
-        let Window { poses, options, .. } = self.window;
-        corridor_of_legs(spans, poses, &seen.crossings, options.corridor())
     }
 
     /// Whether the orientation is part of the optimum; `None` where it has to be and is too dear. Where legs are

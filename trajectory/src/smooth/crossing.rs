@@ -68,13 +68,23 @@ pub(crate) fn crossings(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
 ) -> Vec<Crossing> {
+    crossings_after(spans, poses, options, |_, before| before)
+}
+
+/// The same, each looked for from the moment on that is told for it (0 for the first) and the pass of the pose before.
+fn crossings_after(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    after: impl Fn(usize, Moment) -> Moment,
+) -> Vec<Crossing> {
     let inner = poses
         .get(1..poses.len().saturating_sub(1))
         .unwrap_or_default();
     let mut result = Vec::with_capacity(inner.len());
     let mut at = Moment::START;
     for (i, pose) in inner.iter().enumerate() {
-        let since = at;
+        let since = after(i, at);
         let approach = closest(spans, since, pose, options.tolerance);
         let (deviation, angle) = apart(spans, &poses[0], approach, pose);
         // If the tool turns out of its tolerance meanwhile, a larger distance counts as a rest.
@@ -112,6 +122,37 @@ pub(super) fn crossings_made(
     }
     let (back, poses) = backwards(spans, poses);
     forwards(crossings(&back, &poses, options), spans)
+}
+
+/// The same, each looked for from the time (s) on at which a search has `passed` the pose before: one that is passed elsewhere than
+/// the search has it does not move the passes after it.
+pub(super) fn crossings_since(
+    spans: &[Span],
+    (poses, back): (&[Isometry3<f64>], bool),
+    options: &SmoothOptions,
+    passed: &[f64],
+) -> Vec<Crossing> {
+    let seen = |spans: &[Span], poses: &[Isometry3<f64>], passed: &[f64]| {
+        let before = |i: usize| i.checked_sub(1).and_then(|i| passed.get(i)).copied();
+        let since = |i| moment(spans, before(i).unwrap_or(0.0));
+        crossings_after(spans, poses, options, |i, _| since(i))
+    };
+    if !back {
+        return seen(spans, poses, passed);
+    }
+    let (back, poses) = backwards(spans, poses);
+    let total = spans.last().map_or(0.0, Span::end);
+    let passed: Vec<f64> = passed.iter().rev().map(|time| total - time).collect();
+    forwards(seen(&back, &poses, &passed), spans)
+}
+
+/// A time (s) of a motion, and the span that it is in.
+fn moment(spans: &[Span], time: f64) -> Moment {
+    let next = spans.partition_point(|span| span.start <= time);
+    Moment {
+        span: next.saturating_sub(1),
+        time,
+    }
 }
 
 /// A motion and its poses from their end to their start.
@@ -235,14 +276,7 @@ pub(crate) fn settled(
     let Some(goal) = poses.last() else {
         return true;
     };
-    let moment = |time: f64| {
-        let next = spans.partition_point(|span| span.start <= time);
-        Moment {
-            span: next.saturating_sub(1),
-            time,
-        }
-    };
-    let mut since = moment(0.0);
+    let mut since = moment(spans, 0.0);
     for (crossing, pose) in crossings.iter().zip(&poses[1..]) {
         let at_end = (pose.translation.vector - goal.translation.vector).norm();
         if at_end > RESOLUTION
@@ -251,7 +285,7 @@ pub(crate) fn settled(
         {
             return false;
         }
-        since = moment(crossing.time);
+        since = moment(spans, crossing.time);
     }
     approach(spans, since, goal, options.tolerance).is_none()
 }

@@ -153,6 +153,7 @@ fn searched(
             effort: effort(options, arm),
             coupled: true,
             known: None,
+            backwards: false,
             arm: Some(arm),
         };
         let turns = request.moves()[1];

@@ -24,6 +24,7 @@ mod fade;
 mod for_arm;
 mod found;
 mod judged;
+mod later;
 mod list;
 mod lower_bound;
 mod method;

@@ -152,7 +152,7 @@ mod tests {
                 narrow_legs(&mut shares, &outside);
             }
             for (to, expected) in [1.0_f64, 1.0, 0.7, 1.0, 0.245, 1.0].into_iter().enumerate() {
-                let got = shares.leg(to);
+                let got = shares.leg(to, 0);
                 assert!((got - expected.powi(times)).abs() < 1e-12, "{to}: {got}");
             }
         }

@@ -197,6 +197,7 @@ impl<'a> Task<'a> {
             .collect();
         let mut problem = Problem::at_rest(vertices, self.groups(used));
         problem.shares = self.request.shares.clone();
+        problem.backwards = self.request.backwards;
         if Problem::<D>::TURNS {
             problem.led = self.led();
         }
@@ -284,7 +285,12 @@ impl<'a> Task<'a> {
         spans: &[Span],
         used: [bool; 2],
     ) -> Point<D> {
-        let known = Known::new(spans, self.poses, &self.vectors, self.options);
+        let known = Known::new(
+            spans,
+            (self.poses, self.request.backwards),
+            &self.vectors,
+            self.options,
+        );
         let finish = self.request.finish;
         problem.scale = match (self.moving, finish) {
             (Some(moving), Some(_)) => known.even(moving.spacing),

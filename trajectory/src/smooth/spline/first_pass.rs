@@ -9,7 +9,7 @@ use super::further::Ahead;
 use super::problem::{Point, Problem};
 use super::solve::solve;
 use super::stretch::Stretch;
-use crate::smooth::crossing::{Crossing, crossings_made};
+use crate::smooth::later::later;
 
 /// Most searches one after another.
 const FORWARD: usize = 3;
@@ -31,10 +31,8 @@ impl Task<'_> {
             return;
         }
         let ahead = self.ahead::<D, B>((problem, point), (effort, aims), (used, Ahead::default()));
-        let holds = |(other, first): &(Problem<D>, Point<D>)| {
-            let passes = self.passes((other, first), used, false);
-            passes.missed(first, false).is_empty()
-        };
+        let holds =
+            |(other, first): &(Problem<D>, Point<D>)| self.later((other, first), used).is_empty();
         if let Some(ahead) = ahead.filter(holds) {
             (*problem, *point) = ahead;
         }
@@ -46,15 +44,14 @@ impl Task<'_> {
         &self,
         (problem, point): (&Problem<D>, &Point<D>),
         (mut effort, aims): (Effort, Option<Aims<'_, D>>),
-        (used, Ahead { backwards, both }): ([bool; 2], Ahead),
+        (used, Ahead { both }): ([bool; 2], Ahead),
     ) -> Option<(Problem<D>, Point<D>)> {
         (effort.search, effort.steps) = (BEGINS * effort.search, LONGER * effort.steps);
         let (mut vertices, mut nearer) = (BTreeSet::new(), BTreeSet::new());
         let mut ahead: Option<(Problem<D>, Point<D>)> = None;
         for _ in 0..FORWARD {
             let (before, from) = ahead.as_ref().map_or((problem, point), |(a, b)| (a, b));
-            let passes = self.passes((before, from), used, backwards);
-            let missed = passes.missed(from, backwards);
+            let missed = self.later((before, from), used);
             if missed.is_empty() {
                 break;
             }
@@ -66,11 +63,15 @@ impl Task<'_> {
             let stretch = Stretch {
                 vertices: &vertices,
                 nearer: &nearer,
-                backwards,
+                backwards: self.request.backwards,
                 both,
             };
             let (mut other, mut first) = (before.clone(), from.clone());
             other.go_forward(from, &stretch);
+            for leg in stretch.legs() {
+                let width = self.options.corridor();
+                other.shares.keep_beside(leg + 1, self.poses, width);
+            }
             self.see_aims(&mut other, &first);
             solve::<D, B>(&mut other, &mut first, effort, aims)?;
             ahead = Some((other, first));
@@ -78,51 +79,15 @@ impl Task<'_> {
         ahead
     }
 
-    /// How the motion of an iterate passes the poses.
-    fn passes<const D: usize>(
+    /// The poses that an iterate passes later than its motion does, for which it misses one.
+    fn later<const D: usize>(
         &self,
         (problem, point): (&Problem<D>, &Point<D>),
         used: [bool; 2],
-        backwards: bool,
-    ) -> Passes {
+    ) -> Vec<usize> {
         let spans = self.spans(problem, point, used);
-        Passes {
-            made: crossings_made(&spans, (self.poses, backwards), self.options),
-            spacing: problem.spacing(point.z),
-        }
-    }
-}
-
-/// How a motion passes the inner poses.
-struct Passes {
-    made: Vec<Crossing>,
-    /// Knot spacing, s.
-    spacing: f64,
-}
-
-impl Passes {
-    /// The poses that are not passed when the search passes them, and not within their tolerances. Where the place alone is searched,
-    /// those before them, too, that are not passed when the search passes them: the place comes back to such a pose, and so passes
-    /// the next one before it is there.
-    fn missed<const D: usize>(&self, point: &Point<D>, backwards: bool) -> Vec<usize> {
-        let other = |i: &usize| {
-            let both = self.made.get(*i).zip(point.crossings.get(*i));
-            both.is_some_and(|(made, searched)| made.is_apart(*searched, self.spacing))
-        };
-        let all = 0..self.made.len();
-        let lost = all.filter(|i| !self.made[*i].holds());
-        let mut missed: Vec<usize> = lost.filter(other).collect();
-        if !Problem::<D>::TURNS {
-            let before = |i: &usize| {
-                if backwards {
-                    Some(i + 1)
-                } else {
-                    i.checked_sub(1)
-                }
-            };
-            let also: Vec<usize> = missed.iter().filter_map(before).filter(other).collect();
-            missed.extend(also);
-        }
-        missed
+        let searched = (&point.crossings[..], problem.spacing(point.z));
+        let poses = (self.poses, self.request.backwards);
+        later(&spans, poses, self.options, searched)
     }
 }

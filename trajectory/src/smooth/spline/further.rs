@@ -9,7 +9,7 @@ use crate::smooth::seed::Seed;
 
 /// Time-optimal spline under the bounds of a request from where a search ended. Where the motion of that search approaches poses
 /// before it passes them it goes on `ahead`: with a place that goes forward only on the legs before these poses, or on both legs
-/// beside them, and whether the motion will be made from its end to its start. `None` where that is of no use, or the bounds do
+/// beside them. `None` where that is of no use, or the bounds do
 /// not hold in the end.
 pub(crate) fn further(request: &Request<'_>, seed: &Seed, ahead: Option<Ahead>) -> Option<Found> {
     let task = Task::new(request);
@@ -26,8 +26,6 @@ pub(crate) fn further(request: &Request<'_>, seed: &Seed, ahead: Option<Ahead>) 
 /// How a place goes forward.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ahead {
-    /// Whether the motion will be made from its end to its start.
-    pub(crate) backwards: bool,
     /// Whether the place goes forward on both legs beside a pose; else on the leg before it.
     pub(crate) both: bool,
 }

@@ -15,7 +15,7 @@ use super::basis;
 use super::problem::Problem;
 use super::start::{FEWEST, KNOTS_PER_RAMP, MOST};
 use crate::line::body_turn;
-use crate::smooth::crossing::crossings;
+use crate::smooth::crossing::crossings_made;
 use crate::smooth::options::SmoothOptions;
 use crate::smooth::span::{Span, span_at};
 
@@ -60,14 +60,14 @@ pub(super) struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    /// The motion `spans` through `poses`.
+    /// The motion `spans` through `poses`, and whether it will be made from its end to its start.
     pub(super) fn new(
         spans: &'a [Span],
-        poses: &'a [Isometry3<f64>],
+        (poses, backwards): (&'a [Isometry3<f64>], bool),
         vectors: &'a [Vector3<f64>],
         options: &SmoothOptions,
     ) -> Self {
-        let passes = crossings(spans, poses, options);
+        let passes = crossings_made(spans, (poses, backwards), options);
         let limits = &options.limits;
         let place = options.tolerance.min(options.corridor()) / limits.jerk;
         let turn = options.angular_tolerance() / limits.angular_jerk;

@@ -51,6 +51,8 @@ pub(crate) struct Problem<const D: usize> {
     /// While a first iterate from a start in motion breaks limits, its first control points stay
     /// those of this `z`; a greater `z` only widens limits.
     pub(crate) anchor: Option<f64>,
+    /// Whether the motion will be made from its end to its start: then the last inner vertex is passed first.
+    pub(crate) backwards: bool,
     /// Whether the place alone says when an inner vertex is passed, by vertex; empty: of none.
     pub(crate) led: Vec<bool>,
     /// The joints of an arm that follow.
@@ -113,6 +115,7 @@ impl<const D: usize> Problem<D> {
             finish: None,
             scale: 1.0,
             anchor: None,
+            backwards: false,
             led: Vec::new(),
             joints: Vec::new(),
             frames: Vec::new(),
@@ -128,7 +131,7 @@ impl<const D: usize> Problem<D> {
 
     /// Half width of the corridor of group `g` along the leg to a vertex.
     pub(super) fn width(&self, g: usize, leg: usize) -> f64 {
-        self.shares.leg(leg) * self.groups[g].width
+        self.shares.leg(leg, g) * self.groups[g].width
     }
 
     /// Whether the start or the end is in motion.

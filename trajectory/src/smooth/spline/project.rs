@@ -62,8 +62,11 @@ pub(crate) fn project<const D: usize>(
 ) {
     let end = point.spans() as f64;
     let scales = [0, 1].map(|g: usize| 1.0 / (problem.groups[g].radius * problem.groups[g].radius));
-    let mut before = 0.0_f64;
-    for i in 0..point.crossings.len() {
+    let (mut least, mut most) = (0.0_f64, end);
+    let count = point.crossings.len();
+    for k in 0..count {
+        // In the order in which they are passed.
+        let i = if problem.backwards { count - 1 - k } else { k };
         let radii = |g: usize| room.map_or(0.0, |room| room.balls[g][i].powi(2));
         let pass = Pass {
             goal: &problem.inner()[i],
@@ -71,7 +74,7 @@ pub(crate) fn project<const D: usize>(
             scales,
             led: problem.is_led(i),
         };
-        let mut time = point.crossings[i].clamp(before, end.max(before));
+        let mut time = point.crossings[i].clamp(least, most);
         // Where the orientation is searched, too, a step is taken only to where the strain is seen to be less.
         let mut seen = Problem::<D>::TURNS.then(|| point.at(time));
         let mut here = seen.map(|seen| pass.strain(&seen));
@@ -81,7 +84,7 @@ pub(crate) fn project<const D: usize>(
             };
             let (mut share, mut moved) = (1.0, false);
             for _ in 0..if Problem::<D>::TURNS { 4 } else { 1 } {
-                let to = (time - share * step).clamp(before, end.max(before));
+                let to = (time - share * step).clamp(least, most);
                 let there = Problem::<D>::TURNS.then(|| point.at(to));
                 let strain = there.map(|there| pass.strain(&there));
                 if strain <= here {
@@ -94,8 +97,12 @@ pub(crate) fn project<const D: usize>(
                 break;
             }
         }
-        point.crossings[i] = time.max(before);
-        before = point.crossings[i];
+        point.crossings[i] = time.max(least);
+        if problem.backwards {
+            most = point.crossings[i];
+        } else {
+            least = point.crossings[i];
+        }
     }
 }
 
@@ -381,4 +388,34 @@ fn away<const D: usize>(
     leg: usize,
 ) -> f64 {
     square(&problem.nearest(&point.sample(k, g), leg, g).offset).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::problem::Group;
+    use super::*;
+
+    /// Two poses that a line passes in the wrong order are passed at once where it is nearest to that which comes first as it is made.
+    #[test]
+    fn passes_are_in_the_order_in_which_they_are_made() {
+        let control: Vec<[f64; 3]> = (0..16).map(|k| [f64::from(k), 0.0, 0.0]).collect();
+        let mut point = Point {
+            control,
+            z: 1.0,
+            crossings: vec![5.5; 2],
+        };
+        let vertices = [0.0, 6.0, 5.0, 12.0].map(|time| point.place(time, 0));
+        let group = Group {
+            caps: [0.5, 5.0, 100.0],
+            radius: 2.0,
+            width: 4.0,
+        };
+        let mut problem = Problem::<3>::at_rest(vertices.to_vec(), [group; 2]);
+        for (backwards, time) in [(false, 6.0), (true, 5.0)] {
+            problem.backwards = backwards;
+            project(&problem, &mut point, None, 20);
+            let near = |pass: &f64| (pass - time).abs() < 1e-6;
+            assert!(point.crossings.iter().all(near), "{:?}", point.crossings);
+        }
+    }
 }

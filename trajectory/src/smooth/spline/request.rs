@@ -42,6 +42,8 @@ pub(crate) struct Request<'a> {
     pub(crate) coupled: bool,
     /// A motion from the same start through the same poses that holds, to start the search from.
     pub(crate) known: Option<&'a [Span]>,
+    /// Whether the motion will be made from its end to its start: the first approaches to poses may be others then.
+    pub(crate) backwards: bool,
     /// A motion of an arm from rest to rest through the poses, to start the search from, and what its joints may do.
     pub(crate) arm: Option<&'a ArmMotion<'a>>,
 }

@@ -43,6 +43,18 @@ impl Stretch<'_> {
         if self.backwards { -1.0 } else { 1.0 }
     }
 
+    /// The legs beside its vertices on which the place goes forward, the first being 0.
+    pub(super) fn legs(&self) -> BTreeSet<usize> {
+        let beside = |after: usize| self.vertices.iter().map(move |vertex| vertex + after);
+        let first = usize::from(self.backwards);
+        let other = self.both.then_some(1 - first);
+        [Some(first), other]
+            .into_iter()
+            .flatten()
+            .flat_map(beside)
+            .collect()
+    }
+
     /// The ends of a leg beside which the place goes forward, after a share of the time on it; leg 0 begins at the start.
     fn ends(&self, leg: usize, share: f64) -> impl Iterator<Item = End> {
         let end = move |vertex: usize, sign: f64, away: f64| End { vertex, sign, away };
@@ -174,6 +186,7 @@ mod tests {
             }
             seen.dedup();
             assert_eq!(seen, legs);
+            assert!(stretch.legs().into_iter().eq(legs));
         }
     }
 }
