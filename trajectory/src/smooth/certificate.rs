@@ -157,6 +157,17 @@ pub(crate) fn certify(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
 ) -> (Certificate, Vec<Crossing>) {
+    let crossings = crossing::crossings(spans, poses, options);
+    certify_passes(spans, poses, options, crossings)
+}
+
+/// The same of a motion whose passes are known.
+fn certify_passes(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+    crossings: Vec<Crossing>,
+) -> (Certificate, Vec<Crossing>) {
     let mut certificate = Certificate {
         duration: spans.last().map_or(0.0, Span::end),
         ..Certificate::default()
@@ -167,7 +178,6 @@ pub(crate) fn certify(
     }
     certificate.active = active.finish(certificate.duration);
     certificate.jump = jumps(spans, options);
-    let crossings = crossing::crossings(spans, poses, options);
     certificate.in_order = crossings.iter().all(Crossing::holds);
     certificate.corridor = corridor(spans, poses, &crossings, options.corridor());
     (certificate, crossings)
@@ -210,7 +220,33 @@ pub(super) fn certify_whole(
     poses: &[Isometry3<f64>],
     options: &SmoothOptions,
 ) -> (Certificate, Vec<Crossing>) {
-    let mut whole = certify(spans, poses, options);
+    at_rest(certify(spans, poses, options), spans, options)
+}
+
+/// The same of one that passes all poses. `None` where it misses one: that is seen long before the limits of a tool that turns are
+/// bounded.
+pub(super) fn certify_passing(
+    spans: &[Span],
+    poses: &[Isometry3<f64>],
+    options: &SmoothOptions,
+) -> Option<(Certificate, Vec<Crossing>)> {
+    let passes = crossing::crossings(spans, poses, options);
+    let all = passes.iter().all(Crossing::holds);
+    all.then(|| {
+        at_rest(
+            certify_passes(spans, poses, options, passes),
+            spans,
+            options,
+        )
+    })
+}
+
+/// A certificate that has how far both ends of the motion are from rest, too.
+fn at_rest(
+    mut whole: (Certificate, Vec<Crossing>),
+    spans: &[Span],
+    options: &SmoothOptions,
+) -> (Certificate, Vec<Crossing>) {
     if let (Some(first), Some(last)) = (spans.first(), spans.last()) {
         for end in [first.at(0.0), last.at(last.duration)] {
             let off = jump(&end, &ToolPoint::still(end.pose), options);

@@ -276,7 +276,7 @@ impl<'a> Attempts<'a> {
             if seen.holds() {
                 return Some((spans, retried));
             }
-            let later = self.later(&request, &spans, &seed);
+            let later = self.later(&request, (&spans, &seed, &seen));
             early |= !later.is_empty();
             if attempt == 0
                 && let Some(found) = self.gone_on(&request, (&spans, seed, &seen))

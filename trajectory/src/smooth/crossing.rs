@@ -71,7 +71,7 @@ pub(crate) fn crossings(
     crossings_after(spans, poses, options, |_, before| before)
 }
 
-/// The same, each looked for from the moment on that is told for it (0 for the first) and the pass of the pose before.
+/// The same; `after` tells from which moment on an inner pose, 0 being the first, is looked for, given the pass of the one before.
 fn crossings_after(
     spans: &[Span],
     poses: &[Isometry3<f64>],

@@ -2,19 +2,20 @@
 
 use nalgebra::Isometry3;
 
-use super::crossing::{Crossing, crossings_made, crossings_since};
+use super::crossing::{Crossing, crossings_since};
 use super::options::SmoothOptions;
 use super::span::Span;
 
 /// The inner poses that a search passes on a later approach than its motion does, and for which a pose is missed: they themselves, or
-/// the one that is passed next. The search has the passes at the times `searched`, in knots of a spacing (s).
+/// the one that is passed next. The search has the passes at the times `searched`, in knots of a spacing (s); the motion passes the
+/// poses as they are `made`.
 pub(super) fn later(
     spans: &[Span],
     (poses, backwards): (&[Isometry3<f64>], bool),
     options: &SmoothOptions,
     (searched, spacing): (&[f64], f64),
+    made: &[Crossing],
 ) -> Vec<usize> {
-    let made = crossings_made(spans, (poses, backwards), options);
     if made.iter().all(Crossing::holds) {
         return Vec::new();
     }
@@ -47,6 +48,7 @@ pub(super) fn later(
 
 #[cfg(test)]
 mod tests {
+    use super::super::crossing::crossings_made;
     use super::super::span::reversed;
     use super::*;
     use crate::ToolLimits;
@@ -78,25 +80,26 @@ mod tests {
         (spans, poses.to_vec())
     }
 
+    /// The poses that are named for a search with passes at these times, in tenths of a second.
+    fn named(spans: &[Span], poses: (&[Isometry3<f64>], bool), searched: &[f64]) -> Vec<usize> {
+        let options = SmoothOptions::new(0.01, ToolLimits::UNLIMITED);
+        let made = crossings_made(spans, poses, &options);
+        later(spans, poses, &options, (searched, 0.1), &made)
+    }
+
     /// A search has the first pose on the way back, the motion passes it on the way there: so it is beside the second pose before it is
     /// there, and misses that. The first is named, from either end; and none where the search has it as it is passed.
     #[test]
     fn a_pose_that_is_passed_early_moves_the_next_pass() {
         let (spans, poses) = motion();
-        let options = SmoothOptions::new(0.01, ToolLimits::UNLIMITED);
-        let (back, there) = (1.0 + 0.5 / 0.6, 3.0);
-        let spacing = 0.1;
-        let named = |first: f64| {
-            let searched = [first / spacing, there / spacing];
-            later(&spans, (&poses, false), &options, (&searched, spacing))
-        };
-        assert_eq!(named(back), [0]);
-        assert_eq!(named(0.5), [1]);
+        let (back, there) = (10.0 + 5.0 / 0.6, 30.0);
+        let forth = |first: f64| named(&spans, (&poses, false), &[first, there]);
+        assert_eq!(forth(back), [0]);
+        assert_eq!(forth(5.0), [1]);
         let (turned, mut ends) = (reversed(&spans), poses.clone());
         ends.reverse();
-        let searched = [(4.0 - there) / spacing, (4.0 - back) / spacing];
-        let named = later(&turned, (&ends, true), &options, (&searched, spacing));
-        assert_eq!(named, [1]);
+        let searched = [40.0 - there, 40.0 - back];
+        assert_eq!(named(&turned, (&ends, true), &searched), [1]);
     }
 
     /// A pose that is missed where its search has it is not passed later.
@@ -104,8 +107,6 @@ mod tests {
     fn a_pose_that_is_missed_where_it_is_searched_is_not_named() {
         let (spans, mut poses) = motion();
         poses[1].translation.vector.z = 0.02;
-        let options = SmoothOptions::new(0.01, ToolLimits::UNLIMITED);
-        let named = later(&spans[..1], (&poses[..3], false), &options, (&[5.0], 0.1));
-        assert_eq!(named, []);
+        assert_eq!(named(&spans[..1], (&poses[..3], false), &[5.0]), []);
     }
 }

@@ -4,8 +4,8 @@ use std::cell::Cell;
 
 use nalgebra::Isometry3;
 
-use super::certificate::certify_whole;
-use super::crossing::{Crossing, RESOLUTION, crossings};
+use super::certificate::certify_passing;
+use super::crossing::RESOLUTION;
 use super::found::Found;
 use super::lower_bound::lower_bound;
 use super::method::Method;
@@ -473,12 +473,10 @@ impl<'a> List<'a> {
     fn placed(&self, form: &NormalForm, motion: &Motion) -> Option<SmoothPlan> {
         let motion = form.place(motion.clone());
         let soon = motion.duration() <= self.exact_stop * (1.0 + 1e-12);
-        // Most of what does not hold misses a pose, which is seen long before the limits of a tool that turns are bounded.
-        let passes = || crossings(&motion.spans, self.given, self.options);
-        if !soon || !passes().iter().all(Crossing::holds) {
+        if !soon {
             return None;
         }
-        let whole = certify_whole(&motion.spans, self.given, self.options);
+        let whole = certify_passing(&motion.spans, self.given, self.options)?;
         let good = whole.0.holds();
         good.then(|| SmoothPlan::new(self.given, motion, whole, self.exact_stop))
     }

@@ -16,7 +16,11 @@ const INSIDE: usize = 4;
 impl Attempts<'_> {
     /// The inner poses that a search passes later than its motion does, for which it misses one. None where nothing turns: the place
     /// has nothing to wait for, and narrower balls do.
-    pub(super) fn later(&self, request: &Request<'_>, spans: &[Span], seed: &Seed) -> Vec<usize> {
+    pub(super) fn later(
+        &self,
+        request: &Request<'_>,
+        (spans, seed, seen): (&[Span], &Seed, &Judged),
+    ) -> Vec<usize> {
         let [_, turns] = request.moves();
         if !turns {
             return Vec::new();
@@ -30,7 +34,8 @@ impl Attempts<'_> {
         // It may have been slowed down.
         let spacing = spans.last().map_or(0.0, Span::end) / spans.len() as f64;
         let searched = (&seed.crossings[..], spacing);
-        later(spans, (poses, backwards), options, searched)
+        let poses = (poses, backwards);
+        later(spans, poses, options, searched, &seen.crossings)
     }
 
     /// Keeps the place beside the legs on which it comes to some inner poses; false where it is kept so already.

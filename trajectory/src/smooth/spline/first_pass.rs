@@ -9,6 +9,7 @@ use super::further::Ahead;
 use super::problem::{Point, Problem};
 use super::solve::solve;
 use super::stretch::Stretch;
+use crate::smooth::crossing::crossings_made;
 use crate::smooth::later::later;
 
 /// Most searches one after another.
@@ -88,6 +89,7 @@ impl Task<'_> {
         let spans = self.spans(problem, point, used);
         let searched = (&point.crossings[..], problem.spacing(point.z));
         let poses = (self.poses, self.request.backwards);
-        later(&spans, poses, self.options, searched)
+        let made = crossings_made(&spans, poses, self.options);
+        later(&spans, poses, self.options, searched, &made)
     }
 }

@@ -9,8 +9,7 @@ use crate::smooth::seed::Seed;
 
 /// Time-optimal spline under the bounds of a request from where a search ended. Where the motion of that search approaches poses
 /// before it passes them it goes on `ahead`: with a place that goes forward only on the legs before these poses, or on both legs
-/// beside them. `None` where that is of no use, or the bounds do
-/// not hold in the end.
+/// beside them. `None` where that is of no use, or the bounds do not hold in the end.
 pub(crate) fn further(request: &Request<'_>, seed: &Seed, ahead: Option<Ahead>) -> Option<Found> {
     let task = Task::new(request);
     let (place, turn, all) = ([true, false], [false, true], [true; 2]);
