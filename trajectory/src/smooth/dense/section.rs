@@ -20,10 +20,12 @@ use crate::smooth::tool_law::tool_law;
 use crate::timing::Timed;
 use crate::{Boundary, TimingOptions, ToolLimits};
 
-/// Times that the curve is fitted over the time of the law before.
-const REFITS: usize = 2;
-/// Share of the time that a refit has to gain for another one to be worth while.
-const GAIN: f64 = 1e-3;
+/// Times that the curve is fitted over the time of the law before, at most.
+const REFITS: usize = 8;
+/// Shares of the time that the first refit and a later one have to gain for another one to be worth while.
+const GAINS: [f64; 2] = [1e-3, 5e-3];
+/// A refit with this many times fewer knots than the first fit may have too few.
+const MANY: usize = 3;
 /// Times that a section is fitted with smaller balls where they were missed.
 const ATTEMPTS: usize = 8;
 /// Knots of a fit in a ramp of the acceleration.
@@ -189,28 +191,30 @@ impl<'a, const D: usize> Section<'a, D> {
         density: f64,
         balls: &Balls,
     ) -> Result<TimedCurve<D>, Failure> {
-        let limits = self.limits();
-        let mut best = self.timed(parameters, balls, &limits)?;
-        for _ in 0..REFITS {
+        let mut best = self.timed(parameters, balls, &self.limits())?;
+        let many = best.curve.fit.spans();
+        // A tight bend takes little time, so it may need more knots over time than over its chords. Orientations may turn
+        // between poses then, which poses on the legs do not allow.
+        let mut densities = &DENSITIES[..if D == 3 { DENSITIES.len() } else { 1 }];
+        for round in 0..REFITS {
             let before = best.timed.certificate.duration;
-            // A tight bend takes little time, so it may need more knots over time than over its chords.
-            let refitted = |more: f64| {
-                let parameters = self.time_parameters(&best, [density, more]);
-                self.timed(&parameters, balls, &limits).ok()
+            let refitted = |more: &f64| {
+                let parameters = self.time_parameters(&best, [density, *more]);
+                self.timed(&parameters, balls, &self.limits()).ok()
             };
-            // Orientations may turn between poses then, which poses on the legs do not allow.
-            let tries = if D == 3 { DENSITIES.len() } else { 1 };
-            let Some(next) = DENSITIES
-                .into_iter()
-                .take(tries)
-                .find_map(refitted)
-                .filter(|next| next.timed.certificate.duration < before)
-            else {
-                break;
-            };
-            best = next;
-            if best.timed.certificate.duration > before * (1.0 - GAIN) {
-                break;
+            let faster = |next: &TimedCurve<D>| next.timed.certificate.duration < before;
+            if let Some(next) = densities.iter().find_map(refitted).filter(faster) {
+                best = next;
+            }
+            let gain = GAINS[usize::from(round > 0)];
+            if best.timed.certificate.duration <= before * (1.0 - gain) {
+                continue;
+            }
+            // A curve of far fewer knots than the first may be too stiff.
+            let stiff = MANY * best.curve.fit.spans() < many;
+            match densities {
+                [_, more @ ..] if stiff && !more.is_empty() => densities = more,
+                _ => break,
             }
         }
         Ok(best)
