@@ -92,12 +92,22 @@ impl Span {
     }
 
     /// Pose and time derivatives at local time `t`.
+    pub(crate) fn at(&self, t: f64) -> ToolPoint {
+        let [point, velocity, acceleration, jerk] = self.motion(t);
+        let (rotation, angular) = self.turning(t);
+        ToolPoint {
+            pose: Isometry3::from_parts(point.into(), rotation),
+            linear: [velocity, acceleration, jerk],
+            angular,
+        }
+    }
+
+    /// Orientation, and angular velocity, acceleration and jerk at local time `t`.
     ///
     /// With the world axis `a_j` of factor `j` and the angular velocity
     /// `W_j` of the factors before it, `a_j' = W_j x a_j`; the angular velocity
     /// is the sum of `angle_j' a_j`, and its derivatives follow.
-    pub(crate) fn at(&self, t: f64) -> ToolPoint {
-        let [point, velocity, acceleration, jerk] = self.motion(t);
+    pub(crate) fn turning(&self, t: f64) -> (UnitQuaternion<f64>, [Vector3<f64>; 3]) {
         let mut rotation = self.base;
         let mut angular = [Vector3::zeros(); 3];
         for turn in &self.turns {
@@ -110,11 +120,7 @@ impl Span {
             angular[2] += axis * rate3 + axis1 * (2.0 * rate2) + axis2 * rate;
             rotation *= UnitQuaternion::from_scaled_axis(turn.axis * angle);
         }
-        ToolPoint {
-            pose: Isometry3::from_parts(point.into(), rotation),
-            linear: [velocity, acceleration, jerk],
-            angular,
-        }
+        (rotation, angular)
     }
 
     /// Position in Bernstein form on the local interval `[from, to]`.
