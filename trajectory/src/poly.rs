@@ -11,7 +11,7 @@ use std::ops::{Add, Mul};
 use nalgebra::Vector3;
 
 /// Binomial coefficients up to row 7.
-const CHOOSE: [[f64; 8]; 8] = [
+pub(crate) const CHOOSE: [[f64; 8]; 8] = [
     [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [1.0, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::options::SmoothOptions;
-use super::poly::{hull, quartic};
+use super::poly::{CHOOSE, bernstein, hull, quartic};
 use super::span::Span;
 
 /// Upper bounds of angular speed, acceleration and jerk over their limits.
@@ -101,7 +101,7 @@ impl<'a> Stretch<'a> {
         [
             hull(&speed, caps[0], 4) + off * square / (24.0 * caps[0]),
             hull(&acceleration, caps[1], 4) + off * width / (12.0 * caps[1]),
-            (j.norm().max(last.norm()) + off / 8.0) / caps[2],
+            hull(&[*j, *last], caps[2], 0) + off / (8.0 * caps[2]),
         ]
     }
 
@@ -157,30 +157,20 @@ struct Factor {
 /// A bound of the fourth derivative of the angular velocity on a span, which is that of the jerk's second: the derivatives of
 /// the angles are polynomials of degree three, so that it comes from the moving of the axes alone.
 fn fourth(span: &Span) -> f64 {
-    let half = span.duration / 2.0;
     let mut rotation = span.base;
     let mut before: Vec<Factor> = Vec::with_capacity(span.turns.len());
     let mut sum = 0.0;
     for turn in &span.turns {
-        let [middle, now1, now2, now3] = quartic(&turn.angle, half);
-        let now4 = 24.0 * turn.angle[4];
-        let (first, second, third) = rates([now1, now2, now3, now4], half);
         let length = turn.axis.norm();
-        let most = [
-            largest(&first),
-            largest(&second),
-            largest(&third),
-            now4.abs(),
-        ];
         let axis = rotation * turn.axis / length.max(f64::MIN_POSITIVE);
         let factor = Factor {
             axis,
-            angle: most.map(|most| length * most),
-            moved: moved(&before, &axis, half),
+            angle: largest(&turn.angle, span.duration).map(|most| length * most),
+            moved: moved(&before, &axis, span.duration / 2.0),
         };
-        let ([d1, d2, d3, d4], [m1, m2, m3, m4]) = (factor.angle, factor.moved);
-        sum += 4.0 * m1 * d4 + 6.0 * m2 * d3 + 4.0 * m3 * d2 + m4 * d1;
+        sum += moving(4, &factor.angle, &factor.moved);
         before.push(factor);
+        let middle = quartic(&turn.angle, span.duration / 2.0)[0];
         rotation *= nalgebra::UnitQuaternion::from_scaled_axis(turn.axis * middle);
     }
     sum
@@ -197,51 +187,37 @@ fn moved(before: &[Factor], axis: &Vector3<f64>, half: f64) -> [f64; 4] {
         let skew = (sine(&factor.axis, axis) + half * drift).min(1.0);
         drift += factor.angle[0] * skew;
         for k in 0..4 {
-            let moving = |r: usize| CHOOSE[k][r] * factor.angle[k - r] * factor.moved[r - 1];
-            let moving: f64 = (1..=k).map(moving).sum();
+            let moving = moving(k, &factor.angle, &factor.moved);
             whole[k] += factor.angle[k] + moving;
             across[k] += factor.angle[k] * skew + moving;
         }
     }
-    let m1 = across[0];
-    let m2 = across[1] + whole[0] * m1;
-    let m3 = across[2] + 2.0 * whole[1] * m1 + whole[0] * m2;
-    let m4 = across[3] + 3.0 * (whole[2] * m1 + whole[1] * m2) + whole[0] * m3;
-    [m1, m2, m3, m4]
+    let mut moved = [0.0; 4];
+    for k in 0..4 {
+        moved[k] = across[k] + moving(k, &whole, &moved);
+    }
+    moved
 }
 
-/// Binomial coefficients.
-const CHOOSE: [[f64; 4]; 4] = [
-    [1.0, 0.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0, 0.0],
-    [1.0, 2.0, 1.0, 0.0],
-    [1.0, 3.0, 3.0, 1.0],
-];
-
-/// Bernstein forms of the first three derivatives of an angle on an interval, from its derivatives at the middle and
-/// half of its width.
-fn rates([d1, d2, d3, d4]: [f64; 4], half: f64) -> ([f64; 4], [f64; 3], [f64; 2]) {
-    let square = half * half;
-    let even = [d1 + 0.5 * d3 * square, d1 - d3 * square / 6.0];
-    let odd = [
-        (d2 + d4 * square / 6.0) * half,
-        (d2 / 3.0 - d4 * square / 6.0) * half,
-    ];
-    let (bend, slope) = (0.5 * d4 * square, d3 * half);
-    (
-        [
-            even[0] - odd[0],
-            even[1] - odd[1],
-            even[1] + odd[1],
-            even[0] + odd[0],
-        ],
-        [d2 - slope + bend, d2 - bend, d2 + slope + bend],
-        [d3 - d4 * half, d3 + d4 * half],
-    )
+/// A bound of what the derivatives of a direction add to the derivative of order `order` of a rate along it, from bounds of the
+/// rate and its derivatives and of those of the direction: the terms of Leibniz's rule but for the first.
+fn moving(order: usize, rate: &[f64; 4], moved: &[f64; 4]) -> f64 {
+    let term = |r: usize| CHOOSE[order][r] * rate[order - r] * moved[r - 1];
+    (1..=order).map(term).sum()
 }
 
-fn largest<const M: usize>(control: &[f64; M]) -> f64 {
-    control.iter().fold(0.0, |worst: f64, c| worst.max(c.abs()))
+/// Bounds of the first four derivatives of an angle from 0 to a time (s).
+fn largest([_, c1, c2, c3, c4]: &[f64; 5], end: f64) -> [f64; 4] {
+    [
+        greatest(&bernstein(&[*c1, 2.0 * c2, 3.0 * c3, 4.0 * c4], 0.0, end)),
+        greatest(&bernstein(&[2.0 * c2, 6.0 * c3, 12.0 * c4], 0.0, end)),
+        greatest(&bernstein(&[6.0 * c3, 24.0 * c4], 0.0, end)),
+        (24.0 * c4).abs(),
+    ]
+}
+
+fn greatest(control: &[f64]) -> f64 {
+    control.iter().fold(0.0, |most: f64, c| most.max(c.abs()))
 }
 
 /// Sine of the angle between two directions, of which one may be zero; 0 where it is rounding.
@@ -260,6 +236,30 @@ mod tests {
     use crate::smooth::spline::turns;
     use nalgebra::UnitQuaternion;
 
+    /// A span that turns from each control orientation to the next by a rotation vector.
+    fn turning(steps: [Vector3<f64>; 4], duration: f64) -> Span {
+        let mut control = vec![UnitQuaternion::identity()];
+        for step in steps {
+            control.push(control[control.len() - 1] * UnitQuaternion::from_scaled_axis(step));
+        }
+        Span {
+            start: 0.0,
+            duration,
+            point: [Vector3::zeros(); 5],
+            base: control[0],
+            turns: turns(&control, duration),
+        }
+    }
+
+    /// The greatest angular speed, acceleration and jerk of so many samples.
+    fn sampled(span: &Span, count: u32) -> [f64; 3] {
+        let time = |i: u32| span.duration * f64::from(i) / f64::from(count);
+        (0..=count).fold([0.0; 3], |most: [f64; 3], i| {
+            let rates = span.turning(time(i)).1;
+            [0, 1, 2].map(|k| most[k].max(rates[k].norm()))
+        })
+    }
+
     /// The bounds are not below what is sampled, and within limits that are hardly above it where the axis turns fast:
     /// as a corner that turns is passed at full angular speed. Bounds that added norms in place of vectors were up to
     /// 1.7 times as large, and a motion that held its limits was planned again under narrower ones.
@@ -276,22 +276,8 @@ mod tests {
                     50.0 * t.powi(3) * angle(3),
                 )
             };
-            let mut control = vec![UnitQuaternion::identity()];
-            for k in 0..4 {
-                let step = at(f64::from(k + 1)) - at(f64::from(k));
-                control.push(control[control.len() - 1] * UnitQuaternion::from_scaled_axis(step));
-            }
-            let span = Span {
-                start: 0.0,
-                duration: 0.008,
-                point: [Vector3::zeros(); 5],
-                base: control[0],
-                turns: turns(&control, 0.008),
-            };
-            let samples = (0..=200).map(|i| span.at(0.008 * f64::from(i) / 200.0).angular);
-            let most = samples.fold([0.0_f64; 3], |most, rates| {
-                [0, 1, 2].map(|k| most[k].max(rates[k].norm()))
-            });
+            let span = turning([0.0, 1.0, 2.0, 3.0].map(|k| at(k + 1.0) - at(k)), 0.008);
+            let most = sampled(&span, 200);
             let limits = ToolLimits {
                 angular_speed: 1.15 * most[0],
                 angular_acceleration: 1.15 * most[1],
@@ -323,22 +309,8 @@ mod tests {
             [2.125_058e-3, -1.379_120e-3, 2.265_454e-3],
         ];
         let h = 1.211_206e-3;
-        let mut control = vec![UnitQuaternion::identity()];
-        for step in steps {
-            let step = UnitQuaternion::from_scaled_axis(Vector3::from(step));
-            control.push(control[control.len() - 1] * step);
-        }
-        let span = Span {
-            start: 0.0,
-            duration: h,
-            point: [Vector3::zeros(); 5],
-            base: control[0],
-            turns: turns(&control, h),
-        };
-        let samples = (0..=200).map(|i| span.at(h * f64::from(i) / 200.0).angular);
-        let most = samples.fold([0.0_f64; 3], |most, rates| {
-            [0, 1, 2].map(|k| most[k].max(rates[k].norm()))
-        });
+        let span = turning(steps.map(Vector3::from), h);
+        let most = sampled(&span, 200);
         let caps = [3.0, 30.0, 600.0];
         let whole = Stretch::whole(&span, &caps).ratios();
         let bounds = angular_bounds(&span, &SmoothOptions::new(0.01, limits), [0.0; 3]);
@@ -356,23 +328,9 @@ mod tests {
         for seed in 0..200_u32 {
             let part = |k: u32| f64::from(seed * 7 + k * 13).sin();
             let duration = 0.02 * f64::from(1 + seed % 5);
-            let mut control = vec![UnitQuaternion::identity()];
-            for k in 0..4 {
-                let step = [3 * k, 3 * k + 1, 3 * k + 2].map(|k| 0.5 * part(k));
-                let step = UnitQuaternion::from_scaled_axis(Vector3::from(step));
-                control.push(control[control.len() - 1] * step);
-            }
-            let span = Span {
-                start: 0.0,
-                duration,
-                point: [Vector3::zeros(); 5],
-                base: control[0],
-                turns: turns(&control, duration),
-            };
-            let samples = (0..=1000).map(|i| span.turning(duration * f64::from(i) / 1000.0).1);
-            let most = samples.fold([0.0_f64; 3], |most, rates| {
-                [0, 1, 2].map(|k| most[k].max(rates[k].norm()))
-            });
+            let step = |k: u32| Vector3::from([3 * k, 3 * k + 1, 3 * k + 2].map(|k| 0.5 * part(k)));
+            let span = turning([0, 1, 2, 3].map(step), duration);
+            let most = sampled(&span, 1000);
             let limits = ToolLimits {
                 angular_speed: most[0],
                 angular_acceleration: most[1],
@@ -405,19 +363,9 @@ mod tests {
             let (mut plain, mut known, mut coarse) = ([0.0_f64; 3], [0.0_f64; 3], 0);
             for seed in 0..60_u32 {
                 let angle = |k: u32| 0.9 * f64::from(seed * 7 + k * 13).sin();
-                let mut control = vec![UnitQuaternion::identity()];
-                for k in 0..4 {
-                    let step = Vector3::new(0.024, 0.004 * angle(k), 0.002 * angle(k + 1));
-                    let step = UnitQuaternion::from_scaled_axis(step * angle(5));
-                    control.push(control[control.len() - 1] * step);
-                }
-                let span = Span {
-                    start: 0.0,
-                    duration: 0.008,
-                    point: [Vector3::zeros(); 5],
-                    base: control[0],
-                    turns: turns(&control, 0.008),
-                };
+                let step =
+                    |k| Vector3::new(0.024, 0.004 * angle(k), 0.002 * angle(k + 1)) * angle(5);
+                let span = turning([0, 1, 2, 3].map(step), 0.008);
                 let close = angular_bounds(&span, &options, [0.0; 3]);
                 let bounds = angular_bounds(&span, &options, known);
                 coarse += usize::from(bounds != close);

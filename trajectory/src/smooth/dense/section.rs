@@ -191,7 +191,8 @@ impl<'a, const D: usize> Section<'a, D> {
         density: f64,
         balls: &Balls,
     ) -> Result<TimedCurve<D>, Failure> {
-        let mut best = self.timed(parameters, balls, &self.limits())?;
+        let limits = self.limits();
+        let mut best = self.timed(parameters, balls, &limits)?;
         let many = best.curve.fit.spans();
         // A tight bend takes little time, so it may need more knots over time than over its chords. Orientations may turn
         // between poses then, which poses on the legs do not allow.
@@ -200,7 +201,7 @@ impl<'a, const D: usize> Section<'a, D> {
             let before = best.timed.certificate.duration;
             let refitted = |more: &f64| {
                 let parameters = self.time_parameters(&best, [density, *more]);
-                self.timed(&parameters, balls, &self.limits()).ok()
+                self.timed(&parameters, balls, &limits).ok()
             };
             let faster = |next: &TimedCurve<D>| next.timed.certificate.duration < before;
             if let Some(next) = densities.iter().find_map(refitted).filter(faster) {
